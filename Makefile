@@ -1,0 +1,29 @@
+# Two commands do all set-up: `make demo` and `make test`. Everything lives in .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test test-all lint clean
+
+$(VENV)/ready: pyproject.toml setup.py constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip "setuptools>=77"
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+demo: $(VENV)/ready  ## a photograph-like picture, made here, to a scene in demo/
+	$(BIN)/python examples/make_picture.py demo/picture.png
+	$(BIN)/diff4splat generate demo/picture.png --camera spiral --out demo/scene
+
+test: $(VENV)/ready  ## everything that needs neither a GPU nor patience
+	$(BIN)/pytest -q -m "not slow"
+
+test-all: $(VENV)/ready  ## the same and the slow tests
+	$(BIN)/pytest -q
+
+lint: $(VENV)/ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info demo out

@@ -1,0 +1,89 @@
+"""Outputs appear whole or not at all: write under a temporary name, then rename."""
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from diff4splat.errors import OutputError
+
+_ADVICE = {
+    errno.ENOSPC: "the disk is full; free some space or choose another folder",
+    errno.EDQUOT: "the disk quota is used up; free some space or choose another folder",
+    errno.EFBIG: "the file would be larger than this system allows; choose another folder",
+    errno.EACCES: "no permission to write there; choose another folder",
+    errno.EPERM: "no permission to write there; choose another folder",
+    errno.EROFS: "the file system is read-only; choose another folder",
+    errno.ENOTDIR: "a file stands where a folder is needed; choose another folder",
+    errno.EEXIST: "a file stands where a folder is needed; choose another folder",
+    errno.EISDIR: "a folder stands where the file should go; remove it or choose another name",
+    errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+}
+
+
+def output_error(target: Path, error: OSError) -> OutputError:
+    """The same failure in words that say what to do."""
+    advice = _ADVICE.get(error.errno or 0, error.strerror or str(error))
+    return OutputError(f"{target}: expected to write here, but {advice}")
+
+
+@contextmanager
+def atomic_path(target: Path) -> Iterator[Path]:
+    """Yield a temporary name beside ``target`` and rename it when the block succeeds.
+
+    The suffix is kept, because some writers choose the format by it. On any failure, an interrupt
+    included, the temporary file is removed and an existing ``target`` stays as it was.
+
+    Raises:
+        OutputError: the folder cannot be made or written.
+    """
+    temporary = target.with_name(f".{target.stem}.partial-{os.getpid()}{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():
+            raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
+        yield temporary
+        os.replace(temporary, target)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise output_error(target, error) from error
+    finally:
+        if temporary.exists():
+            temporary.unlink()
+
+
+def write_text(target: Path, text: str) -> None:
+    """Write a small text file whole or not at all."""
+    with atomic_path(target) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def atomic_folder(target: Path) -> Iterator[Path]:
+    """Yield an empty staging folder and move its files into ``target`` when the block succeeds.
+
+    A set of files that belong together appears together: on any failure, an interrupt included,
+    everything staged is removed and what stood in ``target`` before is untouched. Entering the
+    block already proves that the folder can be written.
+
+    Raises:
+        OutputError: the folder cannot be made or written.
+    """
+    existed = target.exists()
+    staging = target / f".partial-{os.getpid()}"
+    try:
+        staging.mkdir(parents=True, exist_ok=True)
+        yield staging
+        for file in sorted(staging.iterdir()):
+            os.replace(file, target / file.name)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise output_error(target, error) from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        if not existed and target.is_dir() and not any(target.iterdir()):
+            target.rmdir()

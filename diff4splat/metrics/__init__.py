@@ -1,0 +1,1 @@
+"""Measures of images, video, depth, poses and motion."""

@@ -1,0 +1,1 @@
+"""Camera paths: presets, key frames and file formats."""

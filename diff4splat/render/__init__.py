@@ -1,0 +1,1 @@
+"""Rendering: one API, several back ends; the reference is plain PyTorch."""

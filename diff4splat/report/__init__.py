@@ -1,0 +1,1 @@
+"""Error against run time, stability, and what was left out."""

@@ -1,0 +1,1 @@
+"""The scene: Gaussians, a motion, suggested cameras and provenance."""

@@ -1,0 +1,1 @@
+"""How Gaussians move: every motion answers ``state_at(gaussians, time_s)``."""

@@ -1,0 +1,49 @@
+"""A scene is Gaussians plus a motion, with suggested cameras and a record of where it came from."""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.protocol import Motion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where a scene came from; travels inside the scene file."""
+
+    generator: str
+    """Program and version, such as ``diff4splat 0.1.0``."""
+    model: str = "none"
+    weights_sha256: str = "none"
+    seed: int | None = None
+    prompt: str | None = None
+    license: str = "unknown"
+    untrained: bool = False
+    """True while the weights are random: the scene shows the photograph standing in space."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Explicit 4D Gaussians that any camera can look at, at any time."""
+
+    gaussians: Gaussians
+    motion: Motion
+    path: CameraPath
+    """The suggested camera path; looking along another one is always possible."""
+    provenance: Provenance
+
+    def state_at(self, time_s: float) -> Gaussians:
+        """The Gaussians as they stand at ``time_s`` seconds."""
+        return self.motion.state_at(self.gaussians, time_s)
+
+    def select(self, kept: Bool[Tensor, " n"]) -> "Scene":
+        """The scene with only the Gaussians under a mask."""
+        return replace(self, gaussians=self.gaussians.select(kept), motion=self.motion.select(kept))
+
+    def to(self, target: torch.device | torch.dtype) -> "Scene":
+        """Move or cast Gaussians and motion; the suggested path stays where it is."""
+        return replace(self, gaussians=self.gaussians.to(target), motion=self.motion.to(target))
