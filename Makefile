@@ -12,8 +12,8 @@ $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	touch $@
 
 demo: $(VENV)/ready  ## a photograph-like picture, made here, to a scene in demo/
-	$(BIN)/python examples/make_picture.py demo/picture.png
-	$(BIN)/diff4splat generate demo/picture.png --camera spiral --out demo/scene
+	$(BIN)/python examples/make_picture.py demo/picture.jpg
+	$(BIN)/diff4splat generate demo/picture.jpg --camera spiral --out demo/scene
 
 test: $(VENV)/ready  ## everything that needs neither a GPU nor patience
 	$(BIN)/pytest -q -m "not slow"

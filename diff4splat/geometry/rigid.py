@@ -57,6 +57,7 @@ def require_rigid(poses: Float[Tensor, "*b 4 4"], what: str, tolerance: float = 
     Raises:
         InputError: a value is not finite, a rotation is left-handed, or it scales or shears.
     """
+    poses = poses.detach()
     rotation = poses[..., :3, :3].double()
     if not bool(torch.isfinite(poses).all()):
         raise InputError(f"{what}: expected finite numbers, got NaN or infinity; repair the file")
@@ -65,7 +66,7 @@ def require_rigid(poses: Float[Tensor, "*b 4 4"], what: str, tolerance: float = 
             f"{what}: expected right-handed rotations (determinant +1), got determinant -1; "
             "one axis is mirrored, flip it in the file"
         )
-    error = (rotation @ rotation.mT - torch.eye(3, dtype=torch.float64)).abs().amax()
+    error = (rotation @ rotation.mT - torch.eye(3, dtype=torch.float64, device=poses.device)).abs().amax()
     if float(error) > tolerance:
         raise InputError(
             f"{what}: expected rotations without scale or shear, got an error of {float(error):.2g}"

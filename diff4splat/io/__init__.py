@@ -1,1 +1,1 @@
-"""Files: scenes, PLY, images, video, EXR. Outputs are written under a temporary name and renamed."""
+"""Files: scenes, PLY, images, video, EXR. Outputs appear whole or not at all (``atomic``)."""

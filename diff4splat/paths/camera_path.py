@@ -25,7 +25,8 @@ class CameraPath:
     def __post_init__(self) -> None:
         if self.cameras.batch_shape != tuple(self.times_s.shape):
             raise ShapeError(
-                f"CameraPath.times_s: expected {self.cameras.batch_shape}, got {tuple(self.times_s.shape)}"
+                f"CameraPath.times_s: expected {self.cameras.batch_shape}, "
+                f"got {tuple(self.times_s.shape)}"
             )
 
     def __len__(self) -> int:
@@ -36,11 +37,12 @@ def require_usable(path: CameraPath, what: str) -> CameraPath:
     """Return ``path`` when a renderer can follow it.
 
     Raises:
-        InputError: no poses, values that are not finite, no rotation, or times that do not increase.
+        InputError: no poses, values that are not finite, no rotation, or times that do not
+            increase.
     """
     if len(path) == 0:
         raise InputError(f"{what}: expected at least one camera pose, got none")
-    rigid.require_rigid(path.cameras.world_from_camera, what)
+    rigid.require_rigid(path.cameras.world_from_camera.detach(), what)
     intrinsics = torch.cat([path.cameras.focal_px, path.cameras.center_px], -1)
     if not bool(torch.isfinite(intrinsics).all() and (path.cameras.focal_px > 0).all()):
         raise InputError(f"{what}: expected finite intrinsics and focal lengths above 0")

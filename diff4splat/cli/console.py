@@ -1,0 +1,40 @@
+"""What a person sees: progress bars, notes and one-line errors, all on the error stream."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from diff4splat.report.phases import Advance, Phases
+
+CONSOLE = Console(stderr=True, highlight=False)
+
+
+class ConsolePhases(Phases):
+    """Phases that draw one progress bar each."""
+
+    @contextmanager
+    def bar(self, name: str, steps: int) -> Iterator[Advance]:
+        """One bar for one phase; it stays on screen when the phase is over."""
+        columns = (
+            TextColumn("{task.description:<14}"),
+            BarColumn(bar_width=28),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+        )
+        with Progress(*columns, console=CONSOLE) as progress:
+            task = progress.add_task(name, total=steps)
+            yield lambda: progress.advance(task)
+            progress.update(task, completed=steps)
+
+
+def note(text: str) -> None:
+    """One line of information."""
+    CONSOLE.print(text, markup=False, soft_wrap=True)
+
+
+def fail(error: Exception) -> None:
+    """One line that says what was expected and what to do."""
+    line = " ".join(str(error).split())
+    CONSOLE.print(f"diff4splat: {line}", style="bold red", markup=False, soft_wrap=True)

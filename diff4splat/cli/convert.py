@@ -1,0 +1,48 @@
+"""``diff4splat convert``: a scene as INRIA PLY, at one time or as a numbered sequence."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from diff4splat.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convert:
+    """Write a scene as PLY: one file at one time, or a numbered sequence into a folder."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A scene file."""
+    out: Path
+    """A name ending in .ply for one time, or a folder for a sequence."""
+    time: float | None = None
+    """Seconds, for a single file (default: the first time of the motion)."""
+    fps: float = 24.0
+    """Files per second of a sequence."""
+
+    def run(self) -> None:
+        """Read, convert, write; existing files are replaced only by whole ones."""
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.io.ply import write_ply, write_ply_sequence
+        from diff4splat.io.scene_file import load_scene
+
+        scene = load_scene(self.scene)
+        start_s, stop_s = scene.motion.time_range_s
+        if self.out.suffix.lower() == ".ply":
+            time_s = start_s if self.time is None else self.time
+            write_ply(scene.state_at(time_s), self.out, comments=(f"time_s {time_s:g}",))
+            note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians at {time_s:g} s)")
+            return
+        if self.time is not None:
+            raise ConfigError(
+                "--time: expected together with one .ply file; --out is a folder here"
+            )
+        if not 0 < self.fps < 1e4:
+            raise ConfigError(f"--fps: expected a number above 0, got {self.fps:g}")
+        count = int((stop_s - start_s) * self.fps) + 1
+        times_s = [start_s + index / self.fps for index in range(count)]
+        with ConsolePhases().phase("write PLY", count) as advance:
+            write_ply_sequence(scene, self.out, times_s, advance=advance)
+        note(f"wrote {count} files to {self.out}")

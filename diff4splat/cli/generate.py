@@ -1,0 +1,113 @@
+"""``diff4splat generate``: one photograph, a camera path and optional text to a scene folder.
+
+photograph ─ load_picture ─┐
+--camera ── choose_path ───┼─ Diff4SplatPipeline ─ Scene ─ render_frames ─ write_scene_folder
+--prompt ── require_prompt ┘
+"""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from diff4splat.cli.camera_choice import CameraOptions, choose_path
+
+if TYPE_CHECKING:
+    from diff4splat.models.picture import Picture
+    from diff4splat.models.settings import GenerationSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generate:
+    """Turn one photograph into a 4D scene: scene file, video, depth, contact sheet and card."""
+
+    image: Annotated[Path, tyro.conf.Positional]
+    """The photograph: an 8-bit RGB JPEG, PNG, WebP, AVIF, TIFF or BMP."""
+    camera: str = "spiral"
+    """Presets chained with `+`, such as `spiral` or `orbit:0.25+up`, or a path file."""
+    prompt: str | None = None
+    """What happens in the scene (default: no text, and no text encoder)."""
+    out: Path = Path("out")
+    """Folder for the results."""
+    options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
+    seed: int = 0
+    """One seed gives one scene, bit for bit on one machine."""
+    model: str = "small"
+    """A model folder, or the name of a size with random weights: test, small."""
+    resolution: int | None = None
+    """Side of a square with as many pixels as the picture will have (default: the model's)."""
+    fov: float | None = None
+    """Horizontal field of view in degrees (default: from EXIF, else a 30 mm lens)."""
+    steps: int = 16
+    """Steps of the sampler."""
+    sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
+    """How the flow is integrated; `diff4splat report error-time` compares them."""
+    guidance: float = 4.0
+    """How strongly to follow the prompt; 1 switches guidance off."""
+    min_opacity: float = 0.005
+    """Fainter Gaussians are dropped."""
+    skip_depth: bool = False
+    """Neither blend nor write depth."""
+    convert: bool = False
+    """Accept grey, alpha, palette, CMYK, 16-bit and animated pictures and convert them."""
+
+    def run(self) -> None:
+        """Check everything cheap first, then generate, render and write."""
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.io.atomic import atomic_folder
+        from diff4splat.models.context import view_of
+        from diff4splat.models.pipeline import Diff4SplatPipeline
+        from diff4splat.report.card import Result, describe, write_card
+        from diff4splat.report.run_log import RunLog
+        from diff4splat.report.scene_folder import render_frames, write_scene_folder
+
+        settings, log = self.settings(), RunLog(phases=ConsolePhases())
+        picture = self.picture()
+        note("; ".join((f"focal length: {picture.focal_source}", *picture.notes)))
+        path = choose_path(self.camera, view_of(picture.camera), self.options)
+        with atomic_folder(self.out) as folder:
+            with log.phases.phase("load model"):
+                pipeline = Diff4SplatPipeline.from_pretrained(self.model)
+            scene = pipeline(picture, path, self.prompt, seed=self.seed, settings=settings, log=log)
+            frames = render_frames(scene, path, log, with_depth=not self.skip_depth)
+            result = Result.of(scene, picture.rgb, frames.rgb[0])
+            facts = describe(result, self.camera, picture.focal_source)
+            write_scene_folder(folder, result, frames, facts, log.phases)
+            write_card(folder / "card.json", result, self.inputs(picture), log)
+        for line in (*(f"{name}: {value}" for name, value in facts), f"wrote {self.out}"):
+            note(line)
+
+    def settings(self) -> "GenerationSettings":
+        """Sampling, guidance and pruning, checked."""
+        from diff4splat.flow.guidance import Guidance
+        from diff4splat.models.settings import GUIDANCE_INTERVAL, GenerationSettings
+
+        low, high = GUIDANCE_INTERVAL
+        return GenerationSettings(
+            steps=self.steps,
+            sampler=self.sampler,
+            guidance=Guidance(weight=self.guidance, low=low, high=high),
+            min_opacity=self.min_opacity,
+        )
+
+    def picture(self) -> "Picture":
+        """The photograph at the model's size; the prompt is checked on the way, it is cheap."""
+        from diff4splat.models.picture import load_picture
+        from diff4splat.models.pretrained import find_config
+        from diff4splat.models.prompt import require_prompt
+
+        config = find_config(self.model)
+        if self.prompt is not None:
+            require_prompt(self.prompt, config.text.max_bytes)
+        side_px = max(config.size_px) if self.resolution is None else self.resolution
+        return load_picture(self.image, side_px, self.fov, self.convert)
+
+    def inputs(self, picture: "Picture") -> dict[str, object]:
+        """Every setting as it was used, for the card."""
+        given = {name: value for name, value in asdict(self).items() if name != "options"}
+        given |= asdict(self.options)
+        given |= {"focal_source": picture.focal_source, "notes": picture.notes}
+        return {
+            name: str(value) if isinstance(value, Path) else value for name, value in given.items()
+        }

@@ -1,0 +1,63 @@
+"""``diff4splat inspect``: what a network size holds, or what a scene file contains."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from diff4splat.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inspect:
+    """Show the contents of a scene file, or the parameter counts of a network size."""
+
+    scene: Annotated[Path | None, tyro.conf.Positional] = None
+    """A scene file."""
+    config: str | None = None
+    """A network size: test, small or paper. Nothing is allocated, whatever the size."""
+
+    def run(self) -> None:
+        """Print a table to standard output."""
+        if (self.scene is None) == (self.config is None):
+            raise ConfigError("inspect: expected a scene file or --config NAME, one of the two")
+        lines = size_lines(self.config) if self.config else scene_lines(self.scene)
+        print("\n".join(lines))
+
+
+def size_lines(name: str) -> list[str]:
+    """Parameters per network, counted on the meta device."""
+    from diff4splat.models.factory import parameter_counts
+    from diff4splat.models.sizes import size_by_name
+
+    counts = parameter_counts(size_by_name(name))
+    width = max(map(len, counts))
+    rows = [f"{part:<{width}}  {count:>16,}" for part, count in counts.items()]
+    return [
+        f"{'network':<{width}}  {'parameters':>16}",
+        *rows,
+        f"{'total':<{width}}  {sum(counts.values()):>16,}",
+    ]
+
+
+def scene_lines(file: Path) -> list[str]:
+    """Counts, times, cameras and provenance of a scene file."""
+    from dataclasses import asdict
+
+    from diff4splat.io.scene_file import load_scene
+    from diff4splat.scene.extent import depth_range
+
+    scene = load_scene(file)
+    depths, (start_s, stop_s) = depth_range(scene), scene.motion.time_range_s
+    height, width = scene.path.cameras.size_px
+    facts = {
+        "gaussians": f"{len(scene.gaussians):,}",
+        "moving": f"{len(scene.motion.moving_index):,} ({type(scene.motion).__name__})",
+        "harmonics": f"degree {scene.gaussians.degree}",
+        "time": f"{start_s:g} to {stop_s:g} s",
+        "cameras": f"{len(scene.path)} of {width}×{height} px",
+        "depth": f"near {depths.near:.3g}, median {depths.focus:.3g} scene units",
+        **{key: str(value) for key, value in asdict(scene.provenance).items()},
+    }
+    return [f"{name:<16}{value}" for name, value in facts.items()]

@@ -1,0 +1,63 @@
+"""``diff4splat``: one command per file; torch is imported only inside the command that runs."""
+
+import signal
+import sys
+from typing import Annotated, NoReturn
+
+import tyro
+
+from diff4splat.cli.convert import Convert
+from diff4splat.cli.generate import Generate
+from diff4splat.cli.inspect import Inspect
+from diff4splat.cli.paths import ListPaths, PreviewPath
+from diff4splat.cli.render import Render
+from diff4splat.cli.report import ErrorTime, ListKnobs
+from diff4splat.errors import Diff4SplatError
+
+subcommand = tyro.conf.subcommand
+Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
+Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
+Command = (
+    Annotated[Generate, subcommand("generate")]
+    | Annotated[Render, subcommand("render")]
+    | Annotated[Convert, subcommand("convert")]
+    | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
+    | Annotated[Inspect, subcommand("inspect")]
+    | Annotated[Report, subcommand("report", description="Error against run time.")]
+)
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+def main() -> NoReturn:
+    """Run the command line; errors a person can act on end in one line and exit code 2."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """The exit code of one command."""
+    command = tyro.cli(
+        Command,
+        prog="diff4splat",
+        description="One image, a camera path and optional text to an explicit 4D Gaussian scene.",
+        args=arguments,
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
+    )
+    # A polite kill unwinds like Ctrl-C, so that staged files are removed.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        command.run()
+    except Diff4SplatError as error:
+        from diff4splat.cli.console import fail
+
+        fail(error)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        from diff4splat.cli.console import note
+
+        note("diff4splat: stopped; no half-written file was left")
+        return INTERRUPTED
+    return 0
+
+
+if __name__ == "__main__":
+    main()

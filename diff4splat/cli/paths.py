@@ -1,0 +1,75 @@
+"""``diff4splat paths``: list the presets, check and draw a path; no model is loaded."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diff4splat.paths.summary import PathSummary
+
+PREVIEW_SIZE_PX = (360, 640)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreviewPath:
+    """Check a camera path and draw it."""
+
+    camera: Annotated[str, tyro.conf.Positional]
+    """Presets such as `spiral` or `orbit:0.25+up`, or a path file."""
+    out: Path = Path("path.png")
+    """Where to draw it."""
+    fov: float = 62.0
+    """Horizontal field of view in degrees, for presets and files without a lens."""
+    near_depth: float = 1.0
+    """Distance of the nearest content, which sizes the presets."""
+    options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
+
+    def run(self) -> None:
+        """Print what the camera does, then write the drawing."""
+        from diff4splat.cli.console import note
+        from diff4splat.geometry.camera import focal_from_fov, pinhole
+        from diff4splat.paths.settings import PathFrame
+        from diff4splat.paths.summary import summarize
+        from diff4splat.report.plot import save_path_preview
+
+        if not 1 <= self.fov <= 170:
+            raise ConfigError(f"--fov: expected 1 to 170 degrees, got {self.fov:g}")
+        camera = pinhole(focal_from_fov(self.fov, PREVIEW_SIZE_PX[1]), PREVIEW_SIZE_PX)
+        view = PathFrame(camera=camera, near_depth=self.near_depth, focus_depth=self.near_depth)
+        path = choose_path(self.camera, view, self.options)
+        print_summary(summarize(path, self.near_depth))
+        save_path_preview(path, self.out, self.camera)
+        note(f"drew {self.out}")
+
+
+def print_summary(summary: "PathSummary") -> None:
+    """What the camera does, in numbers, and what is odd about it."""
+    low, high = summary.focal_range_px
+    facts = {
+        "frames": f"{summary.frames} in {summary.seconds:.3g} s",
+        "travel": f"{summary.travel:.3g} scene units, at most {summary.farthest:.3g} from the start",
+        "largest step": f"{summary.largest_step:.3g} scene units",
+        "turn": f"{summary.turn_deg:.3g} degrees, at most {summary.largest_turn_deg:.3g} per frame",
+        "focal length": f"{low:.4g} to {high:.4g} px" if high > low else f"{low:.4g} px",
+    }
+    for name, value in facts.items():
+        print(f"{name:<14}{value}")
+    for warning in summary.warnings:
+        print(f"warning       {warning}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListPaths:
+    """List the camera presets."""
+
+    def run(self) -> None:
+        """Print one line per preset."""
+        from diff4splat.paths.presets import PRESETS
+
+        for name, preset in PRESETS.items():
+            print(f"{name:<12} {preset.summary}")

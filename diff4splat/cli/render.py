@@ -1,0 +1,78 @@
+"""``diff4splat render``: any camera path and any time, from a scene file alone."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diff4splat.paths.camera_path import CameraPath
+    from diff4splat.scene.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Render:
+    """Look at a scene along any camera path, at any time."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A scene file."""
+    out: Path = Path("render.mp4")
+    """A video (.mp4), one picture (.png) or depth (.exr)."""
+    camera: str | None = None
+    """Presets or a path file (default: the path that the scene suggests)."""
+    time: float | None = None
+    """Stop the clock at this many seconds (default: time runs along the path)."""
+    frame: int = 0
+    """Which pose of the path a single picture shows; -1 is the last."""
+    resolution: int | None = None
+    """Pixels on the longer side (default: as the scene suggests)."""
+    options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
+
+    def run(self) -> None:
+        """Load, choose cameras and times, render, write."""
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.io.scene_file import load_scene
+        from diff4splat.report.run_log import RunLog
+        from diff4splat.report.scene_folder import write_view
+
+        scene = load_scene(self.scene)
+        path = self.chosen_path(scene)
+        if self.out.suffix.lower() == ".png":
+            path = one_pose(path, self.frame)
+        write_view(scene, path, self.out, self.time, RunLog(phases=ConsolePhases()))
+        note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
+
+    def chosen_path(self, scene: "Scene") -> "CameraPath":
+        """Cameras at the asked size, with the times at which the scene is shown."""
+        from diff4splat.paths.picture_size import resized
+        from diff4splat.paths.settings import PathFrame
+        from diff4splat.scene.extent import depth_range
+
+        own = scene.path
+        if self.resolution is not None:
+            own = resized(own, longer_side(own.cameras.size_px, self.resolution))
+        if self.camera is None:
+            return own
+        depths = depth_range(scene)
+        view = PathFrame(camera=own.cameras[0], near_depth=depths.near, focus_depth=depths.focus)
+        return choose_path(self.camera, view, self.options)
+
+
+def longer_side(size_px: tuple[int, int], pixels: int) -> tuple[int, int]:
+    """(height, width) of the same shape with ``pixels`` on the longer side."""
+    if not 1 <= pixels <= 8192:
+        raise ConfigError(f"--resolution: expected 1 to 8192 pixels, got {pixels}")
+    height, width = (max(1, round(side * pixels / max(size_px))) for side in size_px)
+    return height, width
+
+
+def one_pose(path: "CameraPath", frame: int) -> "CameraPath":
+    """The path that consists of one of its poses."""
+    if not -len(path) <= frame < len(path):
+        raise ConfigError(f"--frame: expected -{len(path)} to {len(path) - 1}, got {frame}")
+    index = slice(frame % len(path), frame % len(path) + 1)
+    return replace(path, cameras=path.cameras[index], times_s=path.times_s[index])

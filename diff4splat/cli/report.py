@@ -1,0 +1,38 @@
+"""``diff4splat report``: error against run time of every registered approximation."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorTime:
+    """Sweep approximations: a table, a plot with the Pareto front and JSON for each."""
+
+    out: Path = Path("error-time")
+    """Folder for the results."""
+    knob: tuple[str, ...] = ()
+    """Names to sweep (default: all; see `diff4splat report knobs`)."""
+    repeats: int = 3
+    """Timed runs per setting; the fastest counts."""
+
+    def run(self) -> None:
+        """Measure, write, and print the table."""
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.report import error_time
+
+        written = error_time.run(self.out, self.knob, self.repeats, ConsolePhases())
+        print(written.table)
+        note(f"wrote {', '.join(file.name for file in written.files)} to {self.out}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListKnobs:
+    """List every approximation that can be swept, with its settings and default."""
+
+    def run(self) -> None:
+        """Print one line per knob."""
+        from diff4splat.report.known_knobs import known_knobs
+
+        for knob in known_knobs():
+            settings = ", ".join(str(setting) for setting in knob.settings)
+            print(f"{knob.name}: {knob.summary}\n  default {knob.default}; settings {settings}")

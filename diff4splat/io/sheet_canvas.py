@@ -1,0 +1,93 @@
+"""A page to put pictures and short texts on; positions are (x, y) pixels from the top left."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from PIL import Image, ImageDraw, ImageFont
+from torch import Tensor
+
+from diff4splat.io.pixels import from_bytes, to_bytes
+
+BACKGROUND, INK, FAINT = (22, 24, 29), (236, 238, 242), (154, 160, 172)
+FRAME, NOTE_PAPER, NOTE_INK = (48, 52, 62), (64, 46, 12), (255, 205, 112)
+
+Color = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Style:
+    """How a text looks."""
+
+    size_px: int = 20
+    color: Color = INK
+
+    @property
+    def line_px(self) -> int:
+        """Distance from one line to the next."""
+        return round(self.size_px * 1.4)
+
+
+@cache
+def _font(size_px: int) -> ImageFont.FreeTypeFont:
+    return ImageFont.load_default(size_px)
+
+
+def text_width(text: str, style: Style) -> int:
+    """Pixels that one line takes."""
+    return -int(-_font(style.size_px).getlength(text) // 1)
+
+
+def wrap(text: str, style: Style, width: int) -> list[str]:
+    """Lines no wider than ``width``, broken at spaces, and inside words that are too long."""
+    lines = [""]
+    for word in text.split():
+        if lines[-1] and text_width(f"{lines[-1]} {word}", style) <= width:
+            lines[-1] += f" {word}"
+            continue
+        if lines[-1]:
+            lines.append("")
+        for letter in word:
+            if lines[-1] and text_width(lines[-1] + letter, style) > width:
+                lines.append("")
+            lines[-1] += letter
+    return lines
+
+
+class Canvas:
+    """The page while it is being drawn."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._image = Image.new("RGB", (width, height), BACKGROUND)
+        self._draw = ImageDraw.Draw(self._image)
+
+    def text(self, position: tuple[int, int], text: str, style: Style) -> None:
+        """One line; ``position`` is the top left of its letters."""
+        self._draw.text(position, text, fill=style.color, font=_font(style.size_px))
+
+    def box(self, position: tuple[int, int], size: tuple[int, int], color: Color) -> None:
+        """A filled rectangle with round corners; ``size`` is (width, height)."""
+        corner = (position[0] + size[0] - 1, position[1] + size[1] - 1)
+        self._draw.rounded_rectangle((*position, *corner), radius=6, fill=color)
+
+    def picture(
+        self, position: tuple[int, int], size: tuple[int, int], rgb: Float[Tensor, "h w 3"]
+    ) -> None:
+        """A picture scaled to ``size`` (width, height) with a thin frame just outside."""
+        x, y = position
+        self._draw.rectangle((x - 1, y - 1, x + size[0], y + size[1]), outline=FRAME)
+        scaled = Image.fromarray(to_bytes(rgb)).resize(size, Image.Resampling.LANCZOS)
+        self._image.paste(scaled, position)
+
+    def to_rgb(self) -> Float[Tensor, "h w 3"]:
+        """The finished page."""
+        return from_bytes(np.asarray(self._image))
+
+
+def fitted(shape: torch.Size, box: tuple[int, int]) -> tuple[int, int]:
+    """The largest (width, height) inside ``box`` for a picture of shape (height, width, ...)."""
+    height, width = shape[:2]
+    factor = min(box[0] / width, box[1] / height)
+    return max(round(width * factor), 1), max(round(height * factor), 1)

@@ -1,0 +1,1 @@
+"""Camera path files as pure functions between text and CameraPath; one module per format."""

@@ -1,0 +1,117 @@
+"""What can be asked of a renderer, and what it answers.
+
+Axes: ``h w`` pixels. Depth is camera-space z in scene units, flow is in pixels (x, y).
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.errors import ConfigError
+from diff4splat.geometry.camera import Camera
+from diff4splat.scene.gaussians import Gaussians
+
+OUTPUTS = ("rgb", "depth", "median_depth", "alpha", "flow")
+"""Every picture that a renderer can make."""
+
+_LEAST_MEMORY = 1 << 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderSettings:
+    """How a picture is made; the defaults are those of Kerbl et al. 2023."""
+
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """RGB behind the scene. For a learnt one render over black and add (1 - alpha) * background."""
+    dilation_px2: float = 0.3
+    """Variance added to both axes of every footprint, in square pixels; 0 switches it off."""
+    antialias: bool = False
+    """Scale opacities by sqrt(det / det_dilated): dilation adds no light (Yu et al. 2024)."""
+    alpha_cutoff: float = 1 / 255
+    """Contributions to a pixel below this are nothing; it also bounds the support."""
+    alpha_max: float = 0.999
+    """Largest opacity of one contribution; below 1 so that the light behind has a gradient."""
+    near_depth: float = 0.01
+    """Gaussians whose centre is nearer than this, in scene units, are not drawn."""
+    tile_px: int = 8
+    """Edge of the square tiles that share one list of Gaussians."""
+    memory_bytes: int = 256 << 20
+    """What the compositing may allocate beyond its inputs and outputs."""
+    flow_camera: Camera | None = None
+    """Where the camera is at the end of the flow; None is the same camera."""
+    flow_time_s: float | None = None
+    """When the flow ends; None is the same time."""
+
+    def __post_init__(self) -> None:
+        accepted = {
+            "background": len(self.background) == 3 and all(map(math.isfinite, self.background)),
+            "dilation_px2": 0 <= self.dilation_px2 < math.inf,
+            "alpha_cutoff": 0 < self.alpha_cutoff < 1,
+            "alpha_max": self.alpha_cutoff < self.alpha_max < 1,
+            "near_depth": 0 < self.near_depth < math.inf,
+            "tile_px": self.tile_px >= 1,
+            "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
+        }
+        for name, fine in accepted.items():
+            if not fine:
+                raise ConfigError(
+                    f"RenderSettings.{name}: expected {_EXPECTED[name]}, got {getattr(self, name)}"
+                )
+
+
+_EXPECTED = {
+    "background": "three finite numbers",
+    "dilation_px2": "a finite number of at least 0",
+    "alpha_cutoff": "a number above 0 and below 1",
+    "alpha_max": "a number above alpha_cutoff and below 1",
+    "near_depth": "a finite number above 0",
+    "tile_px": "at least 1",
+    "memory_bytes": f"at least {_LEAST_MEMORY}",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderOutput:
+    """The pictures asked for; None for the others."""
+
+    rgb: Float[Tensor, "h w 3"] | None = None
+    depth: Float[Tensor, "h w"] | None = None
+    """Expected z, Σ w z / Σ w; 0 where nothing is seen."""
+    median_depth: Float[Tensor, "h w"] | None = None
+    """z of the Gaussian behind which at most half of the light is left; 0 where more is left."""
+    alpha: Float[Tensor, "h w"] | None = None
+    flow: Float[Tensor, "h w 2"] | None = None
+    """Where the surface goes, in pixels; 0 where nothing is seen."""
+    dropped_nonfinite: int = 0
+    """Gaussians left out because a parameter is NaN, infinite, or too large to be squared."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderJob:
+    """One picture to make: what every back end gets. Tensors share one dtype and device."""
+
+    gaussians: Gaussians
+    camera: Camera
+    outputs: frozenset[str]
+    settings: RenderSettings
+    flow_gaussians: Gaussians
+    """The same Gaussians at the end of the flow."""
+    flow_camera: Camera
+
+
+def require_outputs(outputs: Collection[str]) -> frozenset[str]:
+    """The set of ``outputs`` when all of them are known.
+
+    Raises:
+        ConfigError: none is named, or a name is unknown.
+    """
+    known = ", ".join(OUTPUTS)
+    if isinstance(outputs, str) or not outputs:
+        raise ConfigError(f"outputs: expected a collection of names among {known}, got {outputs!r}")
+    unknown = sorted(set(outputs) - set(OUTPUTS))
+    if unknown:
+        raise ConfigError(f"outputs: expected names among {known}, got {', '.join(unknown)}")
+    return frozenset(outputs)

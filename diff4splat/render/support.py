@@ -1,0 +1,71 @@
+"""Which Gaussians can be seen, and where.
+
+Axes: ``n`` Gaussians, ``m`` visible ones. A contribution o exp(-q / 2) reaches the cutoff c where
+q ≤ 2 ln(o / c), so the support of a footprint is an ellipse whose exact half extents are σ_x r and
+σ_y r, r² = 2 ln(o / c); an opacity below the cutoff has no support.
+"""
+
+from dataclasses import fields
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from diff4splat.geometry.camera import Camera
+from diff4splat.render.projection import Footprints, camera_space, footprints
+from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.gaussians import Gaussians
+
+_THINNEST_PX = 1e-6
+"""Footprints with a thinner axis pass between all pixel centres and have no usable gradient."""
+
+
+@torch.no_grad()
+def visible_order(
+    gaussians: Gaussians, camera: Camera, settings: RenderSettings
+) -> tuple[Int[Tensor, " m"], int]:
+    """Indices of the Gaussians that touch the picture, nearest first, and how many are not finite.
+
+    Equal depths keep the order of their indices.
+    """
+    usable = _usable(gaussians)
+    depth = camera_space(camera, gaussians.means)[:, 2]
+    candidate = (
+        usable & (depth > settings.near_depth) & (gaussians.opacities >= settings.alpha_cutoff)
+    )
+    index = candidate.nonzero().squeeze(1)
+    prints = footprints(gaussians.select(index), camera, settings)
+    box = pixel_boxes(prints, camera.size_px, settings.alpha_cutoff)
+    seen = (box[:, 2:] > box[:, :2]).all(-1) & (_thin_axis_px(prints) >= _THINNEST_PX)
+    index, depth = index[seen], prints.depth[seen]
+    return index[depth.argsort(stable=True)], len(gaussians) - int(usable.sum())
+
+
+@torch.no_grad()
+def pixel_boxes(
+    prints: Footprints, size_px: tuple[int, int], alpha_cutoff: float
+) -> Int[Tensor, "n 4"]:
+    """Half-open boxes (left, top, right, bottom) of the pixels that a support may contain.
+
+    A shade too large, because the cutoff is decided per pixel: were it decided by the rounding of
+    the box, the picture would depend on the tile size. A support off the picture has an empty box.
+    """
+    radius = (2 * (prints.opacities / alpha_cutoff).log().clamp_min(0)).sqrt()
+    extent = 1.001 * prints.sigma_px * radius[:, None] + 0.01
+    last = prints.center_px.new_tensor([size_px[1], size_px[0]])
+    start = torch.minimum((prints.center_px - extent - 0.5).ceil().clamp_min(0), last)
+    stop = torch.minimum((prints.center_px + extent + 0.5).floor().clamp_min(0), last)
+    reachable = prints.opacities >= alpha_cutoff
+    return torch.where(reachable[:, None], torch.cat([start, stop], -1), 0).nan_to_num().long()
+
+
+def _usable(gaussians: Gaussians) -> Bool[Tensor, " n"]:
+    """Every parameter is finite, and can be squared without overflow."""
+    largest = torch.finfo(gaussians.means.dtype).max ** 0.5
+    rows = [getattr(gaussians, field.name)[:, None].flatten(1) for field in fields(gaussians)]
+    return (torch.cat(rows, 1).abs() < largest).all(1)
+
+
+def _thin_axis_px(prints: Footprints) -> Float[Tensor, " n"]:
+    """A lower bound on the standard deviation along the thin axis: sqrt(determinant / trace)."""
+    return 1 / (prints.whitening[:, 0] * prints.whitening[:, 2] * prints.sigma_px.norm(dim=-1))

@@ -1,0 +1,81 @@
+"""Knobs: approximations whose error and run time are measured against a registered reference.
+
+A knob has settings from cheap to exact. ``run`` computes a result with one setting, ``error``
+compares it with the result of the reference setting; 0 means the same.
+"""
+
+import re
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any
+
+from torch import Tensor
+
+from diff4splat.errors import ConfigError
+from diff4splat.paths.names import unknown_name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knob:
+    """One approximation: what it may be set to, and against what it is measured."""
+
+    name: str
+    """Also part of file names: lower case, digits and ``-``."""
+    summary: str
+    """What is approximated, in one line."""
+    error_unit: str
+    settings: tuple[Hashable, ...]
+    """Values with a readable ``str``."""
+    default: Hashable
+    """One of ``settings``."""
+    reference: Hashable
+    """The setting that counts as exact; need not be one of ``settings``."""
+    run: Callable[[Any], Tensor]
+    error: Callable[[Tensor, Tensor], float]
+    """(result, result of the reference) to an error of 0 or above."""
+    series: Callable[[Any], str] = lambda _: ""
+    """Settings of the same series are one curve in the plot."""
+    label: Callable[[Any], str] = str
+    """Short name of a setting beside its point."""
+    label_meaning: str = ""
+    """What the labels say, where they are bare numbers."""
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch("[a-z0-9]+(-[a-z0-9]+)*", self.name):
+            raise ConfigError(
+                f"knob name: expected lower-case letters, digits and '-', got {self.name!r}"
+            )
+        if not self.settings or len(set(self.settings)) != len(self.settings):
+            raise ConfigError(f"knob {self.name}: expected at least one setting, each only once")
+        if self.default not in self.settings:
+            raise ConfigError(
+                f"knob {self.name}: expected the default among its settings, got {self.default}"
+            )
+
+
+@dataclass(slots=True)
+class KnobRegistry:
+    """Knobs by name, in the order in which they were registered."""
+
+    _knobs: dict[str, Knob] = field(default_factory=dict)
+
+    def register(self, knob: Knob) -> None:
+        """Add a knob.
+
+        Raises:
+            ConfigError: the name is taken.
+        """
+        if knob.name in self._knobs:
+            raise ConfigError(f"knob {knob.name}: expected a new name, got one that is taken")
+        self._knobs[knob.name] = knob
+
+    def knobs(self, names: tuple[str, ...] = ()) -> tuple[Knob, ...]:
+        """All knobs, or those of the given names.
+
+        Raises:
+            ConfigError: a name is not registered.
+        """
+        for name in names:
+            if name not in self._knobs:
+                raise ConfigError(unknown_name("knob", name, self._knobs))
+        return tuple(self._knobs[name] for name in names or self._knobs)

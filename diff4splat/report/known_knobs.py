@@ -1,0 +1,26 @@
+"""The knobs that come with the library; other packages register theirs beside them."""
+
+from diff4splat.report import flow_knobs, scene_knobs
+from diff4splat.report.knobs import Knob, KnobRegistry
+
+_BUILDERS = (
+    flow_knobs.sampler_knob,
+    flow_knobs.guided_sampler_knob,
+    flow_knobs.levels_knob,
+    flow_knobs.guidance_knob,
+    scene_knobs.pruning_knob,
+    scene_knobs.harmonics_knob,
+)
+
+
+def register_known_knobs(registry: KnobRegistry) -> None:
+    """Add every knob of this package to ``registry``."""
+    for build in _BUILDERS:
+        registry.register(build())
+
+
+def known_knobs() -> tuple[Knob, ...]:
+    """All of them."""
+    registry = KnobRegistry()
+    register_known_knobs(registry)
+    return registry.knobs()

@@ -1,0 +1,38 @@
+"""How far away a scene is, so that camera moves can be sized to it.
+
+Axes: ``n`` Gaussians in front of the camera. Depths are z in the first camera of the scene's path.
+"""
+
+from dataclasses import dataclass
+
+import torch
+
+from diff4splat.geometry.camera import project
+from diff4splat.scene.scene import Scene
+
+NEAR_QUANTILE, FOCUS_QUANTILE = 0.05, 0.5
+DEFAULT_DEPTH = 1.0
+"""For a scene with nothing in front of its first camera."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthRange:
+    """Depths that camera presets are measured in, in scene units."""
+
+    near: float
+    focus: float
+
+
+def depth_range(scene: Scene) -> DepthRange:
+    """Near (5 %) and focus (median) depth of the Gaussians that the first camera can see."""
+    camera = scene.path.cameras[0].to(scene.gaussians.means.dtype)
+    pixels, z = project(camera, scene.state_at(float(scene.path.times_s[0])).means)
+    height, width = camera.size_px
+    inside = (pixels >= 0).all(-1) & (pixels[:, 0] < width) & (pixels[:, 1] < height) & (z > 0)
+    seen = z[inside & z.isfinite()]
+    if len(seen) == 0:
+        return DepthRange(near=DEFAULT_DEPTH, focus=DEFAULT_DEPTH)
+    ordered = seen.sort().values
+    at = [int(q * (len(ordered) - 1)) for q in (NEAR_QUANTILE, FOCUS_QUANTILE)]
+    near, focus = ordered[torch.tensor(at, device=ordered.device)].tolist()
+    return DepthRange(near=near, focus=focus)

@@ -1,0 +1,60 @@
+"""Multi-head attention with root-mean-square-normalised queries and keys.
+
+Axes: ``b`` batch, ``n`` tokens, ``s`` tokens attended to, ``d`` width (all heads together).
+The norm runs over the whole width before it is split into heads, as in Wan 2.1.
+"""
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.norm import TokenRmsNorm
+from diff4splat.models.blocks.rope import RopeTables, rotate
+
+
+def attend(
+    query: Float[Tensor, "b n h c"],
+    key: Float[Tensor, "b s h c"],
+    value: Float[Tensor, "b s h c"],
+    bias: Float[Tensor, "#b #h #n s"] | Bool[Tensor, "#b #h #n s"] | None = None,
+) -> Float[Tensor, "b n d"]:
+    """softmax(q kᵀ / √c + bias) v, heads joined; a Boolean bias marks what may be attended to."""
+    heads = torch.nn.functional.scaled_dot_product_attention(
+        query.transpose(1, 2), key.transpose(1, 2), value.transpose(1, 2), attn_mask=bias
+    )
+    return heads.transpose(1, 2).flatten(2)
+
+
+class Attention(nn.Module):
+    """Self-attention, or cross-attention to tokens of ``context_width``."""
+
+    def __init__(self, width: int, heads: int, context_width: int | None = None) -> None:
+        super().__init__()
+        self.heads = heads
+        source = width if context_width is None else context_width
+        self.to_query = nn.Linear(width, width)
+        self.to_key = nn.Linear(source, width)
+        self.to_value = nn.Linear(source, width)
+        self.to_output = nn.Linear(width, width)
+        self.query_norm = TokenRmsNorm(width)
+        self.key_norm = TokenRmsNorm(width)
+
+    def forward(
+        self,
+        tokens: Float[Tensor, "b n d"],
+        context: Float[Tensor, "b s e"] | None = None,
+        rope: RopeTables | None = None,
+        mask: Bool[Tensor, "b s"] | None = None,
+    ) -> Float[Tensor, "b n d"]:
+        """Attend to ``context`` (default: the tokens themselves) where ``mask`` is true."""
+        source = tokens if context is None else context
+        query = self._split(self.query_norm(self.to_query(tokens)))
+        key = self._split(self.key_norm(self.to_key(source)))
+        value = self._split(self.to_value(source))
+        if rope is not None:
+            query, key = rotate(query, rope), rotate(key, rope)
+        bias = None if mask is None else mask[:, None, None]
+        return self.to_output(attend(query, key, value, bias))
+
+    def _split(self, tokens: Float[Tensor, "b n d"]) -> Float[Tensor, "b n h c"]:
+        return tokens.unflatten(-1, (self.heads, -1))

@@ -1,0 +1,210 @@
+"""Settings of the single networks: frozen, checked when made, each number with its source.
+
+Sources: "paper" is Diff4Splat (arXiv 2511.00503) with the section; "inferred" is our choice where
+the paper is silent; other names are the work a number was taken from.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from diff4splat.errors import ConfigError
+
+TIME_STRIDE = 4
+"""Video frames per latent frame after the first (paper); fixed, files depend on it."""
+TOKEN_PATCH = 2
+"""Latent pixels per token side, in the video model and in LDRM (paper)."""
+GAUSSIAN_SPLIT = (3, 3, 4, 1, 1)
+"""RGB, scale, quaternion, opacity, ray distance: K_g = 12 as in Wonderland, not in the paper."""
+DEFORMATION_SPLIT = (3, 4, 3)
+"""Offset, rotation, scale offset: K_d = 10 (paper)."""
+
+
+def require(holds: bool, what: str, expected: str, got: object) -> None:
+    """Raise a ConfigError in the usual words unless ``holds``."""
+    if not holds:
+        raise ConfigError(f"{what}: expected {expected}, got {got!r}")
+
+
+def require_counts(config: object, *names: str) -> None:
+    """Every named field must be a whole number of at least 1."""
+    for name in names:
+        value = getattr(config, name)
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        require(
+            whole and value >= 1,
+            f"{type(config).__name__}.{name}",
+            "a whole number of at least 1",
+            value,
+        )
+
+
+def require_heads(config: "TextConfig | DitConfig | LdrmConfig", smallest: int) -> None:
+    """The width must split into heads of an even width of at least ``smallest``."""
+    what = f"{type(config).__name__}.heads"
+    require(
+        config.width % config.heads == 0, what, f"a divisor of width {config.width}", config.heads
+    )
+    head = config.width // config.heads
+    require(head % 2 == 0 and head >= smallest, what, f"even heads of at least {smallest}", head)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VaeConfig:
+    """Causal 3D video autoencoder."""
+
+    latent_channels: int
+    """c; 32 in the paper, 16 in Wan 2.1 and CogVideoX."""
+    widths: tuple[int, ...]
+    """Channels per resolution, finest first; Wan 2.1 uses 96, 192, 384, 384."""
+    pixel_patch: int = 1
+    """Pixels per side folded into channels before the first convolution (2 in Wan 2.2)."""
+    blocks: int = 1
+    """Residual blocks per resolution (2 in Wan 2.1)."""
+
+    def __post_init__(self) -> None:
+        require_counts(self, "latent_channels", "pixel_patch", "blocks")
+        enough = isinstance(self.widths, tuple) and len(self.widths) >= 3
+        require(
+            enough, "VaeConfig.widths", "at least 3 widths, for two halvings of time", self.widths
+        )
+        for width in self.widths:
+            require(
+                isinstance(width, int) and width >= 1,
+                "VaeConfig.widths",
+                "whole numbers above 0",
+                width,
+            )
+
+    @property
+    def space_stride(self) -> int:
+        """Pixels per latent pixel side; 8 in the paper."""
+        return self.pixel_patch * 2 ** (len(self.widths) - 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextConfig:
+    """Byte-level text encoder in the manner of T5 (the paper names only T5)."""
+
+    width: int
+    """Width of the text states."""
+    blocks: int
+    heads: int
+    feedforward_width: int
+    max_bytes: int = 512
+    """Longest prompt in UTF-8 bytes; inferred from Wan's 512 text tokens."""
+    buckets: int = 32
+    """Relative-position buckets (T5)."""
+    max_distance: int = 128
+    """Distance in bytes from which all positions share a bucket (T5)."""
+
+    def __post_init__(self) -> None:
+        require_counts(self, "width", "blocks", "heads", "feedforward_width", "max_bytes")
+        require_counts(self, "buckets", "max_distance")
+        require_heads(self, smallest=2)
+        require(self.buckets % 4 == 0, "TextConfig.buckets", "a multiple of 4", self.buckets)
+        far = self.buckets // 4 < self.max_distance
+        require(far, "TextConfig.max_distance", f"above {self.buckets // 4}", self.max_distance)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DitConfig:
+    """Latent video diffusion transformer; block layout of Wan 2.1."""
+
+    width: int
+    """4096 in the paper."""
+    blocks: int
+    """32 in the paper."""
+    heads: int
+    """32 (inferred: Snap's video model with the paper's other numbers, heads of 128)."""
+    feedforward_width: int
+    """Four times the width (inferred; CogVideoX)."""
+    frequency_width: int = 256
+    """Width of the sinusoid of the noise level (Wan)."""
+    camera_width: int = 64
+    """Hidden width of the camera adapter (inferred; AC3D finds a narrow one enough)."""
+    image_condition: Literal["first_latent", "none"] = "first_latent"
+    """``first_latent``: the *caller* overwrites latent frame 0 with the clean image latent at every
+    step and gives it level 0 (Wan 2.2 TI2V); ``none``: the model was trained without an image."""
+
+    def __post_init__(self) -> None:
+        require_counts(
+            self, "width", "blocks", "heads", "feedforward_width", "frequency_width", "camera_width"
+        )
+        require_heads(self, smallest=6)
+        require(
+            self.frequency_width % 2 == 0,
+            "DitConfig.frequency_width",
+            "an even number",
+            self.frequency_width,
+        )
+        known = self.image_condition in ("first_latent", "none")
+        require(
+            known, "DitConfig.image_condition", "'first_latent' or 'none'", self.image_condition
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LdrmConfig:
+    """Latent Dynamic Reconstruction Model."""
+
+    width: int
+    """Not stated in the paper; 1024 in Wonderland, whose model it extends."""
+    heads: int
+    """Not stated in the paper."""
+    feedforward_width: int
+    """Not stated in the paper; four times the width is usual."""
+    blocks: int = 16
+    """16 in the paper."""
+    embed_channels: int = 64
+    """Latent channels are first projected to 64 (paper)."""
+    grid_stride: Literal[1, 2] = 1
+    """1: a Gaussian per pixel (paper); 2: one per 2 by 2 pixels (Wonderland, high resolution)."""
+
+    def __post_init__(self) -> None:
+        require_counts(
+            self, "width", "heads", "feedforward_width", "blocks", "embed_channels", "grid_stride"
+        )
+        require_heads(self, smallest=6)
+        require(self.grid_stride in (1, 2), "LdrmConfig.grid_stride", "1 or 2", self.grid_stride)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeformationConfig:
+    """Query-time deformation network (structure: paper appendix; sizes not stated)."""
+
+    width: int
+    """Channels of the time-conditioned tokens."""
+    blocks: int = 2
+    """Time-conditioned residual blocks."""
+    level_widths: tuple[int, int, int] = (48, 24, 12)
+    """Channels of the features at 1/2, 1/4 and 1/8 of the token side."""
+    octaves: int = 10
+    """Frequencies 2^0 … 2^9 of the time embedding (MoVieS)."""
+
+    def __post_init__(self) -> None:
+        require_counts(self, "width", "blocks", "octaves")
+        three = isinstance(self.level_widths, tuple) and len(self.level_widths) == 3
+        require(three, "DeformationConfig.level_widths", "three widths", self.level_widths)
+        for width in self.level_widths:
+            whole = isinstance(width, int) and width >= 1
+            require(whole, "DeformationConfig.level_widths", "whole numbers above 0", width)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActivationConfig:
+    """Limits of the correction that the heads may make to the base scene; all inferred."""
+
+    log_distance_limit: float = math.log(16)
+    """L: ray distances stay within a factor e^L of the base."""
+    log_scale_limit: float = math.log(16)
+    """L: standard deviations stay within a factor e^L of the pixel footprint."""
+    footprint_px: float = 0.35
+    """Standard deviation of an uncorrected Gaussian, in pixels of its own grid."""
+
+    def __post_init__(self) -> None:
+        for name in ("log_distance_limit", "log_scale_limit", "footprint_px"):
+            value = getattr(self, name)
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            positive = number and math.isfinite(value) and value > 0
+            require(positive, f"ActivationConfig.{name}", "a finite number above 0", value)

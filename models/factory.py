@@ -1,0 +1,78 @@
+"""The one place where networks are put together.
+
+Every part starts from its own random stream, so weights depend on the configuration, the seed and
+the part alone: not on the caller's random state, nor on whether the text encoder is built.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+
+import torch
+from torch import nn
+
+from diff4splat.models.config import ModelConfig
+from diff4splat.models.deformation import DeformationNetwork
+from diff4splat.models.ldrm import Ldrm
+from diff4splat.models.text_encoder import TextEncoder
+from diff4splat.models.video_dit import VideoDiT
+from diff4splat.models.video_vae import VideoVae
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Networks:
+    """All networks of one model."""
+
+    vae: VideoVae
+    text_encoder: TextEncoder | None
+    """None when there is no prompt."""
+    dit: VideoDiT
+    ldrm: Ldrm
+    deformation: DeformationNetwork
+
+    def parts(self) -> list[tuple[str, nn.Module]]:
+        """(name, network) of the parts that exist."""
+        named = [(field.name, getattr(self, field.name)) for field in fields(self)]
+        return [(name, part) for name, part in named if part is not None]
+
+    def to(self, target: torch.device | torch.dtype) -> "Networks":
+        """Move or cast every part, in place."""
+        for _, part in self.parts():
+            part.to(target)
+        return self
+
+
+def create_networks(
+    config: ModelConfig,
+    device: torch.device | str | None = None,
+    *,
+    with_text: bool = True,
+    seed: int = 0,
+) -> Networks:
+    """Networks with random weights that are the same for the same arguments.
+
+    On the meta device nothing is allocated; elsewhere weights are drawn on the CPU and then moved.
+    """
+    target = torch.device("cpu" if device is None else device)
+    draw_on = target if target.type == "meta" else torch.device("cpu")
+
+    def build(order: int, make: Callable[[], nn.Module]) -> nn.Module:
+        with torch.random.fork_rng(devices=[]), draw_on:
+            torch.manual_seed(seed * len(fields(Networks)) + order)
+            return make().to(target)
+
+    return Networks(
+        vae=build(0, lambda: VideoVae(config.vae)),
+        text_encoder=build(1, lambda: TextEncoder(config.text)) if with_text else None,
+        dit=build(2, lambda: VideoDiT(config)),
+        ldrm=build(3, lambda: Ldrm(config)),
+        deformation=build(4, lambda: DeformationNetwork(config)),
+    )
+
+
+def parameter_counts(config: ModelConfig) -> Mapping[str, int]:
+    """Trainable weights per part, counted without allocating anything."""
+    parts = create_networks(config, "meta").parts()
+    return MappingProxyType(
+        {name: sum(map(torch.numel, part.parameters())) for name, part in parts}
+    )

@@ -1,0 +1,90 @@
+"""From noise to video latents: the flow solver drives the video model.
+
+Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid, ``f`` video frames, ``s d`` text.
+The first latent frame is the image's own, clean at every step: it has level 0 and velocity 0
+(Wan 2.2 TI2V), so the solver carries it through unchanged.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.flow.guidance import CallCount, Guidance, guided
+from diff4splat.flow.levels import make_levels
+from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
+from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.video_dit import VideoDiT
+
+UNGUIDED = Guidance(weight=1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What the video is generated from."""
+
+    image_latent: Float[Tensor, "b c 1 h w"]
+    plucker: Float[Tensor, "b 6 f height width"]
+    text: Float[Tensor, "b s d"] | None
+    """None without a prompt: then neither the text encoder nor the guidance pass exists."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledVideo:
+    """Clean video latents and what they cost."""
+
+    latent: Float[Tensor, "b c t h w"]
+    calls: CallCount
+
+
+def sample_video(
+    dit: VideoDiT,
+    conditions: Conditions,
+    settings: GenerationSettings,
+    seed: int,
+    advance: Callable[[], None] | None = None,
+) -> SampledVideo:
+    """Video latents for ``conditions``; one seed gives one video.
+
+    Raises:
+        ConfigError: an unknown sampler or schedule.
+    """
+    calls = CallCount()
+    latent = integrate(
+        find_sampler(settings.sampler),
+        _velocity(dit, conditions, settings.guidance, calls),
+        initial_noise(conditions, seed),
+        make_levels(settings.schedule, settings.steps, settings.shift),
+        advance,
+    )
+    return SampledVideo(latent=latent, calls=calls)
+
+
+def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w"]:
+    """Seeded noise behind the clean first frame; drawn on the CPU, so every device starts alike."""
+    image = conditions.image_latent
+    frames = (conditions.plucker.shape[2] - 1) // 4
+    generator = torch.Generator().manual_seed(seed)
+    noise = torch.randn(*image.shape[:2], frames, *image.shape[3:], generator=generator)
+    return torch.cat([image, noise.to(image)], 2)
+
+
+def _velocity(
+    dit: VideoDiT, conditions: Conditions, guidance: Guidance, calls: CallCount
+) -> VelocityFn:
+    unconditional = _branch(dit, conditions, None)
+    if conditions.text is None:
+        return guided(None, unconditional, UNGUIDED, calls)
+    return guided(_branch(dit, conditions, conditions.text), unconditional, guidance, calls)
+
+
+def _branch(dit: VideoDiT, conditions: Conditions, text: Tensor | None) -> VelocityFn:
+    def call(state: Tensor, level: float) -> Tensor:
+        levels = state.new_full((state.shape[0], state.shape[2]), level)
+        levels[:, 0] = 0
+        answer = dit(state, levels, conditions.plucker, text)
+        return torch.cat([torch.zeros_like(answer[:, :, :1]), answer[:, :, 1:]], 2)
+
+    return call

@@ -1,0 +1,132 @@
+"""The photograph as the model sees it: size, crop and focal length.
+
+Axes: ``h w 3`` RGB in [0, 1]. The picture keeps the photograph's shape: both sides become multiples of
+16 within a pixel budget, and at most a few columns or rows are cropped. Focal lengths follow the same
+scale and crop, so the geometry stays that of the photograph.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.errors import ConfigError, InputError
+from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, pinhole
+from diff4splat.io.images import read_photo
+
+SIDE_MULTIPLE = 16
+"""VAE stride 8 times patch 2."""
+DEFAULT_FOCAL_35MM = 30.0
+"""What phones see with their main lens, when nothing is known."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FocalChoice:
+    """A focal length in pixels of the whole photograph, and where it came from."""
+
+    focal_px: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """The photograph at the model's size, with the camera that took it at the origin."""
+
+    rgb: Float[Tensor, "h w 3"]
+    camera: Camera
+    focal_source: str
+    notes: tuple[str, ...] = ()
+    """What was done to the photograph, in words."""
+
+
+def load_picture(
+    file: Path, side_px: int, fov_deg: float | None = None, convert: bool = False
+) -> Picture:
+    """A photograph's file at the model's size; ``convert`` accepts grey, alpha, 16 bits and so on.
+
+    Raises:
+        InputError: the file cannot be used as a photograph.
+        ConfigError: the field of view or the size is out of range.
+    """
+    photo = read_photo(file, convert)
+    size_px = (photo.rgb.shape[0], photo.rgb.shape[1])
+    focal = choose_focal(size_px, fov_deg, photo.focal_35mm)
+    return replace(prepare_picture(photo.rgb, focal, side_px), notes=photo.notes)
+
+
+def choose_focal(
+    size_px: tuple[int, int], fov_deg: float | None, focal_35mm: float | None
+) -> FocalChoice:
+    """The focal length of a photograph of (height, width): asked for, from EXIF, or a default.
+
+    ``fov_deg`` is the horizontal field of view of the whole photograph.
+
+    Raises:
+        ConfigError: the field of view is not between 1 and 170 degrees.
+    """
+    if fov_deg is not None:
+        if not (math.isfinite(fov_deg) and 1 <= fov_deg <= 170):
+            raise ConfigError(f"--fov: expected 1 to 170 degrees, got {fov_deg:g}")
+        return FocalChoice(
+            focal_px=focal_from_fov(fov_deg, size_px[1]), source=f"--fov {fov_deg:g} degrees"
+        )
+    if focal_35mm is not None:
+        return FocalChoice(
+            focal_px=focal_from_35mm(focal_35mm, size_px),
+            source=f"EXIF, {focal_35mm:g} mm (35 mm equivalent)",
+        )
+    return FocalChoice(
+        focal_px=focal_from_35mm(DEFAULT_FOCAL_35MM, size_px),
+        source=f"default, {DEFAULT_FOCAL_35MM:g} mm (35 mm equivalent); --fov overrides",
+    )
+
+
+def model_size(photo_size_px: tuple[int, int], side_px: int) -> tuple[int, int]:
+    """(height, width) near the photograph's shape, with at most ``side_px``² pixels.
+
+    Raises:
+        ConfigError: the side is too small for one patch or too large to be meant.
+        InputError: the photograph is too long and thin to fit.
+    """
+    if not SIDE_MULTIPLE <= side_px <= 4096:
+        raise ConfigError(f"--resolution: expected {SIDE_MULTIPLE} to 4096 pixels, got {side_px}")
+    aspect = photo_size_px[1] / photo_size_px[0]
+    rows = range(SIDE_MULTIPLE, side_px * side_px // SIDE_MULTIPLE + 1, SIDE_MULTIPLE)
+    sizes = [(h, max(1, round(h * aspect / SIDE_MULTIPLE)) * SIDE_MULTIPLE) for h in rows]
+    fitting = [s for s in sizes if s[0] * s[1] <= side_px**2 and 0.5 < s[1] / s[0] / aspect < 2]
+    if not fitting:
+        raise InputError(
+            f"image: expected a shape that fits into {side_px}×{side_px} pixels, got "
+            f"{photo_size_px[1]}×{photo_size_px[0]}; crop it or raise --resolution"
+        )
+    return max(fitting, key=lambda size: size[0] * size[1])
+
+
+def prepare_picture(
+    rgb: Float[Tensor, "height width 3"], focal: FocalChoice, side_px: int
+) -> Picture:
+    """Crop the centre to the model's shape and resize it."""
+    photo_size = (rgb.shape[0], rgb.shape[1])
+    size = model_size(photo_size, side_px)
+    scale = min(photo_size[0] / size[0], photo_size[1] / size[1])
+    crop = (min(photo_size[0], round(size[0] * scale)), min(photo_size[1], round(size[1] * scale)))
+    top, left = (photo_size[0] - crop[0]) // 2, (photo_size[1] - crop[1]) // 2
+    camera = pinhole(focal.focal_px, photo_size).cropped((top, left), crop).resized(size)
+    window = rgb[top : top + crop[0], left : left + crop[1]]
+    return Picture(rgb=_resize(window, size), camera=camera, focal_source=focal.source)
+
+
+def _resize(
+    rgb: Float[Tensor, "height width 3"], size_px: tuple[int, int]
+) -> Float[Tensor, "h w 3"]:
+    if rgb.shape[:2] == size_px:
+        return rgb.clone()
+    # Averaging over the area keeps a downscaled photograph free of aliasing.
+    shrinks = rgb.shape[0] >= size_px[0]
+    method = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
+    resized = cv2.resize(rgb.contiguous().numpy(), size_px[::-1], interpolation=method)
+    return torch.from_numpy(resized).clamp(0, 1)

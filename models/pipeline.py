@@ -1,0 +1,200 @@
+"""One image, a camera path and optional text to a scene.
+
+Axes: ``b c t h w`` inside networks, pictures ``h w 3`` outside; this file is where they meet.
+
+    picture ─ vae ─────────┐
+    prompt ── text encoder ┼─ sample ─ latents ─┐
+    path ──── Plücker maps ┴────────────────────┼─ reconstruct ─ prune ─ deform ─ Scene
+    picture on a plane ─────────────────────────┘
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat import __version__
+from diff4splat.geometry.rays import plucker_map, relative_to_first
+from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
+from diff4splat.models.context import as_path, context_path
+from diff4splat.models.deformation_heads import DeformationUnits
+from diff4splat.models.input_colors import match_input_view
+from diff4splat.models.latent_sampling import Conditions, sample_video
+from diff4splat.models.picture import Picture, load_picture
+from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
+from diff4splat.models.prompt import require_prompt
+from diff4splat.models.reconstruction import deform, prune_cells, reconstruct
+from diff4splat.models.settings import GenerationSettings
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.report.run_log import RunLog
+from diff4splat.scene.edit import static_if_still
+from diff4splat.scene.scene import Provenance, Scene
+
+SPLAT_REACH = 3.0
+"""Standard deviations out to which a Gaussian is seen."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """One generation, validated and at the model's size."""
+
+    picture: Picture
+    path: CameraPath
+    prompt: str | None
+    seed: int
+    settings: GenerationSettings
+
+
+class Diff4SplatPipeline:
+    """All networks of one model, ready to generate."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    @classmethod
+    def from_pretrained(cls, name_or_folder: str | Path) -> "Diff4SplatPipeline":
+        """A model folder, or the name of a size with random weights (then marked untrained).
+
+        Raises:
+            ConfigError: no such size, or it does not fit into this machine's memory.
+            CheckpointError: the folder's weights do not belong to its configuration.
+        """
+        return cls(load_model(name_or_folder))
+
+    def save_pretrained(self, folder: Path | str) -> None:
+        """Write configuration, weights and provenance into ``folder``."""
+        save_model(self.model, Path(folder))
+
+    @torch.no_grad()
+    def __call__(
+        self,
+        image: Picture | Path | str,
+        path: CameraPath | str,
+        prompt: str | None = None,
+        *,
+        seed: int = 0,
+        settings: GenerationSettings | None = None,
+        log: RunLog | None = None,
+    ) -> Scene:
+        """Generate a scene; equal arguments give equal bits on one machine.
+
+        Args:
+            image: a photograph's file, or a prepared ``Picture``.
+            path: cameras, or presets such as ``spiral+forward``; becomes the scene's suggested path.
+            prompt: what happens; None leaves the text encoder and the guidance pass out.
+            seed: of the noise that the video starts from.
+            settings: sampling, guidance and pruning.
+            log: collects seconds and what was left out.
+
+        Raises:
+            InputError: the image, the path or the prompt cannot be used.
+        """
+        side_px = max(self.model.config.size_px)
+        picture = image if isinstance(image, Picture) else load_picture(Path(image), side_px)
+        request = Request(
+            picture=picture,
+            path=as_path(path, picture.camera),
+            prompt=prompt,
+            seed=seed,
+            settings=settings or GenerationSettings(),
+        )
+        return self._generate(request, log or RunLog())
+
+    def _generate(self, request: Request, log: RunLog) -> Scene:
+        context = context_path(request.path, self.model.config.frames)
+        conditions = self._conditions(request, context, log)
+        latent = self._sample(request, conditions, log)
+        scene = self._reconstruct(request, context, conditions.plucker, latent, log)
+        return self._without_still_keys(scene, request, log)
+
+    def _conditions(self, request: Request, context: CameraPath, log: RunLog) -> Conditions:
+        text = self._text_states(request.prompt, log)
+        with log.phases.phase("encode image"):
+            plucker = plucker_map(relative_to_first(context.cameras)).movedim(0, 1)[None]
+            video = request.picture.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
+            image_latent = self.model.networks.vae.encode(video).mean
+        return Conditions(image_latent=image_latent, plucker=plucker, text=text)
+
+    def _text_states(self, prompt: str | None, log: RunLog) -> Float[Tensor, "1 s d"] | None:
+        if prompt is None:
+            log.left_out("text encoder", "no prompt", "the whole network: it was not built")
+            return None
+        require_prompt(prompt, self.model.config.text.max_bytes)
+        with log.phases.phase("encode text"):
+            self.model = with_text_encoder(self.model)
+            return self.model.networks.text_encoder.encode_prompt(prompt)
+
+    def _sample(
+        self, request: Request, conditions: Conditions, log: RunLog
+    ) -> Float[Tensor, "1 c t h w"]:
+        settings, dit = request.settings, self.model.networks.dit
+        with log.phases.phase("sample video", settings.steps) as advance:
+            video = sample_video(dit, conditions, settings, request.seed, advance)
+        if video.calls.saved:
+            why = "no prompt" if conditions.text is None else "outside the guidance interval"
+            log.left_out("guidance pass", why, f"{video.calls.saved} network calls")
+        log.left_out("video decoder", "the scene is decoded from latents", "the whole network")
+        return video.latent
+
+    def _reconstruct(
+        self,
+        request: Request,
+        context: CameraPath,
+        plucker: Float[Tensor, "1 6 f h w"],
+        latent: Float[Tensor, "1 c t h2 w2"],
+        log: RunLog,
+    ) -> Scene:
+        networks, config = self.model.networks, self.model.config
+        with log.phases.phase("reconstruct"):
+            base = plane_base(request.picture, context.cameras, config.ldrm.grid_stride)
+            maps = networks.ldrm(latent, plucker)
+            canonical = prune_cells(
+                reconstruct(maps, base, config.activation), request.settings.min_opacity, log
+            )
+        units = DeformationUnits(length_unit=PLANE_DEPTH, activation=config.activation)
+        scene = Scene(
+            gaussians=canonical.gaussians,
+            motion=deform(networks.deformation, canonical, context.times_s, units, log),
+            path=request.path,
+            provenance=self._provenance(request),
+        )
+        if config.ldrm.grid_stride > 1:
+            return scene
+        steps = request.settings.color_steps
+        return match_input_view(scene, canonical.cells, request.picture, steps, log)
+
+    def _without_still_keys(self, scene: Scene, request: Request, log: RunLog) -> Scene:
+        moving = len(scene.motion.moving_index)
+        if moving == 0:
+            return scene
+        still_px, activation = request.settings.still_px, self.model.config.activation
+        nearest = float(scene.gaussians.means[:, 2].clamp_min(PLANE_DEPTH / 8).min())
+        focal_px = float(request.picture.camera.focal_px.max())
+        # Turning or stretching the widest splat by this much moves its rim by ``still_px``.
+        rim_px = SPLAT_REACH * activation.footprint_px * math.exp(activation.log_scale_limit)
+        trimmed = static_if_still(
+            scene,
+            offset=still_px * nearest / focal_px,
+            angle_rad=still_px / rim_px,
+            log_scale=still_px / rim_px,
+        )
+        still = moving - len(trimmed.motion.moving_index)
+        if still:
+            why = f"they move by less than {still_px:g} px"
+            log.left_out(
+                "key times of still Gaussians", why, f"{still:,} tracks", still_px
+            )
+        return trimmed
+
+    def _provenance(self, request: Request) -> Provenance:
+        return Provenance(
+            generator=f"diff4splat {__version__}",
+            model=self.model.config.name,
+            weights_sha256=self.model.weights_sha256,
+            seed=request.seed,
+            prompt=request.prompt,
+            untrained=self.model.untrained,
+        )

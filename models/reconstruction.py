@@ -1,0 +1,95 @@
+"""From video latents to canonical Gaussians and their motion.
+
+Axes: ``t h w`` Gaussian grid, ``n`` its cells in that order, ``m`` those kept after pruning, ``k``
+key times. The deformation network answers one time per call, so that memory does not grow with the
+number of key times times the grid.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.models.config import ActivationConfig
+from diff4splat.models.deformation import DeformationNetwork
+from diff4splat.models.deformation_heads import (
+    DeformationUnits,
+    deformation_state,
+    keyframe_motion,
+    raw_scales,
+)
+from diff4splat.models.heads import PixelBase, activate
+from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.report.run_log import RunLog
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.protocol import Motion
+from diff4splat.scene.motion.static import StaticMotion
+
+RENDER_CUTOFF = 1 / 255
+"""Renderers draw nothing below this opacity, so dropping it changes no pixel."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Canonical:
+    """Gaussians with what their deformation needs."""
+
+    gaussians: Gaussians
+    cells: Int[Tensor, " m"]
+    """Where each lies in the grid."""
+    maps: ReconstructionMaps
+
+
+def reconstruct(maps: ReconstructionMaps, base: PixelBase, config: ActivationConfig) -> Canonical:
+    """One Gaussian for every cell of the grid."""
+    gaussians = activate(maps.gaussians[0].float(), base, config)
+    cells = torch.arange(len(gaussians), device=gaussians.means.device)
+    return Canonical(gaussians=gaussians, cells=cells, maps=maps)
+
+
+def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canonical:
+    """Keep Gaussians of at least ``min_opacity`` (paper §1.3), and say what that dropped."""
+    opacities = canonical.gaussians.opacities
+    kept = opacities >= min_opacity
+    dropped = len(kept) - int(kept.sum())
+    if dropped:
+        faintest = float(opacities[~kept].max())
+        log.left_out(
+            "faint Gaussians",
+            f"opacity below {min_opacity:g}",
+            f"{dropped:,} of {len(kept):,} Gaussians",
+            faintest if faintest >= RENDER_CUTOFF else 0.0,
+        )
+    return Canonical(
+        gaussians=canonical.gaussians.select(kept),
+        cells=canonical.cells[kept],
+        maps=canonical.maps,
+    )
+
+
+def deform(
+    network: DeformationNetwork,
+    canonical: Canonical,
+    key_times_s: Float[Tensor, " k"],
+    units: DeformationUnits,
+    log: RunLog,
+) -> Motion:
+    """Key-framed motion of the kept Gaussians, or none when the network is still the identity."""
+    start_s, stop_s = float(key_times_s[0]), float(key_times_s[-1])
+    if network.is_identity:
+        log.left_out(
+            "deformation network",
+            "its output layers are zero, so nothing can move",
+            f"{len(key_times_s)} network calls and all key times",
+        )
+        return StaticMotion(time_range_s=(start_s, stop_s))
+    raw_scale = raw_scales(canonical.maps.gaussians[0].float())[canonical.cells]
+    fractions = torch.linspace(0, 1, len(key_times_s), device=key_times_s.device)
+    states = []
+    with log.phases.phase("deform", len(key_times_s)) as advance:
+        for fraction in fractions:
+            raw = network(canonical.maps.tokens, fraction[None])[0].float()
+            states.append(deformation_state(raw, raw_scale, canonical.cells, units))
+            advance()
+    everything = torch.arange(len(canonical.cells), device=raw_scale.device)
+    return keyframe_motion(states, key_times_s, everything)

@@ -1,0 +1,41 @@
+"""What a user may choose about one generation; everything else is in the model's configuration."""
+
+from dataclasses import dataclass
+
+from diff4splat.errors import ConfigError
+from diff4splat.flow.guidance import Guidance
+from diff4splat.flow.levels import Schedule
+from diff4splat.scene.edit import MIN_OPACITY
+
+MAX_STEPS = 1000
+GUIDANCE_INTERVAL = (0.2, 0.9)
+"""Noise levels at which guidance helps (Kynkäänniemi et al., arXiv 2404.07724)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GenerationSettings:
+    """Sampling, guidance and what to leave out of the scene."""
+
+    steps: int = 16
+    sampler: str = "multistep2"
+    schedule: Schedule = "uniform"
+    shift: float = 3.0
+    """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
+    guidance: Guidance = Guidance(weight=4.0, low=GUIDANCE_INTERVAL[0], high=GUIDANCE_INTERVAL[1])
+    """Used only when there is a prompt."""
+    min_opacity: float = MIN_OPACITY
+    still_px: float = 0.05
+    """Gaussians that never move by more than this many pixels of the input view stand still."""
+
+    color_steps: int = 3
+    """Corrections of the input pixels' colours against the rendered input view; 0 switches off."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.steps <= MAX_STEPS:
+            raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
+        if not 0 <= self.color_steps <= 100:
+            raise ConfigError(f"color_steps: expected 0 to 100, got {self.color_steps}")
+        if not 0 <= self.min_opacity <= 1:
+            raise ConfigError(f"--min-opacity: expected 0 to 1, got {self.min_opacity:g}")
+        if not 0 <= self.still_px < 100:
+            raise ConfigError(f"still_px: expected 0 to 100 pixels, got {self.still_px:g}")

@@ -1,0 +1,119 @@
+"""Latent video diffusion transformer: predicts the velocity noise − clean (layout of Wan 2.1).
+
+Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and columns, ``f hh ww``
+video frames and pixels, ``d`` width, ``s`` text tokens. Noise level 0 is data and 1 is noise,
+given per latent frame: an image condition overwrites latent frame 0 with the clean latent and
+gives it level 0.
+
+    latent ─ patch 1×2×2 ─ linear ─┐
+    camera ─ adapter ──────────────┴ + ─ blocks ─ norm, modulate ─ linear (zero at first) ─ velocity
+    level ── sinusoid, MLP ─ modulation ───┘ │
+    text ─── MLP ─ cross-attention ──────────┘
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.dit_block import MODULATIONS, DitBlock
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.blocks.modulation import ZeroModulation, modulate
+from diff4splat.models.blocks.norm import EPSILON
+from diff4splat.models.blocks.patches import patchify, unpatchify
+from diff4splat.models.blocks.rope import rope_tables
+from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
+from diff4splat.models.camera_adapter import CameraAdapter
+from diff4splat.models.config import ModelConfig
+from diff4splat.models.config_parts import TOKEN_PATCH
+
+PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DitConditions:
+    """What stays the same over all noise levels of one generation; None is not computed at all."""
+
+    camera: Float[Tensor, "b t h w d"] | None = None
+    text: Float[Tensor, "b s d"] | None = None
+    text_mask: Bool[Tensor, "b s"] | None = None
+    """True where a text token is real; None when all are."""
+
+
+class TextProjection(nn.Module):
+    """Text states to the model's width: linear, tanh-GELU, linear."""
+
+    def __init__(self, text_width: int, width: int) -> None:
+        super().__init__()
+        self.expand = nn.Linear(text_width, width)
+        self.contract = nn.Linear(width, width)
+
+    def forward(self, text: Float[Tensor, "b s e"]) -> Float[Tensor, "b s d"]:
+        """Project every token on its own."""
+        return self.contract(torch.nn.functional.gelu(self.expand(text), approximate="tanh"))
+
+
+class VideoDiT(nn.Module):
+    """Velocity of a noisy latent under camera, text and image conditions."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        dit, channels = config.dit, config.vae.latent_channels
+        self.config = dit
+        self.patch_embedding = nn.Linear(channels * TOKEN_PATCH**2, dit.width)
+        self.camera_adapter = CameraAdapter(dit.width, dit.camera_width, config.vae.space_stride)
+        self.text_projection = TextProjection(config.text.width, dit.width)
+        self.level_mlp = EmbeddingMlp(dit.frequency_width, dit.width)
+        self.level_modulation = ZeroModulation(dit.width, dit.width, MODULATIONS)
+        self.blocks = nn.ModuleList([DitBlock(dit) for _ in range(dit.blocks)])
+        self.norm_out = nn.LayerNorm(dit.width, eps=EPSILON, elementwise_affine=False)
+        self.modulation_out = nn.Parameter(torch.zeros(2, dit.width))
+        self.head = zero_(nn.Linear(dit.width, channels * TOKEN_PATCH**2))
+
+    def forward(
+        self,
+        latent: Float[Tensor, "b c t h w"],
+        level: Float[Tensor, "b t"],
+        camera: Float[Tensor, "b 6 f hh ww"] | None = None,
+        text: Float[Tensor, "b s e"] | None = None,
+        text_mask: Bool[Tensor, "b s"] | None = None,
+    ) -> Float[Tensor, "b c t h w"]:
+        """Velocity in one call: ``prepare``, then ``velocity``."""
+        return self.velocity(latent, level, self.prepare(camera, text, text_mask))
+
+    def prepare(
+        self,
+        camera: Float[Tensor, "b 6 f hh ww"] | None = None,
+        text: Float[Tensor, "b s e"] | None = None,
+        text_mask: Bool[Tensor, "b s"] | None = None,
+    ) -> DitConditions:
+        """Embed the conditions once for all steps of a sampler."""
+        return DitConditions(
+            camera=None if camera is None else self.camera_adapter(camera),
+            text=None if text is None else self.text_projection(text),
+            text_mask=text_mask,
+        )
+
+    def velocity(
+        self,
+        latent: Float[Tensor, "b c t h w"],
+        level: Float[Tensor, "b t"],
+        conditions: DitConditions,
+    ) -> Float[Tensor, "b c t h w"]:
+        """Velocity at a noise level per latent frame."""
+        tokens = self.patch_embedding(patchify(latent, PATCH))
+        if conditions.camera is not None:
+            tokens = tokens + conditions.camera
+        rows, columns = tokens.shape[2:4]
+        rope = rope_tables(
+            tuple(tokens.shape[1:4]), self.config.width // self.config.heads, tokens.device
+        )
+        embedding = self.level_mlp(level_embedding(level, self.config.frequency_width))
+        modulation = self.level_modulation(embedding)
+        tokens = tokens.flatten(2, 3)
+        for block in self.blocks:
+            tokens = block(tokens, modulation, rope, conditions.text, conditions.text_mask)
+        shift, scale = (embedding[..., None, :] + self.modulation_out)[..., None, :].unbind(2)
+        patches = self.head(modulate(self.norm_out(tokens), shift, scale))
+        return unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)

@@ -1,0 +1,184 @@
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+import torch
+from oracles_render import random_gaussians, small_camera
+
+from diff4splat.errors import ConfigError, InputError, ShapeError
+from diff4splat.geometry.camera import pinhole
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.render import backends
+from diff4splat.render.api import render, render_video
+from diff4splat.render.settings import OUTPUTS, RenderOutput, RenderSettings
+from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.motion.protocol import Motion
+from diff4splat.scene.motion.static import StaticMotion
+from diff4splat.scene.scene import Provenance, Scene
+
+CAMERA = pinhole(8.0, (6, 7))
+COUNT = 10
+
+
+def drifting(velocity: tuple[float, float, float]) -> KeyframeMotion:
+    """All Gaussians move by ``velocity`` per second, from 0 to 1 s."""
+    offsets = torch.zeros(2, COUNT, 3)
+    offsets[1] = torch.tensor(velocity)
+    return KeyframeMotion(
+        key_times_s=torch.tensor([0.0, 1.0]),
+        moving_index=torch.arange(COUNT),
+        offsets=offsets,
+        rotations=torch.tensor([1.0, 0.0, 0.0, 0.0]).expand(2, COUNT, 4),
+        log_scale_offsets=torch.zeros(2, COUNT, 3),
+    )
+
+
+def scene_with(motion: Motion, frames: int = 3) -> Scene:
+    """Random Gaussians and a path that moves sideways."""
+    poses = torch.eye(4).repeat(frames, 1, 1)
+    poses[:, 0, 3] = 0.1 * torch.arange(frames)
+    path = CameraPath(cameras=CAMERA.with_pose(poses), times_s=0.5 * torch.arange(frames))
+    gaussians = random_gaussians(COUNT, dtype=torch.float32)
+    return Scene(
+        gaussians=gaussians, motion=motion, path=path, provenance=Provenance(generator="test")
+    )
+
+
+def test_only_what_is_asked_for_is_made() -> None:
+    made = render(random_gaussians(COUNT), CAMERA, outputs=("alpha",))
+    assert [name for name in OUTPUTS if getattr(made, name) is not None] == ["alpha"]
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_a_picture_is_the_same_alone_and_in_company(name: str) -> None:
+    settings = RenderSettings(flow_camera=small_camera((6, 7)))
+    gaussians = random_gaussians(COUNT)
+    alone = render(gaussians, CAMERA, outputs=(name,), settings=settings)
+    together = render(gaussians, CAMERA, outputs=OUTPUTS, settings=settings)
+    torch.testing.assert_close(getattr(alone, name), getattr(together, name))
+    assert getattr(alone, name).shape[:2] == (6, 7)
+
+
+def test_a_scene_is_seen_at_its_time() -> None:
+    scene = scene_with(drifting((0.4, 0.0, 0.0)))
+    moved = replace(scene.gaussians, means=scene.gaussians.means + torch.tensor([0.2, 0.0, 0.0]))
+    torch.testing.assert_close(render(scene, CAMERA, 0.5).rgb, render(moved, CAMERA).rgb)
+
+
+def test_the_camera_takes_the_dtype_of_the_gaussians() -> None:
+    assert render(random_gaussians(COUNT), CAMERA).rgb.dtype == torch.float64
+
+
+def test_autocast_does_not_reach_the_arithmetic() -> None:
+    gaussians = random_gaussians(COUNT, dtype=torch.float32)
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        inside = render(gaussians, CAMERA).rgb
+    assert torch.equal(inside, render(gaussians, CAMERA).rgb)
+
+
+def test_half_precision_is_refused() -> None:
+    with pytest.raises(ShapeError, match=r"expected float32 or float64, got torch\.float16"):
+        render(random_gaussians(COUNT, dtype=torch.float16), CAMERA)
+
+
+def test_mixed_precision_is_refused() -> None:
+    gaussians = random_gaussians(COUNT)
+    mixed = replace(gaussians, scales=gaussians.scales.float())
+    with pytest.raises(
+        ShapeError, match=r"expected one dtype and device, got torch\.float32 on cpu"
+    ):
+        render(mixed, CAMERA)
+
+
+def test_batches_of_cameras_are_refused() -> None:
+    batch = CAMERA.with_pose(torch.eye(4).expand(2, 4, 4))
+    with pytest.raises(ShapeError, match=r"expected one camera, got a batch of shape \(2,\)"):
+        render(random_gaussians(COUNT), batch)
+
+
+@pytest.mark.parametrize("focal", [0.0, -1.0, float("nan")])
+def test_unusable_cameras_are_refused(focal: float) -> None:
+    with pytest.raises(InputError, match="expected finite pose and intrinsics and focal lengths"):
+        render(random_gaussians(COUNT), replace(CAMERA, focal_px=torch.tensor([8.0, focal])))
+
+
+def test_flow_needs_somewhere_to_go() -> None:
+    with pytest.raises(
+        ConfigError, match=r"flow expected settings\.flow_time_s or settings\.flow_"
+    ):
+        render(random_gaussians(COUNT), CAMERA, outputs=("flow",))
+
+
+def test_a_video_is_its_frames_one_at_a_time() -> None:
+    scene, done = scene_with(drifting((0.4, 0.0, 0.0))), []
+    frames = render_video(
+        scene, scene.path, outputs=("rgb", "depth"), advance=lambda: done.append(1)
+    )
+    assert done == []
+    for index, frame in enumerate(frames):
+        assert len(done) == index + 1
+        alone = render(scene, scene.path.cameras[index], 0.5 * index, outputs=("rgb", "depth"))
+        assert torch.equal(frame.rgb, alone.rgb)
+        assert torch.equal(frame.depth, alone.depth)
+    assert len(done) == 3
+
+
+def test_flow_in_a_video_runs_to_the_next_frame() -> None:
+    scene = scene_with(drifting((0.4, 0.0, 0.1)))
+    first, second, last = render_video(scene, scene.path, outputs=("flow",))
+    settings = RenderSettings(flow_camera=scene.path.cameras[2], flow_time_s=1.0)
+    alone = render(scene, scene.path.cameras[1], 0.5, outputs=("flow",), settings=settings)
+    assert torch.equal(second.flow, alone.flow)
+    assert float(first.flow.abs().max()) > 0.1
+    assert not last.flow.any()
+
+
+def test_a_scene_that_stands_still_has_no_state_per_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_with(StaticMotion())
+    monkeypatch.delattr(StaticMotion, "state_at")
+    assert len(list(render_video(scene, scene.path))) == 3
+
+
+def test_a_video_refuses_before_the_first_frame() -> None:
+    scene = scene_with(StaticMotion())
+    with pytest.raises(ConfigError, match="expected names among"):
+        render_video(scene, scene.path, outputs=("colour",))
+
+
+def test_unknown_back_ends_are_answered_with_the_known() -> None:
+    with pytest.raises(ConfigError, match="backend: expected auto, reference, got 'magic'"):
+        render(random_gaussians(COUNT), CAMERA, backend="magic")
+
+
+@pytest.fixture
+def picky(monkeypatch: pytest.MonkeyPatch) -> RenderOutput:
+    """A back end before all others that only does float32; what it answers."""
+    answer = RenderOutput(dropped_nonfinite=7)
+
+    def refusal(job: object) -> str | None:
+        dtype = job.gaussians.means.dtype
+        return None if dtype == torch.float32 else f"expected float32, got {dtype}"
+
+    monkeypatch.setitem(
+        sys.modules, "picky", SimpleNamespace(refusal=refusal, render=lambda job: answer)
+    )
+    monkeypatch.setattr(backends, "BACKENDS", {"picky": "picky", **backends.BACKENDS})
+    return answer
+
+
+def test_auto_takes_the_first_that_does_not_refuse(picky: RenderOutput) -> None:
+    assert render(random_gaussians(COUNT, dtype=torch.float32), CAMERA) is picky
+    assert render(random_gaussians(COUNT), CAMERA).rgb is not None
+    assert (
+        render(random_gaussians(COUNT, dtype=torch.float32), CAMERA, backend="reference")
+        is not picky
+    )
+
+
+@pytest.mark.usefixtures("picky")
+def test_a_back_end_that_refuses_says_why() -> None:
+    with pytest.raises(
+        ConfigError, match=r"backend 'picky': expected float32, got torch\.float64; use"
+    ):
+        render(random_gaussians(COUNT), CAMERA, backend="picky")
