@@ -8,24 +8,18 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-_TINY = 1e-24
-"""Squared norm below which a quaternion carries no direction in float32."""
-
-
 def identity_like(quats: Float[Tensor, "*b 4"]) -> Float[Tensor, "*b 4"]:
     """(1, 0, 0, 0) in the shape, dtype and device of ``quats``."""
     return torch.eye(4, dtype=quats.dtype, device=quats.device)[0].expand(quats.shape)
 
 
 def normalize(quats: Float[Tensor, "*b 4"]) -> Float[Tensor, "*b 4"]:
-    """Unit quaternions; a zero quaternion becomes the identity with zero gradient."""
+    """Unit quaternions; a zero quaternion becomes the identity with zero gradient, NaN stays NaN."""
     # Dividing by the largest entry first keeps 1e-30 and 1e30 from under- and overflowing.
     largest = quats.abs().amax(-1, keepdim=True)
-    usable = largest > 0
-    scaled = quats / torch.where(usable, largest, 1.0).detach()
-    safe = torch.where(
-        usable & (scaled.square().sum(-1, keepdim=True) > _TINY), scaled, identity_like(quats)
-    )
+    zero = largest == 0
+    scaled = quats / torch.where(zero, 1.0, largest).detach()
+    safe = torch.where(zero, identity_like(quats), scaled)
     return safe / safe.square().sum(-1, keepdim=True).sqrt()
 
 

@@ -4,11 +4,14 @@ import errno
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
 from diff4splat.errors import OutputError
 
+_NUMBERS = count()
+"""Tells apart writers of one process that aim at one target."""
 _ADVICE = {
     errno.ENOSPC: "the disk is full; free some space or choose another folder",
     errno.EDQUOT: "the disk quota is used up; free some space or choose another folder",
@@ -39,7 +42,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
     Raises:
         OutputError: the folder cannot be made or written.
     """
-    temporary = target.with_name(f".{target.stem}.partial-{os.getpid()}{target.suffix}")
+    temporary = target.parent / f".partial-{os.getpid()}-{next(_NUMBERS)}{target.suffix}"
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
@@ -51,7 +54,8 @@ def atomic_path(target: Path) -> Iterator[Path]:
     except OSError as error:
         raise output_error(target, error) from error
     finally:
-        if temporary.exists():
+        # A failing clean-up must not hide why the write failed.
+        with suppress(OSError):
             temporary.unlink()
 
 
@@ -73,7 +77,7 @@ def atomic_folder(target: Path) -> Iterator[Path]:
         OutputError: the folder cannot be made or written.
     """
     existed = target.exists()
-    staging = target / f".partial-{os.getpid()}"
+    staging = target / f".partial-{os.getpid()}-{next(_NUMBERS)}"
     try:
         staging.mkdir(parents=True, exist_ok=True)
         yield staging

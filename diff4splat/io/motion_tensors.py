@@ -63,8 +63,9 @@ def unpack_motion(stored: StoredMotion, count: int) -> Motion:
     """
     kind = take_value(stored.settings, "kind", str)
     if kind not in CODECS:
+        known = ", ".join(sorted(CODECS))
         raise FileFormatError(
-            f"motion: expected one of {', '.join(sorted(CODECS))}, got '{kind}'; update diff4splat"
+            f"motion: expected one of {known}, got {kind[:40]!r}; update diff4splat"
         )
     return CODECS[kind].unpack(stored, count)
 
@@ -99,7 +100,7 @@ def _unpack_keyframes(stored: StoredMotion, count: int) -> KeyframeMotion:
     interpolation = take_value(stored.settings, "interpolation", str)
     if interpolation not in ("linear", "cubic"):
         raise FileFormatError(
-            f"metadata 'interpolation': expected linear or cubic, got '{interpolation}'"
+            f"metadata 'interpolation': expected linear or cubic, got {interpolation[:40]!r}"
         )
     times = take_floats(stored.tensors, "key_times_s", (None,))
     index = take_index(stored.tensors, "moving_index", count)

@@ -86,4 +86,4 @@ def _apply_profile(color: Image.Image, profile: bytes | None) -> Noted:
         converted = ImageCms.profileToProfile(color, source, target, outputMode="RGB")
     except (ImageCms.PyCMSError, OSError, ValueError):
         return color, ("ICC profile is damaged or does not fit the picture and was ignored",)
-    return converted, (f"ICC profile '{name}' converted to sRGB",)
+    return converted, (f"ICC profile {name[:60]!r} converted to sRGB",)

@@ -16,7 +16,7 @@ _REDUCED_COPY = 254
 """TIFF tag NewSubfileType; bit 0 marks the preview inside a camera's raw file."""
 _MAGIC = (b"\xff\xd8", b"\x89PNG", b"RIFF", b"II*\0", b"MM\0*", b"BM", b"GIF8")
 _ODD_MODES = {
-    "CMYK": "the print colours cyan, magenta, yellow and black",
+    "CMYK": "CMYK print colours",
     "YCbCr": "YCbCr colours",
     "LAB": "CIE Lab colours",
 }
@@ -93,9 +93,9 @@ def _unusual(image: Image.Image) -> str | None:
     found = {
         # Phones store a second view or a depth map behind an ordinary JPEG and call the file MPO.
         f"an animation or a stack of {frames} pictures": frames > 1 and image.format != "MPO",
-        "more than 8 bits per channel": is_deep(image),
+        "16-bit or deeper channels": is_deep(image),
         "a palette picture": image.mode in ("P", "PA"),
-        "a picture with transparency": image.mode != "P" and image.has_transparency_data,
+        "a picture with an alpha channel or transparency": image.mode != "P" and image.has_transparency_data,
         "a grey picture": image.mode in ("1", "L"),
         _ODD_MODES.get(image.mode, f"colours of kind {image.mode}"): image.mode != "RGB",
     }

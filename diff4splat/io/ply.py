@@ -4,8 +4,6 @@ Written little-endian with all properties of the original; read tolerantly (text
 no normals or harmonics, extra properties and elements). ``ply_columns`` has the layout.
 """
 
-import os
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import numpy as np
 
 from diff4splat import __version__
 from diff4splat.errors import FileFormatError, InputError, OutputError
-from diff4splat.io.atomic import atomic_path, output_error
+from diff4splat.io.atomic import atomic_folder, atomic_path
 from diff4splat.io.existing import require_file
 from diff4splat.io.ply_body import read_columns
 from diff4splat.io.ply_columns import column_names, from_columns, to_table
@@ -58,21 +56,12 @@ def write_ply_sequence(
     if not times_s:
         raise InputError(f"{folder}: expected at least one time, got none")
     targets = [folder / f"frame_{index:04d}.ply" for index in range(len(times_s))]
-    try:
+    with atomic_folder(folder) as staging:
         _refuse_leftovers(folder, targets)
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".frames.partial-", dir=folder.parent) as hidden:
-            for index, target in enumerate(targets):
-                encoded = _encode_frame(scene, times_s, index, target)
-                (Path(hidden) / target.name).write_bytes(encoded)
-                advance()
-            folder.mkdir(exist_ok=True)
-            for target in targets:
-                os.replace(Path(hidden) / target.name, target)
-    except OutputError:
-        raise
-    except OSError as error:
-        raise output_error(folder, error) from error
+        for index, target in enumerate(targets):
+            encoded = _encode_frame(scene, times_s, index, target)
+            (staging / target.name).write_bytes(encoded)
+            advance()
     return targets
 
 

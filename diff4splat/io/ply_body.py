@@ -22,7 +22,7 @@ def read_columns(data: bytes, header: Header, name: str) -> Columns:
     """
     names = [element.name for element in header.elements]
     if name not in names:
-        raise FileFormatError(f"expected an element '{name}', got {', '.join(names) or 'none'}")
+        raise FileFormatError(f"expected an element '{name}', got {repr(names)[:60]}")
     wanted = names.index(name)
     if header.byte_order:
         source: _Binary | _Text = _Binary(data, header)
@@ -39,7 +39,7 @@ def _has_lists(element: Element) -> bool:
 
 def _cut_off(element: Element) -> FileFormatError:
     return FileFormatError(
-        f"expected {element.count} rows of element '{element.name}', got fewer; "
+        f"expected {element.count} rows of element {element.name[:40]!r}, got fewer; "
         "the file is cut off, copy it again"
     )
 
@@ -47,7 +47,7 @@ def _cut_off(element: Element) -> FileFormatError:
 def _length(element: Element, value: float) -> int:
     if not 0 <= value < 2**32:
         raise FileFormatError(
-            f"expected list lengths from 0 in element '{element.name}', got {value:g}"
+            f"expected list lengths from 0 in element {element.name[:40]!r}, got {value:g}"
         )
     return int(value)
 
@@ -120,7 +120,8 @@ class _Text:
             return np.array(self.words[start:end], dtype=np.float64)
         except ValueError as error:
             raise FileFormatError(
-                f"expected numbers in element '{element.name}', got other text; copy the file again"
+                f"expected numbers in element {element.name[:40]!r}, got other text; "
+                "copy the file again"
             ) from error
 
 

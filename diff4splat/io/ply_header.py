@@ -70,7 +70,7 @@ def read_header(data: bytes) -> Header:
             case ["property", *words] if elements:
                 elements[-1] = _extended(elements[-1], words, line)
             case _:
-                raise FileFormatError(f"expected a PLY header line, got '{line[:60]}'")
+                raise FileFormatError(f"expected a PLY header line, got {line[:60]!r}")
     if byte_order is None:
         raise FileFormatError("expected a PLY 'format' line, got none")
     return Header(byte_order=byte_order, elements=tuple(elements), data_start=data_start)
@@ -87,7 +87,7 @@ def _lines(data: bytes) -> tuple[list[str], int]:
             "expected 'end_header' to end the PLY header, got none; the file is cut off"
         )
     text = data[:end].decode("ascii", errors="replace")
-    return text.replace("\r", "").split("\n")[1:], line_end + 1
+    return text.split("\n")[1:], line_end + 1
 
 
 def _extended(element: Element, words: list[str], line: str) -> Element:
@@ -97,8 +97,8 @@ def _extended(element: Element, words: list[str], line: str) -> Element:
         case [kind, name] if kind in TYPE_CODES:
             new = Property(name=name, code=TYPE_CODES[kind])
         case _:
-            raise FileFormatError(f"expected a PLY property of a known type, got '{line[:60]}'")
+            raise FileFormatError(f"expected a PLY property of a known type, got {line[:60]!r}")
     if any(new.name == old.name for old in element.properties):
-        raise FileFormatError(f"expected different property names, got '{new.name}' twice")
+        raise FileFormatError(f"expected different property names, got {new.name[:60]!r} twice")
     properties = (*element.properties, new)
     return Element(name=element.name, count=element.count, properties=properties)

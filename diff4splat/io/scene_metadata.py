@@ -77,12 +77,12 @@ def decode(strings: Mapping[str, str]) -> SceneMetadata:
 def _require_version(strings: Mapping[str, str]) -> None:
     found = strings.get("format", "")
     if found != FORMAT:
-        got = f"format '{found[:40]}'" if found else "a .safetensors file without that mark"
+        got = f"format {found[:40]!r}" if found else "a .safetensors file without that mark"
         raise FileFormatError(f"expected format '{FORMAT}', got {got}; check the path")
     version = strings.get("version", "")
     if not (version.isascii() and version.isdigit() and len(version) < 10 and int(version) > 0):
         raise FileFormatError(
-            f"expected a version number, got '{version[:20]}'; copy the file again"
+            f"expected a version number, got {version[:20]!r}; copy the file again"
         )
     if int(version) > VERSION:
         raise FileFormatError(

@@ -12,10 +12,22 @@ from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.geometry.depth import depth_from_distance, distance_from_depth, unproject
 from diff4splat.geometry.rays import camera_rays, pixel_centers, plucker_map, world_rays
+from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.deformation import DeformationNetwork
+from diff4splat.models.deformation_heads import DeformationUnits
+from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.picture import Picture
+from diff4splat.models.pipeline import Diff4SplatPipeline
+from diff4splat.models.reconstruction import Canonical, deform
+from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.sizes import size_by_name
 from diff4splat.render.api import render
+from diff4splat.report.run_log import RunLog
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.motion.static import StaticMotion
+from diff4splat.scene.scene import Scene
 
 PAGE = Path(__file__).parents[2] / "docs" / "conventions.md"
 F64 = torch.float64
@@ -188,6 +200,48 @@ def test_level() -> None:
 def test_precision() -> None:
     with pytest.raises(ShapeError, match="float32 or float64"):
         render(ball((0, 0, 1.0)).to(torch.float16), pinhole(8.0, (8, 8)))
+
+
+@pytest.fixture(scope="module")
+def generated() -> Scene:
+    """An untrained scene of a smooth picture along a two-second path."""
+    y, x = torch.meshgrid(torch.linspace(0, 6, 32), torch.linspace(0, 6, 32), indexing="ij")
+    rgb = torch.stack([x.sin(), y.cos(), (x + y).sin()], -1) * 0.4 + 0.5
+    picture = Picture(rgb=rgb, camera=pinhole(30.0, (32, 32)), focal_source="test")
+    pipeline = Diff4SplatPipeline.from_pretrained("test")
+    return pipeline(picture, "right", settings=GenerationSettings(steps=1))
+
+
+def test_first_camera(generated: Scene) -> None:
+    assert torch.equal(generated.path.cameras.world_from_camera[0], torch.eye(4))
+
+
+def test_time(generated: Scene) -> None:
+    duration_s = (len(generated.path) - 1) / 24
+    assert float(generated.path.times_s[-1]) == pytest.approx(duration_s)
+    assert generated.motion.time_range_s == pytest.approx((0.0, duration_s))
+    network = DeformationNetwork(size_by_name("test"))
+    seen = []
+    network.register_forward_pre_hook(lambda _, arguments: seen.append(float(arguments[1])))
+    network.heads[0].weight.data.fill_(1e-3)
+    canonical = Canonical(
+        gaussians=generated.gaussians,
+        cells=torch.arange(len(generated.gaussians)),
+        maps=ReconstructionMaps(
+            gaussians=torch.zeros(1, 12, 5, 32, 32), tokens=torch.randn(1, 24, 2, 2, 2)
+        ),
+    )
+    units = DeformationUnits(length_unit=1.0, activation=size_by_name("test").activation)
+    motion = deform(network, canonical, torch.tensor([0.0, 1.5, 3.0]), units, RunLog())
+    assert motion.time_range_s == (0.0, 3.0)
+    assert seen == [0.0, 0.5, 1.0]
+
+
+def test_zero_is_identity(generated: Scene) -> None:
+    assert isinstance(generated.motion, StaticMotion)
+    depth = render(generated, generated.path.cameras[0], outputs=("depth",)).depth
+    torch.testing.assert_close(depth, torch.full_like(depth, PLANE_DEPTH))
+    assert generated.provenance.untrained
 
 
 def test_projection_undoes_the_rays() -> None:

@@ -84,3 +84,9 @@ def test_empty_batches_pass_through() -> None:
     empty = torch.zeros(0, 4)
     assert quaternion.to_matrix(empty).shape == (0, 3, 3)
     assert quaternion.from_matrix(torch.zeros(0, 3, 3)).shape == (0, 4)
+
+
+def test_nan_is_not_mistaken_for_no_rotation() -> None:
+    quats = torch.tensor([[float("nan"), 0, 0, 0], [1.0, 0, 0, 0]])
+    assert torch.isnan(quaternion.normalize(quats)[0]).any()
+    assert torch.isfinite(quaternion.normalize(quats)[1]).all()

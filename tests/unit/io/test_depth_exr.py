@@ -24,7 +24,7 @@ def file(tmp_path: Path) -> Path:
 def refusal(file: Path) -> str:
     with pytest.raises(FileFormatError) as caught:
         read_depth_exr(file)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
     assert str(file) in str(caught.value)
     return str(caught.value)
 
@@ -164,5 +164,5 @@ def test_damaged_bytes_never_end_in_another_exception(
         try:
             read_depth_exr(file)
         except FileFormatError as error:
-            assert "\n" not in str(error)
+            assert str(error).isprintable()
     assert capfd.readouterr() == ("", "")

@@ -19,7 +19,7 @@ def file(tmp_path: Path) -> Path:
 def refusal(file: Path) -> str:
     with pytest.raises(FileFormatError) as caught:
         read_ply(file)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
     assert str(file) in str(caught.value)
     return str(caught.value)
 
@@ -80,7 +80,7 @@ def test_vertex_counts_that_are_none(file: Path, count: bytes) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        (b"element vertex", b"element point", "expected an element 'vertex', got point"),
+        (b"element vertex", b"element point", "expected an element 'vertex', got ['point']"),
         (
             b"format binary_little_endian",
             b"format binary_middle_endian",
@@ -89,6 +89,8 @@ def test_vertex_counts_that_are_none(file: Path, count: bytes) -> None:
         (b"format binary_little_endian 1.0", b"comment none", "expected a PLY 'format' line"),
         (b"float nx", b"quaternion nx", "property of a known type, got 'property quaternion nx'"),
         (b"float nx", b"list float nx", "property of a known type"),
+        (b"float nx", b"nonsense \x1b[31m\r", "expected a PLY property of a known type, got"),
+        (b"format binary", b"\x1b[31mformat binary", "expected a PLY header line, got"),
         (b"float nx", b"float x", "expected different property names, got 'x' twice"),
         (b"element vertex 3", b"comment no element", "expected a PLY header line, got 'property"),
     ],
@@ -156,4 +158,4 @@ def test_damaged_bytes_never_end_in_another_exception(file: Path) -> None:
         try:
             read_ply(file)
         except FileFormatError as error:
-            assert "\n" not in str(error)
+            assert str(error).isprintable()

@@ -25,7 +25,7 @@ def refusal(file: Path) -> str:
     with pytest.raises(FileFormatError) as caught:
         load_scene(file)
     message = str(caught.value)
-    assert "\n" not in message
+    assert message.isprintable()
     assert str(file) in message
     return message
 
@@ -103,7 +103,7 @@ def test_damaged_bytes_never_end_in_another_exception(file: Path) -> None:
         try:
             load_scene(file)
         except FileFormatError as error:
-            assert "\n" not in str(error)
+            assert str(error).isprintable()
 
 
 def test_a_newer_version_says_so(file: Path) -> None:

@@ -1,4 +1,5 @@
 import dataclasses
+from pathlib import Path
 
 import pytest
 import torch
@@ -99,3 +100,12 @@ def test_paper_model_has_the_published_order_of_magnitude() -> None:
     assert counts["ldrm"] == pytest.approx(16 * 12 * 1024**2, rel=0.2)
     assert 5e7 < counts["vae"] < 5e8
     assert 4e9 < counts["text_encoder"] < 6e9
+
+
+def test_documentation_lists_the_counts() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "networks.md").read_text(encoding="utf-8")
+    counts = [parameter_counts(make()) for make in SIZES.values()]
+    rows = {part: [table[part] for table in counts] for part in counts[0]}
+    rows["total"] = [sum(table.values()) for table in counts]
+    for part, row in rows.items():
+        assert f"| {part} | {' | '.join(f'{count:,}' for count in row)} |" in text

@@ -12,7 +12,7 @@ from PIL import Image
 from diff4splat.errors import ConfigError, InputError, MissingExtraError, OutputError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.paths.camera_path import CameraPath
-from diff4splat.report import error_time
+from diff4splat.report import error_picture, error_time
 from diff4splat.report.knobs import Knob, KnobRegistry
 from diff4splat.report.path_picture import speeds, turn_rates
 from diff4splat.report.phases import Phases
@@ -173,3 +173,14 @@ def test_an_unwritable_folder_is_reported(tmp_path: Path) -> None:
 def test_drawing_leaves_no_global_state(tmp_path: Path) -> None:
     save_error_time_plot(measured([0.1, 0.01]), tmp_path / "plot.png")
     assert "matplotlib.pyplot" not in sys.modules
+
+
+def test_an_error_of_zero_is_drawn_below_all_others() -> None:
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    error_picture.draw(axes, measured([0.1, 0.01, 0.0]))
+    points = next(line for line in axes.lines if line.get_marker() == "o")
+    assert points.get_ydata() == pytest.approx([0.1, 0.01, 0.003])
+    assert points.get_xdata() == pytest.approx([1.0, 2.0, 3.0])  # milliseconds
+    assert "error 0" in [text.get_text() for text in axes.texts]
