@@ -20,7 +20,7 @@ _PUBLIC = {
     "save_scene": "diff4splat.io.scene_file",
 }
 
-__all__ = ["__version__", *sorted(_PUBLIC)]
+__all__ = ["__version__", *sorted(_PUBLIC)]  # noqa: PLE0604 (the names are strings)
 
 
 def __getattr__(name: str) -> object:

@@ -1,6 +1,6 @@
 """Raw network outputs to activated values. Zero means identity: raw 0 gives exactly the base value.
 
-Axes: ``*b`` any. Every function is smooth, has a gradient that is not zero at raw 0, and stays
+Axes: ``*b`` any. Every function is continuous, has a gradient that is not zero at raw 0, and stays
 finite, value and gradient, for raw values of any finite size. float32 and float64 only: poses and
 depths do not survive half precision.
 

@@ -53,12 +53,12 @@ class ModelConfig:
     activation: ActivationConfig
 
     def __post_init__(self) -> None:
-        require(
-            isinstance(self.name, str) and self.name != "", "ModelConfig.name", "a name", self.name
-        )
+        named = isinstance(self.name, str) and self.name != ""
+        require(named, "ModelConfig.name", "a name", self.name)
         require_counts(self, "frames")
         pair = isinstance(self.size_px, tuple) and len(self.size_px) == 2
-        require(pair, "ModelConfig.size_px", "(height, width)", self.size_px)
+        whole = pair and all(isinstance(side, int) for side in self.size_px)
+        require(whole, "ModelConfig.size_px", "(height, width) in whole pixels", self.size_px)
         try:
             self.latent_grid(self.frames, self.size_px)
         except InputError as error:

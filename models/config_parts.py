@@ -123,9 +123,6 @@ class DitConfig:
     """Width of the sinusoid of the noise level (Wan)."""
     camera_width: int = 64
     """Hidden width of the camera adapter (inferred; AC3D finds a narrow one enough)."""
-    image_condition: Literal["first_latent", "none"] = "first_latent"
-    """``first_latent``: the *caller* overwrites latent frame 0 with the clean image latent at every
-    step and gives it level 0 (Wan 2.2 TI2V); ``none``: the model was trained without an image."""
 
     def __post_init__(self) -> None:
         require_counts(
@@ -137,10 +134,6 @@ class DitConfig:
             "DitConfig.frequency_width",
             "an even number",
             self.frequency_width,
-        )
-        known = self.image_condition in ("first_latent", "none")
-        require(
-            known, "DitConfig.image_condition", "'first_latent' or 'none'", self.image_condition
         )
 
 

@@ -107,9 +107,8 @@ class DeformationNetwork(nn.Module):
 
     def _tokens_at(self, tokens: Tensor, time: Tensor) -> Float[Tensor, "b t h w e"]:
         frames = tokens.shape[2]
-        own_time = torch.arange(frames, dtype=torch.float32, device=tokens.device) / max(
-            frames - 1, 1
-        )
+        latent_frame = torch.arange(frames, dtype=torch.float32, device=tokens.device)
+        own_time = latent_frame / max(frames - 1, 1)
         query = octave_embedding(time, self.octaves)[:, None].expand(-1, frames, -1)
         own = octave_embedding(own_time, self.octaves)[None].expand(tokens.shape[0], -1, -1)
         condition = self.time_mlp(torch.cat([query, own], -1))

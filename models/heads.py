@@ -61,33 +61,30 @@ def activate(
         ShapeError: the maps and the base differ in shape, or a tensor is in half precision.
     """
     _require_fit(raw, base)
-    rgb, scale, rotation, opacity, distance = (
-        raw.movedim(0, -1).flatten(0, -2).split(GAUSSIAN_SPLIT, -1)
-    )
-    far = base.distance.flatten() * activations.bounded_factor(
-        distance[:, 0], config.log_distance_limit
-    )
+    rows = raw.movedim(0, -1).flatten(0, -2)
+    rgb, scale, rotation, opacity, distance = rows.split(GAUSSIAN_SPLIT, -1)
+    factor = activations.bounded_factor(distance[:, 0], config.log_distance_limit)
+    far = base.distance.flatten() * factor
     origins, directions = world_rays(base.cameras)
-    footprint = config.footprint_px * far / _focal_px(base).flatten()
+    footprint = config.footprint_px * far / _focal_px(base)
     return Gaussians(
         means=origins.flatten(0, 2) + far[:, None] * directions.flatten(0, 2),
-        quats=quaternion.multiply(
-            _camera_quats(base).flatten(0, 2), activations.rotation(rotation)
-        ),
+        quats=quaternion.multiply(_camera_quats(base), activations.rotation(rotation)),
         scales=footprint[:, None] * activations.bounded_factor(scale, config.log_scale_limit),
         opacities=activations.opacity(opacity[:, 0], base.opacity.flatten()),
         sh=dc_from_color(activations.color(rgb, base.rgb.flatten(0, 2)))[:, None],
     )
 
 
-def _focal_px(base: PixelBase) -> Float[Tensor, "t h w"]:
+def _focal_px(base: PixelBase) -> Float[Tensor, " n"]:
     """Geometric mean of the two focal lengths, per cell."""
-    return base.cameras.focal_px.prod(-1).sqrt()[:, None, None].expand(base.distance.shape)
+    focal_px = base.cameras.focal_px.prod(-1).sqrt()
+    return focal_px[:, None, None].expand(base.distance.shape).flatten()
 
 
-def _camera_quats(base: PixelBase) -> Float[Tensor, "t h w 4"]:
+def _camera_quats(base: PixelBase) -> Float[Tensor, "n 4"]:
     quats = quaternion.from_matrix(base.cameras.world_from_camera[:, :3, :3])
-    return quats[:, None, None].expand(*base.distance.shape, 4)
+    return quats[:, None, None].expand(*base.distance.shape, 4).flatten(0, 2)
 
 
 def _require_fit(raw: Tensor, base: PixelBase) -> None:

@@ -6,7 +6,7 @@ The first latent frame is the image's own, clean at every step: it has level 0 a
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Float
@@ -16,7 +16,7 @@ from diff4splat.flow.guidance import CallCount, Guidance, guided
 from diff4splat.flow.levels import make_levels
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.models.settings import GenerationSettings
-from diff4splat.models.video_dit import VideoDiT
+from diff4splat.models.video_dit import DitConditions, VideoDiT
 
 UNGUIDED = Guidance(weight=1.0)
 
@@ -74,17 +74,19 @@ def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w
 def _velocity(
     dit: VideoDiT, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
-    unconditional = _branch(dit, conditions, None)
+    # Cameras and text are embedded once: they are the same at every level.
+    embedded = dit.prepare(conditions.plucker, conditions.text)
+    unconditional = _branch(dit, replace(embedded, text=None))
     if conditions.text is None:
         return guided(None, unconditional, UNGUIDED, calls)
-    return guided(_branch(dit, conditions, conditions.text), unconditional, guidance, calls)
+    return guided(_branch(dit, embedded), unconditional, guidance, calls)
 
 
-def _branch(dit: VideoDiT, conditions: Conditions, text: Tensor | None) -> VelocityFn:
+def _branch(dit: VideoDiT, embedded: DitConditions) -> VelocityFn:
     def call(state: Tensor, level: float) -> Tensor:
         levels = state.new_full((state.shape[0], state.shape[2]), level)
         levels[:, 0] = 0
-        answer = dit(state, levels, conditions.plucker, text)
+        answer = dit.velocity(state, levels, embedded)
         return torch.cat([torch.zeros_like(answer[:, :, :1]), answer[:, :, 1:]], 2)
 
     return call

@@ -1,7 +1,7 @@
 """The photograph as the model sees it: size, crop and focal length.
 
-Axes: ``h w 3`` RGB in [0, 1]. The picture keeps the photograph's shape: both sides become multiples of
-16 within a pixel budget, and at most a few columns or rows are cropped. Focal lengths follow the same
+Axes: ``h w 3`` RGB in [0, 1]. The picture keeps the photograph's shape: both sides become multiples
+of 16 within a pixel budget, and at most a few columns or rows are cropped. Focal lengths follow
 scale and crop, so the geometry stays that of the photograph.
 """
 

@@ -83,7 +83,7 @@ class Diff4SplatPipeline:
 
         Args:
             image: a photograph's file, or a prepared ``Picture``.
-            path: cameras, or presets such as ``spiral+forward``; becomes the scene's suggested path.
+            path: cameras, or presets such as ``spiral+forward``; becomes the suggested path.
             prompt: what happens; None leaves the text encoder and the guidance pass out.
             seed: of the noise that the video starts from.
             settings: sampling, guidance and pruning.
@@ -184,9 +184,7 @@ class Diff4SplatPipeline:
         still = moving - len(trimmed.motion.moving_index)
         if still:
             why = f"they move by less than {still_px:g} px"
-            log.left_out(
-                "key times of still Gaussians", why, f"{still:,} tracks", still_px
-            )
+            log.left_out("key times of still Gaussians", why, f"{still:,} tracks", still_px)
         return trimmed
 
     def _provenance(self, request: Request) -> Provenance:

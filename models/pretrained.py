@@ -101,6 +101,6 @@ def _require_memory(config: ModelConfig) -> None:
     present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > 0.8 * present:
         raise ConfigError(
-            f"model {config.name!r}: expected at least {needed / 0.8 / 2**30:.0f} GiB of memory for "
-            f"its weights, got {present / 2**30:.0f} GiB; choose a smaller size of {', '.join(SIZES)}"
+            f"model {config.name!r}: expected at least {needed / 0.8 / 2**30:.0f} GiB of memory "
+            f"for its weights, got {present / 2**30:.0f} GiB; choose another of {', '.join(SIZES)}"
         )

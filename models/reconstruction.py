@@ -48,7 +48,7 @@ def reconstruct(maps: ReconstructionMaps, base: PixelBase, config: ActivationCon
 
 
 def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canonical:
-    """Keep Gaussians of at least ``min_opacity`` (paper §1.3), and say what that dropped."""
+    """Keep Gaussians of at least ``min_opacity`` (Diff4Splat: 0.005), and say what that dropped."""
     opacities = canonical.gaussians.opacities
     kept = opacities >= min_opacity
     dropped = len(kept) - int(kept.sum())

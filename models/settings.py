@@ -8,8 +8,8 @@ from diff4splat.flow.levels import Schedule
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
-GUIDANCE_INTERVAL = (0.2, 0.9)
-"""Noise levels at which guidance helps (Kynkäänniemi et al., arXiv 2404.07724)."""
+DEFAULT_GUIDANCE = Guidance(weight=4.0, low=0.2, high=0.9)
+"""At high noise guidance hurts, at low noise it is useless (Kynkäänniemi et al. 2404.07724)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +21,7 @@ class GenerationSettings:
     schedule: Schedule = "uniform"
     shift: float = 3.0
     """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
-    guidance: Guidance = Guidance(weight=4.0, low=GUIDANCE_INTERVAL[0], high=GUIDANCE_INTERVAL[1])
+    guidance: Guidance = DEFAULT_GUIDANCE
     """Used only when there is a prompt."""
     min_opacity: float = MIN_OPACITY
     still_px: float = 0.05

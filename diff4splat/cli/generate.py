@@ -5,7 +5,7 @@ photograph ─ load_picture ─┐
 --prompt ── require_prompt ┘
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -80,14 +80,12 @@ class Generate:
 
     def settings(self) -> "GenerationSettings":
         """Sampling, guidance and pruning, checked."""
-        from diff4splat.flow.guidance import Guidance
-        from diff4splat.models.settings import GUIDANCE_INTERVAL, GenerationSettings
+        from diff4splat.models.settings import DEFAULT_GUIDANCE, GenerationSettings
 
-        low, high = GUIDANCE_INTERVAL
         return GenerationSettings(
             steps=self.steps,
             sampler=self.sampler,
-            guidance=Guidance(weight=self.guidance, low=low, high=high),
+            guidance=replace(DEFAULT_GUIDANCE, weight=self.guidance),
             min_opacity=self.min_opacity,
         )
 

@@ -52,8 +52,8 @@ def print_summary(summary: "PathSummary") -> None:
     low, high = summary.focal_range_px
     facts = {
         "frames": f"{summary.frames} in {summary.seconds:.3g} s",
-        "travel": f"{summary.travel:.3g} scene units, at most {summary.farthest:.3g} from the start",
-        "largest step": f"{summary.largest_step:.3g} scene units",
+        "travel": f"{summary.travel:.3g} units, at most {summary.farthest:.3g} from the start",
+        "largest step": f"{summary.largest_step:.3g} units",
         "turn": f"{summary.turn_deg:.3g} degrees, at most {summary.largest_turn_deg:.3g} per frame",
         "focal length": f"{low:.4g} to {high:.4g} px" if high > low else f"{low:.4g} px",
     }

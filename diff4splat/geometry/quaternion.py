@@ -8,13 +8,14 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+
 def identity_like(quats: Float[Tensor, "*b 4"]) -> Float[Tensor, "*b 4"]:
     """(1, 0, 0, 0) in the shape, dtype and device of ``quats``."""
     return torch.eye(4, dtype=quats.dtype, device=quats.device)[0].expand(quats.shape)
 
 
 def normalize(quats: Float[Tensor, "*b 4"]) -> Float[Tensor, "*b 4"]:
-    """Unit quaternions; a zero quaternion becomes the identity with zero gradient, NaN stays NaN."""
+    """Unit quaternions; zero becomes the identity with zero gradient, NaN stays NaN."""
     # Dividing by the largest entry first keeps 1e-30 and 1e30 from under- and overflowing.
     largest = quats.abs().amax(-1, keepdim=True)
     zero = largest == 0

@@ -66,7 +66,11 @@ def require_rigid(poses: Float[Tensor, "*b 4 4"], what: str, tolerance: float = 
             f"{what}: expected right-handed rotations (determinant +1), got determinant -1; "
             "one axis is mirrored, flip it in the file"
         )
-    error = (rotation @ rotation.mT - torch.eye(3, dtype=torch.float64, device=poses.device)).abs().amax()
+    error = (
+        (rotation @ rotation.mT - torch.eye(3, dtype=torch.float64, device=poses.device))
+        .abs()
+        .amax()
+    )
     if float(error) > tolerance:
         raise InputError(
             f"{what}: expected rotations without scale or shear, got an error of {float(error):.2g}"

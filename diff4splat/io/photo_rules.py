@@ -95,7 +95,8 @@ def _unusual(image: Image.Image) -> str | None:
         f"an animation or a stack of {frames} pictures": frames > 1 and image.format != "MPO",
         "16-bit or deeper channels": is_deep(image),
         "a palette picture": image.mode in ("P", "PA"),
-        "a picture with an alpha channel or transparency": image.mode != "P" and image.has_transparency_data,
+        "a picture with an alpha channel or transparency": image.mode != "P"
+        and image.has_transparency_data,
         "a grey picture": image.mode in ("1", "L"),
         _ODD_MODES.get(image.mode, f"colours of kind {image.mode}"): image.mode != "RGB",
     }

@@ -34,7 +34,9 @@ def generate(image: Path, out: Path, *more: str) -> int:
 def assert_refused(code: int, capsys: pytest.CaptureFixture, *words: str) -> None:
     """Exit code 2 and a last line that names the trouble."""
     assert code == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("diff4splat:")]
+    lines = [
+        line for line in capsys.readouterr().err.splitlines() if line.startswith("diff4splat:")
+    ]
     assert len(lines) == 1
     for word in words:
         assert word in lines[0], lines[0]
@@ -143,7 +145,9 @@ def test_path_files(name: str, photo: Path, tmp_path: Path, capsys: pytest.Captu
     file = tmp_path / "path.txt"
     file.write_text(content)
     assert_refused(generate(photo, tmp_path / "out", "--camera", str(file)), capsys, word)
-    assert_refused(run(["paths", "preview", str(file), "--out", str(tmp_path / "p.png")]), capsys, word)
+    assert_refused(
+        run(["paths", "preview", str(file), "--out", str(tmp_path / "p.png")]), capsys, word
+    )
     assert not (tmp_path / "out").exists()
     assert not (tmp_path / "p.png").exists()
 
@@ -155,7 +159,9 @@ def test_an_unknown_preset_suggests_the_nearest(
     assert_refused(generate(photo, tmp_path / "out", "--camera", "gone.txt"), capsys, "gone.txt")
 
 
-@pytest.mark.parametrize(("prompt", "word"), [("", "none"), ("   ", "none"), ("x" * 10_000, "10000")])
+@pytest.mark.parametrize(
+    ("prompt", "word"), [("", "none"), ("   ", "none"), ("x" * 10_000, "10000")]
+)
 def test_prompts(
     prompt: str, word: str, photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -279,7 +285,11 @@ def test_scene_files(tmp_path: Path, photo: Path, capsys: pytest.CaptureFixture)
     ],
 )
 def test_render_settings(
-    arguments: tuple[str, ...], word: str, photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+    arguments: tuple[str, ...],
+    word: str,
+    photo: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
 ) -> None:
     assert generate(photo, tmp_path / "out") == 0
     capsys.readouterr()

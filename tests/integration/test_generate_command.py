@@ -103,7 +103,9 @@ def test_render_needs_nothing_but_the_scene_file(folder: Path, tmp_path: Path) -
     assert video.stat().st_size > 0
 
 
-def test_two_runs_with_one_seed_are_bit_identical(folder: Path, photo: Path, tmp_path: Path) -> None:
+def test_two_runs_with_one_seed_are_bit_identical(
+    folder: Path, photo: Path, tmp_path: Path
+) -> None:
     assert generate(photo, tmp_path / "again") == 0
     for name in FILES - {"card.json"}:
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes(), name
@@ -129,12 +131,17 @@ def test_a_field_of_view_overrides_and_is_reported(photo: Path, tmp_path: Path) 
     scene = load_scene(tmp_path / "out" / "scene.safetensors")
     width, focal_px = scene.path.cameras.size_px[1], float(scene.path.cameras.focal_px[0, 0])
     assert focal_px == pytest.approx(width / 2, rel=0.25)
-    assert "--fov 90" in json.loads((tmp_path / "out" / "card.json").read_text())["inputs"]["focal_source"]
+    assert (
+        "--fov 90"
+        in json.loads((tmp_path / "out" / "card.json").read_text())["inputs"]["focal_source"]
+    )
 
 
 def test_numbered_ply_files(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "sequence"
-    assert run(["convert", str(folder / "scene.safetensors"), "--out", str(out), "--fps", "20"]) == 0
+    assert (
+        run(["convert", str(folder / "scene.safetensors"), "--out", str(out), "--fps", "20"]) == 0
+    )
     names = sorted(file.name for file in out.iterdir())
     assert names[0] == "frame_0000.ply"
     assert len(names) >= 3

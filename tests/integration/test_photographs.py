@@ -1,4 +1,4 @@
-"""Real photographs: the first view is the photograph, and moving the camera moves the picture right.
+"""Real photographs: the first view is the photograph, and the picture moves as geometry says.
 
 The picture's motion is measured on the rendered frames alone (dense optical flow, OpenCV DIS) and
 compared with the motion that the predicted depth and the two poses imply.
@@ -49,7 +49,7 @@ def grey(rgb: torch.Tensor) -> np.ndarray:
 
 
 def textured(rgb: torch.Tensor) -> torch.Tensor:
-    """The better textured half of the inner pixels: flow cannot be measured where nothing changes."""
+    """The better textured half of the inner pixels: elsewhere flow cannot be measured."""
     inner = torch.from_numpy(cv2.GaussianBlur(grey(rgb), (0, 0), 1)).float()[16:-16, 16:-16]
     rows, columns = torch.gradient(inner)
     strength = rows**2 + columns**2

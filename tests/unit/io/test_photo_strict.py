@@ -159,7 +159,9 @@ def test_transparency_in_modern_formats(tmp_path: Path, kind: str) -> None:
 
 def test_a_transparent_colour_counts_as_transparency(tmp_path: Path) -> None:
     oracles_io.photograph().save(tmp_path / "rgb.png", transparency=(0, 0, 0))
-    assert f"a picture with an alpha channel or transparency; {ADVICE}" in refusal(tmp_path / "rgb.png")
+    assert f"a picture with an alpha channel or transparency; {ADVICE}" in refusal(
+        tmp_path / "rgb.png"
+    )
     palette = oracles_io.photograph().convert("P")
     palette.save(tmp_path / "p.png", transparency=3)
     assert f"a palette picture; {ADVICE}" in refusal(tmp_path / "p.png")

@@ -3,7 +3,7 @@
 import torch
 
 from diff4splat.geometry import quaternion, rigid
-from diff4splat.geometry.camera import pinhole, project
+from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.metrics.image import psnr
 from diff4splat.models.base_scene import OPAQUE, PLANE_DEPTH, UNSEEN, plane_base
 from diff4splat.models.config import ActivationConfig
@@ -23,7 +23,7 @@ def smooth_picture(height: int = 32, width: int = 48) -> Picture:
     return Picture(rgb=rgb, camera=pinhole(40.0, (height, width)), focal_source="test")
 
 
-def two_cameras(picture: Picture):  # noqa: ANN201
+def two_cameras(picture: Picture) -> Camera:
     turn = quaternion.to_matrix(
         quaternion.from_axis_angle(torch.tensor([0.0, 1, 0]), torch.tensor(0.1))
     )

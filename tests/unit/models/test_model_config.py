@@ -25,7 +25,6 @@ OTHER_VALUES = {
     "heads": 1,
     "widths": [5, 6, 8],
     "level_widths": [9, 6, 4],
-    "image_condition": "none",
     "pixel_patch": 4,
     "buckets": 64,
     "grid_stride": 2,
@@ -95,11 +94,6 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
         (DitConfig, {"width": "24"}, "DitConfig.width: expected a whole number"),
         (DitConfig, {"blocks": True}, "DitConfig.blocks: expected a whole number"),
         (DitConfig, {"frequency_width": 15}, "DitConfig.frequency_width: expected an even number"),
-        (
-            DitConfig,
-            {"image_condition": "no"},
-            "DitConfig.image_condition: expected 'first_latent'",
-        ),
         (LdrmConfig, {"grid_stride": 3}, "LdrmConfig.grid_stride: expected 1 or 2"),
         (VaeConfig, {"widths": (4, 8)}, "VaeConfig.widths: expected at least 3 widths"),
         (VaeConfig, {"widths": (4, 8, -1)}, "VaeConfig.widths: expected whole numbers"),
@@ -140,6 +134,14 @@ def test_latent_grid() -> None:
 def test_latent_grid_says_what_fits(frames: int, size_px: tuple[int, int], message: str) -> None:
     with pytest.raises(InputError, match=message):
         test_size().latent_grid(frames, size_px)
+
+
+@pytest.mark.usefixtures("as_shipped")
+@pytest.mark.parametrize("value", [["a", 32], [32], 32, None, [32.0, 32]])
+def test_malformed_size_is_refused(value: object) -> None:
+    data = json.loads(test_size().to_json()) | {"size_px": value}
+    with pytest.raises(ConfigError, match=r"size_px: expected \(height, width\) in whole pixels"):
+        ModelConfig.from_json(json.dumps(data))
 
 
 def test_default_frames_and_size_must_fit() -> None:

@@ -42,7 +42,7 @@ def test_focal_is_the_asked_one_then_exif_then_a_default() -> None:
     assert asked.focal_px == pytest.approx(focal_from_fov(60.0, 400))
     assert "--fov 60" in asked.source
     from_exif = choose_focal(size, None, 28.0)
-    assert from_exif.focal_px == pytest.approx(focal_from_35mm(28, size))
+    assert from_exif.focal_px == pytest.approx(focal_from_35mm(28.0, size))
     assert "EXIF" in from_exif.source
     assert "default" in choose_focal(size, None, None).source
 

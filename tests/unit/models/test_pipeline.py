@@ -42,7 +42,9 @@ def randomize(pipeline: Diff4SplatPipeline, part: str, scale: float = 0.3) -> No
 
 def assert_same_scene(left: Scene, right: Scene) -> None:
     for field in fields(Gaussians):
-        assert torch.equal(getattr(left.gaussians, field.name), getattr(right.gaussians, field.name))
+        assert torch.equal(
+            getattr(left.gaussians, field.name), getattr(right.gaussians, field.name)
+        )
     assert type(left.motion) is type(right.motion)
     for time_s in (0.0, 0.4, 1.3):
         assert torch.equal(left.state_at(time_s).means, right.state_at(time_s).means)
@@ -168,7 +170,7 @@ def test_a_single_camera_and_a_file_name_are_enough(
 
     write_png(torch.rand(40, 60, 3), tmp_path / "photo.png")
     scene = pipeline(tmp_path / "photo.png", "static", settings=QUICK)
-    assert scene.path.cameras.size_px == (16, 32) or scene.path.cameras.size_px == (32, 32)
+    assert scene.path.cameras.size_px == (16, 32)
     one = replace(scene.path, cameras=scene.path.cameras[:1], times_s=scene.path.times_s[:1])
     assert len(pipeline(picture, one, settings=QUICK).path) == 1
 
