@@ -96,14 +96,22 @@ def model_size(photo_size_px: tuple[int, int], side_px: int) -> tuple[int, int]:
         raise ConfigError(f"--resolution: expected {SIDE_MULTIPLE} to 4096 pixels, got {side_px}")
     aspect = photo_size_px[1] / photo_size_px[0]
     rows = range(SIDE_MULTIPLE, side_px * side_px // SIDE_MULTIPLE + 1, SIDE_MULTIPLE)
-    sizes = [(h, max(1, round(h * aspect / SIDE_MULTIPLE)) * SIDE_MULTIPLE) for h in rows]
-    fitting = [s for s in sizes if s[0] * s[1] <= side_px**2 and 0.5 < s[1] / s[0] / aspect < 2]
-    if not fitting:
+    columns = [(math.floor(h * aspect / SIDE_MULTIPLE), h) for h in rows]
+    sizes = [(h, (count + more) * SIDE_MULTIPLE) for count, h in columns for more in (0, 1)]
+    fitting = [size for size in sizes if 0 < size[0] * size[1] <= side_px**2]
+    best = max(fitting, key=lambda size: _size_score(size, aspect), default=None)
+    if best is None or not 0.5 < best[1] / best[0] / aspect < 2:
         raise InputError(
             f"image: expected a shape that fits into {side_px}×{side_px} pixels, got "
             f"{photo_size_px[1]}×{photo_size_px[0]}; crop it or raise --resolution"
         )
-    return max(fitting, key=lambda size: size[0] * size[1])
+    return best
+
+
+def _size_score(size_px: tuple[int, int], aspect: float) -> float:
+    """More pixels are better; each per cent that has to be cropped outweighs four of them."""
+    height, width = size_px
+    return math.log(height * width) - 4 * abs(math.log(width / height / aspect))
 
 
 def prepare_picture(

@@ -73,10 +73,10 @@ def require_levels(levels: Sequence[float]) -> None:
     if len(levels) < 2:
         raise ConfigError(f"levels: expected at least two, start and end, got {len(levels)}")
     if not all(0 <= level <= 1 for level in levels):
-        raise ConfigError(f"levels: expected numbers in [0, 1], got {_brief(levels)}")
+        raise ConfigError(f"levels: expected numbers in [0, 1], got {_listed(levels)}")
     if any(after >= before for before, after in pairwise(levels)):
         raise ConfigError(
-            f"levels: expected each below the one before it, got {_brief(levels)}; "
+            f"levels: expected each below the one before it, got {_listed(levels)}; "
             "use fewer steps or a smaller shift"
         )
 
@@ -86,6 +86,6 @@ def _require_steps(steps: int) -> None:
         raise ConfigError(f"steps: expected at least 1, got {steps}")
 
 
-def _brief(levels: Sequence[float]) -> str:
+def _listed(levels: Sequence[float]) -> str:
     shown = ", ".join(f"{level:.6g}" for level in levels[:8])
     return shown + (", ..." if len(levels) > 8 else "")
