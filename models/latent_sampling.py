@@ -13,7 +13,6 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.guidance import CallCount, Guidance, guided
-from diff4splat.flow.levels import make_levels
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.video_dit import DitConditions, VideoDiT
@@ -56,7 +55,7 @@ def sample_video(
         find_sampler(settings.sampler),
         _velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
-        make_levels(settings.schedule, settings.steps, settings.shift),
+        settings.levels,
         advance,
     )
     return SampledVideo(latent=latent, calls=calls)

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.guidance import Guidance
-from diff4splat.flow.levels import Schedule
+from diff4splat.flow.levels import Schedule, make_levels
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
+ENOUGH_STEPS = 6
+"""With fewer, evenly spaced in log signal-to-noise ratio throws guided samples off their course."""
 DEFAULT_GUIDANCE = Guidance(weight=4.0, low=0.2, high=0.9)
 """At high noise guidance hurts, at low noise it is useless (Kynkäänniemi et al. 2404.07724)."""
 
@@ -18,15 +20,15 @@ class GenerationSettings:
 
     steps: int = 16
     sampler: str = "multistep2"
-    schedule: Schedule = "uniform"
-    shift: float = 3.0
+    schedule: Schedule | None = None
+    """None takes the better one for the number of steps, as measured in docs/samplers.md."""
+    shift: float = 1.0
     """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
     guidance: Guidance = DEFAULT_GUIDANCE
     """Used only when there is a prompt."""
     min_opacity: float = MIN_OPACITY
     still_px: float = 0.05
     """Gaussians that never move by more than this many pixels of the input view stand still."""
-
     color_steps: int = 3
     """Corrections of the input pixels' colours against the rendered input view; 0 switches off."""
 
@@ -39,3 +41,9 @@ class GenerationSettings:
             raise ConfigError(f"--min-opacity: expected 0 to 1, got {self.min_opacity:g}")
         if not 0 <= self.still_px < 100:
             raise ConfigError(f"still_px: expected 0 to 100 pixels, got {self.still_px:g}")
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Noise levels that the sampler visits."""
+        measured: Schedule = "log_snr" if self.steps >= ENOUGH_STEPS else "uniform"
+        return make_levels(self.schedule or measured, self.steps, self.shift)

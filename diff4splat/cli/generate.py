@@ -43,6 +43,8 @@ class Generate:
     """Steps of the sampler."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
     """How the flow is integrated; `diff4splat report error-time` compares them."""
+    shift: float = 1.0
+    """Above 1 spends more steps on noisy levels."""
     guidance: float = 4.0
     """How strongly to follow the prompt; 1 switches guidance off."""
     min_opacity: float = 0.005
@@ -56,8 +58,10 @@ class Generate:
         """Check everything cheap first, then generate, render and write."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.io.atomic import atomic_folder
+        from diff4splat.models.base_scene import PLANE_DEPTH
         from diff4splat.models.context import view_of
         from diff4splat.models.pipeline import Diff4SplatPipeline
+        from diff4splat.paths.summary import summarize
         from diff4splat.report.card import Result, describe, write_card
         from diff4splat.report.run_log import RunLog
         from diff4splat.report.scene_folder import render_frames, write_scene_folder
@@ -66,6 +70,8 @@ class Generate:
         picture = self.picture()
         note("; ".join((f"focal length: {picture.focal_source}", *picture.notes)))
         path = choose_path(self.camera, view_of(picture.camera), self.options)
+        for warning in summarize(path, PLANE_DEPTH).warnings:
+            note(f"camera path: {warning}")
         with atomic_folder(self.out) as folder:
             with log.phases.phase("load model"):
                 pipeline = Diff4SplatPipeline.from_pretrained(self.model)
@@ -85,6 +91,7 @@ class Generate:
         return GenerationSettings(
             steps=self.steps,
             sampler=self.sampler,
+            shift=self.shift,
             guidance=replace(DEFAULT_GUIDANCE, weight=self.guidance),
             min_opacity=self.min_opacity,
         )

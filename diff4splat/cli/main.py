@@ -30,6 +30,9 @@ BAD_INPUT, INTERRUPTED = 2, 130
 
 def main() -> NoReturn:
     """Run the command line; errors a person can act on end in one line and exit code 2."""
+    if hasattr(signal, "SIGPIPE"):
+        # `diff4splat ... | head` ends quietly, like any other filter.
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     sys.exit(run(sys.argv[1:]))
 
 
