@@ -4,8 +4,14 @@ The path that generates a scene and the path it is shown along are different thi
 as many cameras as the model was made for, the second as many frames as the video.
 """
 
+from dataclasses import replace
+
+import torch
+
 from diff4splat.geometry.camera import Camera
+from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.picture import Picture
 from diff4splat.paths.build import build_path
 from diff4splat.paths.camera_path import CameraPath, require_usable
 from diff4splat.paths.picture_size import resized
@@ -21,11 +27,34 @@ def view_of(camera: Camera) -> PathFrame:
 
 
 def as_path(path: CameraPath | str, camera: Camera) -> CameraPath:
-    """Presets resolved in the picture's view, or cameras brought to the picture's size."""
+    """Presets in the picture's view, or cameras brought to its size and to the identity."""
     if isinstance(path, str):
         settings = PathSettings(frames=DEFAULT_FRAMES, fps=DEFAULT_FPS)
         return build_path(path, view_of(camera), settings)
-    return resized(require_usable(path, "camera path"), camera.size_px)
+    fitting = resized(require_usable(path, "camera path"), camera.size_px)
+    return replace(fitting, cameras=relative_to_first(fitting.cameras))
+
+
+def agree_on_lens(picture: Picture, path: CameraPath) -> tuple[Picture, CameraPath]:
+    """The first camera of the path took the photograph, so both must have one lens.
+
+    A photograph whose lens is known keeps it, and the path keeps its zoom relative to its first
+    camera; otherwise the photograph takes over the lens that the path names.
+    """
+    cameras, first = path.cameras, path.cameras[0]
+    if torch.allclose(first.focal_px, picture.camera.focal_px) and torch.allclose(
+        first.center_px, picture.camera.center_px
+    ):
+        return picture, path
+    if not picture.focal_known:
+        lens = replace(picture.camera, focal_px=first.focal_px, center_px=first.center_px)
+        return replace(picture, camera=lens, focal_known=True, focal_source="camera path"), path
+    matched = replace(
+        cameras,
+        focal_px=cameras.focal_px * (picture.camera.focal_px / first.focal_px),
+        center_px=cameras.center_px + (picture.camera.center_px - first.center_px),
+    )
+    return picture, replace(path, cameras=matched)
 
 
 def context_path(path: CameraPath, frames: int) -> CameraPath:

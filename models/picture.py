@@ -30,6 +30,8 @@ class FocalChoice:
 
     focal_px: float
     source: str
+    known: bool = True
+    """False for a guess that better knowledge may replace."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +41,8 @@ class Picture:
     rgb: Float[Tensor, "h w 3"]
     camera: Camera
     focal_source: str
+    focal_known: bool = True
+    """False for a default lens; a camera path that names one then decides."""
     notes: tuple[str, ...] = ()
     """What was done to the photograph, in words."""
 
@@ -82,6 +86,7 @@ def choose_focal(
     return FocalChoice(
         focal_px=focal_from_35mm(DEFAULT_FOCAL_35MM, size_px),
         source=f"default, {DEFAULT_FOCAL_35MM:g} mm (35 mm equivalent); --fov overrides",
+        known=False,
     )
 
 
@@ -125,7 +130,12 @@ def prepare_picture(
     top, left = (photo_size[0] - crop[0]) // 2, (photo_size[1] - crop[1]) // 2
     camera = pinhole(focal.focal_px, photo_size).cropped((top, left), crop).resized(size)
     window = rgb[top : top + crop[0], left : left + crop[1]]
-    return Picture(rgb=_resize(window, size), camera=camera, focal_source=focal.source)
+    return Picture(
+        rgb=_resize(window, size),
+        camera=camera,
+        focal_source=focal.source,
+        focal_known=focal.known,
+    )
 
 
 def _resize(

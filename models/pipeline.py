@@ -19,7 +19,7 @@ from torch import Tensor
 from diff4splat import __version__
 from diff4splat.geometry.rays import plucker_map, relative_to_first
 from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
-from diff4splat.models.context import as_path, context_path
+from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
 from diff4splat.models.input_colors import match_input_view
 from diff4splat.models.latent_sampling import Conditions, sample_video
@@ -94,9 +94,10 @@ class Diff4SplatPipeline:
         """
         side_px = max(self.model.config.size_px)
         picture = image if isinstance(image, Picture) else load_picture(Path(image), side_px)
+        picture, path = agree_on_lens(picture, as_path(path, picture.camera))
         request = Request(
             picture=picture,
-            path=as_path(path, picture.camera),
+            path=path,
             prompt=prompt,
             seed=seed,
             settings=settings or GenerationSettings(),

@@ -59,7 +59,7 @@ class Generate:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.io.atomic import atomic_folder
         from diff4splat.models.base_scene import PLANE_DEPTH
-        from diff4splat.models.context import view_of
+        from diff4splat.models.context import agree_on_lens, view_of
         from diff4splat.models.pipeline import Diff4SplatPipeline
         from diff4splat.paths.summary import summarize
         from diff4splat.report.card import Result, describe, write_card
@@ -68,8 +68,9 @@ class Generate:
 
         settings, log = self.settings(), RunLog(phases=ConsolePhases())
         picture = self.picture()
+        asked = choose_path(self.camera, view_of(picture.camera), self.options)
+        picture, path = agree_on_lens(picture, asked)
         note("; ".join((f"focal length: {picture.focal_source}", *picture.notes)))
-        path = choose_path(self.camera, view_of(picture.camera), self.options)
         for warning in summarize(path, PLANE_DEPTH).warnings:
             note(f"camera path: {warning}")
         with atomic_folder(self.out) as folder:

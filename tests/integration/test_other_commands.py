@@ -47,6 +47,7 @@ def test_preview_and_generate_follow_every_file_format(name: str, tmp_path: Path
     assert run([*arguments, "--camera", str(file), "--out", str(tmp_path / "out")]) == 0
     card = json.loads((tmp_path / "out" / "card.json").read_text())
     assert card["scene"]["frames"] == 7
+    assert card["first_view_psnr_db"] > 28
 
 
 def test_every_preset_is_listed(capsys: pytest.CaptureFixture) -> None:
