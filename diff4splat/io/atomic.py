@@ -83,8 +83,9 @@ def atomic_folder(target: Path) -> Iterator[Path]:
         yield staging
         for file in sorted(staging.iterdir()):
             os.replace(file, target / file.name)
-    except OutputError:
-        raise
+    except OutputError as error:
+        # People know the folder they named, not the one it was staged in.
+        raise OutputError(str(error).replace(str(staging), str(target))) from error
     except OSError as error:
         raise output_error(target, error) from error
     finally:

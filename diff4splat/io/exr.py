@@ -5,7 +5,9 @@ no depth. Attributes per part: ``time_s``, ``focal_px``, ``center_px``, ``world_
 ``unit``, ``conventions``, ``frame_count``; numbers are double precision.
 """
 
+import errno
 import io
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
@@ -96,8 +98,13 @@ def _doubles(values: Tensor) -> np.ndarray:
 
 
 def _write(parts: list[OpenEXR.Part], temporary: Path) -> None:
-    with _silent(), OpenEXR.File(parts) as opened:
-        opened.write(str(temporary))
+    """Write the parts; the library wraps the system's errors in its own, without their number."""
+    try:
+        with _silent(), OpenEXR.File(parts) as opened:
+            opened.write(str(temporary))
+    except RuntimeError as error:
+        full = os.strerror(errno.ENOSPC) in str(error)
+        raise OSError(errno.ENOSPC if full else errno.EIO, str(error)) from error
 
 
 def _verify(frames: Float32[np.ndarray, "t h w"], temporary: Path, file: Path) -> None:

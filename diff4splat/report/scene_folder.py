@@ -63,10 +63,9 @@ def write_scene_folder(
         OutputError: the folder cannot be written, or the disk is full.
     """
     scene = result.scene
-    with phases.phase("write files", 4) as advance:
+    _write_video(frames, scene.path, folder / "video.mp4", phases)
+    with phases.phase("write files", 3) as advance:
         save_scene(scene, folder / "scene.safetensors")
-        advance()
-        write_video(frames.rgb, folder / "video.mp4", frames_per_second(scene.path))
         advance()
         if frames.depth is not None:
             write_depth_exr(frames.depth, scene.path, folder / "depth.exr")
@@ -109,13 +108,17 @@ def write_view(
     if time_s is not None:
         scene = replace(scene, gaussians=scene.state_at(time_s), motion=StaticMotion())
     frames = render_frames(scene, path, log, with_depth=suffix == ".exr")
-    with log.phases.phase("write"):
-        if suffix == ".png":
-            write_png(frames.rgb[0], file)
-        elif suffix == ".exr":
-            write_depth_exr(frames.depth, path, file)
-        else:
-            write_video(frames.rgb, file, frames_per_second(path))
+    if suffix == ".mp4":
+        _write_video(frames, path, file, log.phases)
+    elif suffix == ".png":
+        write_png(frames.rgb[0], file)
+    else:
+        write_depth_exr(frames.depth, path, file)
+
+
+def _write_video(frames: Frames, path: CameraPath, file: Path, phases: Phases) -> None:
+    with phases.phase("write video", len(path)) as advance:
+        write_video(frames.rgb, file, frames_per_second(path), advance)
 
 
 def frames_per_second(path: CameraPath) -> float:

@@ -91,6 +91,9 @@ def test_a_set_of_files_appears_together_or_not_at_all(tmp_path: Path) -> None:
         (staging / "a.txt").write_text("new")
         assert not (out / "a.txt").exists()
     assert [file.name for file in out.iterdir()] == ["a.txt"]
+    with pytest.raises(OutputError, match=r"out/a\.txt: ") as caught, atomic_folder(out) as staging:
+        raise output_error(staging / "a.txt", OSError(errno.ENOSPC, "full"))
+    assert "partial" not in str(caught.value)
     with pytest.raises(KeyboardInterrupt), atomic_folder(out) as staging:
         (staging / "a.txt").write_text("newer")
         raise KeyboardInterrupt

@@ -213,3 +213,16 @@ def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
         assert "would be larger" in message or "the disk may be full" in message
     assert done.stderr == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_that_the_exr_library_reports_in_its_own_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write(self: object, name: str) -> None:
+        Path(name).write_bytes(b"half")
+        raise RuntimeError(f'Failed to write to "{name}". No space left on device.')
+
+    monkeypatch.setattr(exr.OpenEXR.File, "write", write)
+    with pytest.raises(OutputError, match="the disk is full"):
+        WRITERS["depth.exr"](tmp_path / "a.exr")
+    assert list(tmp_path.iterdir()) == []
