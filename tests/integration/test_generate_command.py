@@ -12,7 +12,8 @@ from diff4splat.io.images import read_photo, write_png
 from diff4splat.io.ply import read_ply
 from diff4splat.io.scene_file import load_scene
 from diff4splat.metrics.image import psnr
-from diff4splat.render.api import render
+from diff4splat.render.api import render, render_video
+from diff4splat.report import scene_folder
 
 FILES = {"scene.safetensors", "video.mp4", "depth.exr", "preview.png", "card.json"}
 
@@ -120,8 +121,18 @@ def test_a_prompt_builds_the_text_encoder_and_guides(photo: Path, tmp_path: Path
     assert card["provenance"]["prompt"] == "a boat drifts to the left"
 
 
-def test_depth_is_blended_only_when_asked_for(photo: Path, tmp_path: Path) -> None:
+def test_depth_is_blended_only_when_asked_for(
+    photo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def spy(*arguments: object, outputs: tuple[str, ...], **rest: object) -> object:
+        asked.append(outputs)
+        return render_video(*arguments, outputs=outputs, **rest)
+
+    monkeypatch.setattr(scene_folder, "render_video", spy)
     assert generate(photo, tmp_path / "out", "--skip-depth") == 0
+    assert asked == [("rgb",)]
     names = {file.name for file in (tmp_path / "out").iterdir()}
     assert names == FILES - {"depth.exr"}
 

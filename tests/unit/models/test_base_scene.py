@@ -1,5 +1,7 @@
 """What zero corrections mean: the photograph on a plane, seen sharp from where it was taken."""
 
+from dataclasses import replace
+
 import torch
 
 from diff4splat.geometry import quaternion, rigid
@@ -79,7 +81,7 @@ def test_rays_that_miss_the_plane_stay_finite() -> None:
     backwards = torch.diag(torch.tensor([-1.0, 1, -1, 1]))
     base = plane_base(picture, picture.camera.with_pose(torch.stack([torch.eye(4), backwards])), 1)
     assert bool(torch.isfinite(base.distance).all())
-    assert bool((base.distance > 0).all())
+    torch.testing.assert_close(base.distance[1], torch.full((32, 48), PLANE_DEPTH))
     assert bool(torch.isfinite(base.rgb).all())
 
 
@@ -102,6 +104,27 @@ def test_matched_colours_sharpen_the_input_view_and_stay_in_range() -> None:
     assert float(colors.min()) > -1e-6
     assert float(colors.max()) < 1 + 1e-6
     assert match_input_view(scene, cells, picture, 0, RunLog()) is scene
+
+
+def test_hard_edges_are_sharpened_without_leaving_the_range_of_colours() -> None:
+    edges = torch.rand(32, 48, 3, generator=torch.Generator().manual_seed(0)).round()
+    picture = replace(smooth_picture(), rgb=edges)
+    matched = match_input_view(
+        first_view_scene(picture), torch.arange(32 * 48), picture, 3, RunLog()
+    )
+    colors = 0.5 + 0.28209479177387814 * matched.gaussians.sh
+    assert float(colors.min()) > -1e-6
+    assert float(colors.max()) < 1 + 1e-6
+
+
+def test_each_gaussian_is_compared_with_its_own_pixel() -> None:
+    picture = smooth_picture()
+    scene = first_view_scene(picture)
+    cells = torch.arange(32 * 48)[100:]
+    some = scene.select(torch.arange(32 * 48) >= 100)
+    matched = match_input_view(some, cells, picture, 3, RunLog())
+    seen = render(matched, picture.camera).rgb[8:]
+    assert float(psnr(seen, picture.rgb[8:])) > 35
 
 
 def test_only_the_pixels_of_the_picture_are_matched() -> None:

@@ -1,0 +1,77 @@
+"""Pruning keeps track of cells, and deformation reads the cells it was given."""
+
+import torch
+
+from diff4splat.geometry.camera import pinhole
+from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
+from diff4splat.models.deformation import DeformationNetwork
+from diff4splat.models.deformation_heads import DeformationUnits
+from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.picture import Picture
+from diff4splat.models.reconstruction import Canonical, deform, prune_cells, reconstruct
+from diff4splat.models.sizes import size_by_name
+from diff4splat.report.run_log import RunLog
+from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.motion.static import StaticMotion
+
+CONFIG = size_by_name("test")
+UNITS = DeformationUnits(length_unit=PLANE_DEPTH, activation=CONFIG.activation)
+KEY_TIMES_S = torch.tensor([0.0, 1.0, 2.0])
+
+
+def canonical() -> Canonical:
+    """Five frames of random corrections on a picture."""
+    picture = Picture(
+        rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="test"
+    )
+    cameras = picture.camera.with_pose(torch.eye(4).expand(5, 4, 4))
+    maps = ReconstructionMaps(
+        gaussians=torch.randn(1, 12, 5, 32, 32), tokens=torch.randn(1, 24, 2, 2, 2)
+    )
+    return reconstruct(maps, plane_base(picture, cameras, 1), CONFIG.activation)
+
+
+def moving_network() -> DeformationNetwork:
+    torch.manual_seed(1)
+    network = DeformationNetwork(CONFIG)
+    for parameter in network.heads.parameters():
+        parameter.data = torch.randn(parameter.shape)
+    return network
+
+
+def test_pruning_keeps_the_cells_of_what_it_keeps() -> None:
+    whole = canonical()
+    log = RunLog()
+    pruned = prune_cells(whole, 0.01, log)
+    assert 0 < len(pruned.cells) < len(whole.cells)
+    assert torch.equal(pruned.gaussians.means, whole.gaussians.means[pruned.cells])
+    assert float(pruned.gaussians.opacities.min()) >= 0.01
+    (omission,) = log.omissions
+    assert omission.error > 1 / 255, "what a renderer would have drawn is an error"
+
+
+def test_dropping_what_no_renderer_draws_costs_nothing() -> None:
+    log = RunLog()
+    prune_cells(canonical(), 1 / 255, log)
+    assert [omission.error for omission in log.omissions] == [0.0]
+
+
+@torch.no_grad()
+def test_deforming_what_is_left_is_what_is_left_of_the_deformed() -> None:
+    whole, network = canonical(), moving_network()
+    pruned = prune_cells(whole, 0.5, RunLog())
+    of_all = deform(network, whole, KEY_TIMES_S, UNITS, RunLog())
+    of_some = deform(network, pruned, KEY_TIMES_S, UNITS, RunLog())
+    assert isinstance(of_all, KeyframeMotion)
+    assert len(of_some.moving_index) == len(pruned.cells)
+    for name in ("offsets", "rotations", "log_scale_offsets"):
+        torch.testing.assert_close(getattr(of_some, name), getattr(of_all, name)[:, pruned.cells])
+
+
+def test_a_network_that_cannot_move_anything_is_not_run() -> None:
+    network, log = DeformationNetwork(CONFIG), RunLog()
+    network.register_forward_pre_hook(lambda *_: (_ for _ in ()).throw(AssertionError("it ran")))
+    motion = deform(network, canonical(), KEY_TIMES_S, UNITS, log)
+    assert isinstance(motion, StaticMotion)
+    assert motion.time_range_s == (0.0, 2.0)
+    assert [omission.what for omission in log.omissions] == ["deformation network"]
