@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PHOTO ?= demo/picture.jpg
 
 .PHONY: demo test test-all lint clean
 
@@ -11,9 +12,10 @@ $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'
 	touch $@
 
-demo: $(VENV)/ready  ## a photograph-like picture, made here, to a scene in demo/
+demo: $(VENV)/ready  ## a photograph-like picture, made here, to a scene; PHOTO=mine.jpg takes yours
 	$(BIN)/python examples/make_picture.py demo/picture.jpg
-	$(BIN)/diff4splat generate demo/picture.jpg --camera spiral --out demo/scene
+	$(BIN)/diff4splat generate $(PHOTO) --camera spiral --out demo/scene
+	@echo "look at demo/scene/preview.png and demo/scene/video.mp4"
 
 test: $(VENV)/ready  ## everything that needs neither a GPU nor patience
 	$(BIN)/pytest -q -m "not slow"
