@@ -16,7 +16,7 @@ from diff4splat.models.heads import PixelBase
 from diff4splat.models.picture import Picture
 
 PLANE_DEPTH = 4.0
-"""Scene units. Keeps standard deviations near 0.01, which half-precision viewers still hold."""
+"""Scene units. Keeps standard deviations near 0.006, which half-precision viewers still hold."""
 OPAQUE, UNSEEN = 0.999, 0.002
 """Opacities of the first frame and of later ones; the paper prunes below 0.005."""
 DISTANCE_RANGE = (PLANE_DEPTH / 8, PLANE_DEPTH * 8)

@@ -193,7 +193,8 @@ class ActivationConfig:
     log_scale_limit: float = math.log(16)
     """L: standard deviations stay within a factor e^L of the pixel footprint."""
     footprint_px: float = 0.35
-    """Standard deviation of an uncorrected Gaussian, in pixels of its own grid."""
+    """Standard deviation of an uncorrected Gaussian, in cells of its own grid. With the usual
+    dilation 0.35 is right for one Gaussian per pixel, 0.6 for a half grid (docs/adr/0005)."""
 
     def __post_init__(self) -> None:
         for name in ("log_distance_limit", "log_scale_limit", "footprint_px"):

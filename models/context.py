@@ -27,12 +27,15 @@ def view_of(camera: Camera) -> PathFrame:
 
 
 def as_path(path: CameraPath | str, camera: Camera) -> CameraPath:
-    """Presets in the picture's view, or cameras brought to its size and to the identity."""
+    """Presets in the picture's view, or cameras at its size that start at the identity and 0 s."""
     if isinstance(path, str):
         settings = PathSettings(frames=DEFAULT_FRAMES, fps=DEFAULT_FPS)
         return build_path(path, view_of(camera), settings)
     fitting = resized(require_usable(path, "camera path"), camera.size_px)
-    return replace(fitting, cameras=relative_to_first(fitting.cameras))
+    started = CameraPath(
+        cameras=relative_to_first(fitting.cameras), times_s=fitting.times_s - fitting.times_s[0]
+    )
+    return started.to(camera.focal_px.dtype)
 
 
 def agree_on_lens(picture: Picture, path: CameraPath) -> tuple[Picture, CameraPath]:

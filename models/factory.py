@@ -42,6 +42,10 @@ class Networks:
         return self
 
 
+PARTS = tuple(field.name for field in fields(Networks))
+"""Names of the networks, in the order of their random streams."""
+
+
 def create_networks(
     config: ModelConfig,
     device: torch.device | str | None = None,
@@ -54,20 +58,31 @@ def create_networks(
     On the meta device nothing is allocated; elsewhere weights are drawn on the CPU and then moved.
     """
     target = torch.device("cpu" if device is None else device)
-    draw_on = target if target.type == "meta" else torch.device("cpu")
 
-    def build(order: int, make: Callable[[], nn.Module]) -> nn.Module:
-        with torch.random.fork_rng(devices=[]), draw_on:
-            torch.manual_seed(seed * len(fields(Networks)) + order)
-            return make().to(target)
+    def build(part: str, make: Callable[[], nn.Module]) -> nn.Module:
+        return _build(part, make, target, seed)
 
     return Networks(
-        vae=build(0, lambda: VideoVae(config.vae)),
-        text_encoder=build(1, lambda: TextEncoder(config.text)) if with_text else None,
-        dit=build(2, lambda: VideoDiT(config)),
-        ldrm=build(3, lambda: Ldrm(config)),
-        deformation=build(4, lambda: DeformationNetwork(config)),
+        vae=build("vae", lambda: VideoVae(config.vae)),
+        text_encoder=build("text_encoder", lambda: TextEncoder(config.text)) if with_text else None,
+        dit=build("dit", lambda: VideoDiT(config)),
+        ldrm=build("ldrm", lambda: Ldrm(config)),
+        deformation=build("deformation", lambda: DeformationNetwork(config)),
     )
+
+
+def create_text_encoder(
+    config: ModelConfig, device: torch.device | str = "cpu", seed: int = 0
+) -> TextEncoder:
+    """The text encoder that ``create_networks`` builds, alone."""
+    return _build("text_encoder", lambda: TextEncoder(config.text), torch.device(device), seed)
+
+
+def _build(part: str, make: Callable[[], nn.Module], target: torch.device, seed: int) -> nn.Module:
+    draw_on = target if target.type == "meta" else torch.device("cpu")
+    with torch.random.fork_rng(devices=[]), draw_on:
+        torch.manual_seed(seed * len(PARTS) + PARTS.index(part))
+        return make().to(target)
 
 
 def parameter_counts(config: ModelConfig) -> Mapping[str, int]:

@@ -6,7 +6,7 @@ length:
 
     latent ─ 1×1 to 64 ─ patch 2×2 ─ linear ─ norm ─┐
     rays ─── patch 4×16×16 ─ linear ─ norm ─────────┴─ concatenate ─ linear ─ blocks ─ norm ─ tokens
-    tokens ─ transposed convolution 5×16×16, stride 4×16×16 (zero at first) ─ 12 channels per pixel
+    tokens ─ transposed convolution 4×16×16 (zero at first), drop 3 frames ─ 12 channels per pixel
 
 The zero layer makes a fresh model answer exactly 0, which the heads read as "the base scene".
 """
@@ -63,9 +63,8 @@ class Ldrm(nn.Module):
         self.to_gaussians = zero_(
             nn.ConvTranspose3d(
                 *(ldrm.width, sum(GAUSSIAN_SPLIT)),
-                kernel_size=(TIME_STRIDE + 1, side, side),
+                kernel_size=(TIME_STRIDE, side, side),
                 stride=(TIME_STRIDE, side, side),
-                padding=(TIME_STRIDE // 2, 0, 0),
             )
         )
 
@@ -84,8 +83,10 @@ class Ldrm(nn.Module):
         for block in self.blocks:
             tokens = block(tokens, rope)
         maps = self.norm_out(tokens).transpose(1, 2).unflatten(2, grid)
+        # Latent i holds frames 4 i − 3 … 4 i: three of the first pack lie before the video.
+        gaussians = self.to_gaussians(maps)[:, :, TIME_STRIDE - 1 :]
         return ReconstructionMaps(
-            gaussians=self.to_gaussians(maps).to(latent.dtype), tokens=maps.to(latent.dtype)
+            gaussians=gaussians.to(latent.dtype), tokens=maps.to(latent.dtype)
         )
 
     def _latent_tokens(self, latent: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b t h2 w2 d"]:

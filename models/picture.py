@@ -19,7 +19,7 @@ from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, 
 from diff4splat.io.images import read_photo
 
 SIDE_MULTIPLE = 16
-"""VAE stride 8 times patch 2."""
+"""Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""
 DEFAULT_FOCAL_35MM = 30.0
 """What phones see with their main lens, when nothing is known."""
 
@@ -46,9 +46,17 @@ class Picture:
     notes: tuple[str, ...] = ()
     """What was done to the photograph, in words."""
 
+    def to(self, device: torch.device) -> "Picture":
+        """Move pixels and camera."""
+        return replace(self, rgb=self.rgb.to(device), camera=self.camera.to(device))
+
 
 def load_picture(
-    file: Path, side_px: int, fov_deg: float | None = None, convert: bool = False
+    file: Path,
+    side_px: int,
+    fov_deg: float | None = None,
+    convert: bool = False,
+    multiple_px: int = SIDE_MULTIPLE,
 ) -> Picture:
     """A photograph's file at the model's size; ``convert`` accepts grey, alpha, 16 bits and so on.
 
@@ -59,7 +67,7 @@ def load_picture(
     photo = read_photo(file, convert)
     size_px = (photo.rgb.shape[0], photo.rgb.shape[1])
     focal = choose_focal(size_px, fov_deg, photo.focal_35mm)
-    return replace(prepare_picture(photo.rgb, focal, side_px), notes=photo.notes)
+    return replace(prepare_picture(photo.rgb, focal, side_px, multiple_px), notes=photo.notes)
 
 
 def choose_focal(
@@ -90,19 +98,21 @@ def choose_focal(
     )
 
 
-def model_size(photo_size_px: tuple[int, int], side_px: int) -> tuple[int, int]:
+def model_size(
+    photo_size_px: tuple[int, int], side_px: int, multiple_px: int = SIDE_MULTIPLE
+) -> tuple[int, int]:
     """(height, width) near the photograph's shape, with at most ``side_px``² pixels.
 
     Raises:
         ConfigError: the side is too small for one patch or too large to be meant.
         InputError: the photograph is too long and thin to fit.
     """
-    if not SIDE_MULTIPLE <= side_px <= 4096:
-        raise ConfigError(f"--resolution: expected {SIDE_MULTIPLE} to 4096 pixels, got {side_px}")
+    if not multiple_px <= side_px <= 4096:
+        raise ConfigError(f"--resolution: expected {multiple_px} to 4096 pixels, got {side_px}")
     aspect = photo_size_px[1] / photo_size_px[0]
-    rows = range(SIDE_MULTIPLE, side_px * side_px // SIDE_MULTIPLE + 1, SIDE_MULTIPLE)
-    columns = [(math.floor(h * aspect / SIDE_MULTIPLE), h) for h in rows]
-    sizes = [(h, (count + more) * SIDE_MULTIPLE) for count, h in columns for more in (0, 1)]
+    rows = range(multiple_px, side_px * side_px // multiple_px + 1, multiple_px)
+    columns = [(math.floor(h * aspect / multiple_px), h) for h in rows]
+    sizes = [(h, (count + more) * multiple_px) for count, h in columns for more in (0, 1)]
     fitting = [size for size in sizes if 0 < size[0] * size[1] <= side_px**2]
     best = max(fitting, key=lambda size: _size_score(size, aspect), default=None)
     if best is None or not 0.5 < best[1] / best[0] / aspect < 2:
@@ -120,11 +130,14 @@ def _size_score(size_px: tuple[int, int], aspect: float) -> float:
 
 
 def prepare_picture(
-    rgb: Float[Tensor, "height width 3"], focal: FocalChoice, side_px: int
+    rgb: Float[Tensor, "height width 3"],
+    focal: FocalChoice,
+    side_px: int,
+    multiple_px: int = SIDE_MULTIPLE,
 ) -> Picture:
     """Crop the centre to the model's shape and resize it."""
     photo_size = (rgb.shape[0], rgb.shape[1])
-    size = model_size(photo_size, side_px)
+    size = model_size(photo_size, side_px, multiple_px)
     scale = min(photo_size[0] / size[0], photo_size[1] / size[1])
     crop = (min(photo_size[0], round(size[0] * scale)), min(photo_size[1], round(size[1] * scale)))
     top, left = (photo_size[0] - crop[0]) // 2, (photo_size[1] - crop[1]) // 2

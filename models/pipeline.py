@@ -4,12 +4,11 @@ Axes: ``b c t h w`` inside networks, pictures ``h w 3`` outside; this file is wh
 
     picture ─ vae ─────────┐
     prompt ── text encoder ┼─ sample ─ latents ─┐
-    path ──── Plücker maps ┴────────────────────┼─ reconstruct ─ prune ─ deform ─ Scene
+    path ──── Plücker maps ┴────────────────────┼─ reconstruct ─ prune ─ deform ─ match ─ Scene
     picture on a plane ─────────────────────────┘
 """
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -21,20 +20,18 @@ from diff4splat.geometry.rays import plucker_map, relative_to_first
 from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
 from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
-from diff4splat.models.input_colors import match_input_view
+from diff4splat.models.input_colors import InputGrid, match_input_view
 from diff4splat.models.latent_sampling import Conditions, sample_video
 from diff4splat.models.picture import Picture, load_picture
 from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
 from diff4splat.models.prompt import require_prompt
-from diff4splat.models.reconstruction import deform, prune_cells, reconstruct
-from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.reconstruction import Canonical, deform, prune_cells, reconstruct
+from diff4splat.models.settings import GenerationSettings, require_seed
+from diff4splat.models.still import drop_still_tracks
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
-from diff4splat.scene.edit import static_if_still
+from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.scene import Provenance, Scene
-
-SPLAT_REACH = 3.0
-"""Standard deviations out to which a Gaussian is seen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +61,11 @@ class Diff4SplatPipeline:
         """
         return cls(load_model(name_or_folder))
 
+    def to(self, device: torch.device | str) -> "Diff4SplatPipeline":
+        """Move the networks; scenes always come back to the CPU."""
+        self.model.networks.to(torch.device(device))
+        return self
+
     def save_pretrained(self, folder: Path | str) -> None:
         """Write configuration, weights and provenance into ``folder``."""
         save_model(self.model, Path(folder))
@@ -92,8 +94,8 @@ class Diff4SplatPipeline:
         Raises:
             InputError: the image, the path or the prompt cannot be used.
         """
-        side_px = max(self.model.config.size_px)
-        picture = image if isinstance(image, Picture) else load_picture(Path(image), side_px)
+        require_seed(seed)
+        picture = self._picture(image)
         picture, path = agree_on_lens(picture, as_path(path, picture.camera))
         request = Request(
             picture=picture,
@@ -104,12 +106,30 @@ class Diff4SplatPipeline:
         )
         return self._generate(request, log or RunLog())
 
+    def _picture(self, image: Picture | Path | str) -> Picture:
+        """At a size that the model can take, in single precision."""
+        config = self.model.config
+        if not isinstance(image, Picture):
+            image = load_picture(Path(image), max(config.size_px), multiple_px=config.token_px)
+        config.latent_grid(config.frames, image.camera.size_px)
+        return replace(image, rgb=image.rgb.float(), camera=image.camera.to(torch.float32))
+
     def _generate(self, request: Request, log: RunLog) -> Scene:
-        context = context_path(request.path, self.model.config.frames)
+        device = self.model.device
+        context = context_path(request.path, self.model.config.frames).to(device)
+        request = replace(request, picture=request.picture.to(device))
         conditions = self._conditions(request, context, log)
         latent = self._sample(request, conditions, log)
-        scene = self._reconstruct(request, context, conditions.plucker, latent, log)
-        return self._without_still_keys(scene, request, log)
+        canonical = self._reconstruct(request, context, conditions.plucker, latent, log)
+        scene = Scene(
+            gaussians=canonical.gaussians,
+            motion=self._motion(canonical, context, log),
+            path=request.path,
+            provenance=self._provenance(request),
+        )
+        scene = self._match_colors(scene, canonical, request, log)
+        camera, still_px = request.picture.camera, request.settings.still_px
+        return drop_still_tracks(scene, camera, still_px, log).to(torch.device("cpu"))
 
     def _conditions(self, request: Request, context: CameraPath, log: RunLog) -> Conditions:
         text = self._text_states(request.prompt, log)
@@ -121,7 +141,9 @@ class Diff4SplatPipeline:
 
     def _text_states(self, prompt: str | None, log: RunLog) -> Float[Tensor, "1 s d"] | None:
         if prompt is None:
-            log.left_out("text encoder", "no prompt", "the whole network: it was not built")
+            built = self.model.networks.text_encoder is not None
+            saved = "one call" if built else "the whole network: it was not built"
+            log.left_out("text encoder", "no prompt", saved)
             return None
         require_prompt(prompt, self.model.config.text.max_bytes)
         with log.phases.phase("encode text"):
@@ -135,9 +157,9 @@ class Diff4SplatPipeline:
         with log.phases.phase("sample video", settings.steps) as advance:
             video = sample_video(dit, conditions, settings, request.seed, advance)
         if video.calls.saved:
-            why = "no prompt" if conditions.text is None else "outside the guidance interval"
+            why = "no prompt" if conditions.text is None else settings.why_unguided
             log.left_out("guidance pass", why, f"{video.calls.saved} network calls")
-        log.left_out("video decoder", "the scene is decoded from latents", "the whole network")
+        log.left_out("video decoder", "the scene is decoded from latents", "decoding every frame")
         return video.latent
 
     def _reconstruct(
@@ -147,46 +169,27 @@ class Diff4SplatPipeline:
         plucker: Float[Tensor, "1 6 f h w"],
         latent: Float[Tensor, "1 c t h2 w2"],
         log: RunLog,
-    ) -> Scene:
-        networks, config = self.model.networks, self.model.config
+    ) -> Canonical:
+        config = self.model.config
         with log.phases.phase("reconstruct"):
             base = plane_base(request.picture, context.cameras, config.ldrm.grid_stride)
-            maps = networks.ldrm(latent, plucker)
-            canonical = prune_cells(
-                reconstruct(maps, base, config.activation), request.settings.min_opacity, log
-            )
-        units = DeformationUnits(length_unit=PLANE_DEPTH, activation=config.activation)
-        scene = Scene(
-            gaussians=canonical.gaussians,
-            motion=deform(networks.deformation, canonical, context.times_s, units, log),
-            path=request.path,
-            provenance=self._provenance(request),
-        )
-        if config.ldrm.grid_stride > 1:
-            return scene
-        steps = request.settings.color_steps
-        return match_input_view(scene, canonical.cells, request.picture, steps, log)
+            maps = self.model.networks.ldrm(latent, plucker)
+            whole = reconstruct(maps, base, config.activation)
+            return prune_cells(whole, request.settings.min_opacity, log)
 
-    def _without_still_keys(self, scene: Scene, request: Request, log: RunLog) -> Scene:
-        moving = len(scene.motion.moving_index)
-        if moving == 0:
-            return scene
-        still_px, activation = request.settings.still_px, self.model.config.activation
-        nearest = float(scene.gaussians.means[:, 2].clamp_min(PLANE_DEPTH / 8).min())
-        focal_px = float(request.picture.camera.focal_px.max())
-        # Turning or stretching the widest splat by this much moves its rim by ``still_px``.
-        rim_px = SPLAT_REACH * activation.footprint_px * math.exp(activation.log_scale_limit)
-        trimmed = static_if_still(
-            scene,
-            offset=still_px * nearest / focal_px,
-            angle_rad=still_px / rim_px,
-            log_scale=still_px / rim_px,
+    def _motion(self, canonical: Canonical, context: CameraPath, log: RunLog) -> Motion:
+        units = DeformationUnits(length_unit=PLANE_DEPTH, activation=self.model.config.activation)
+        return deform(self.model.networks.deformation, canonical, context.times_s, units, log)
+
+    def _match_colors(
+        self, scene: Scene, canonical: Canonical, request: Request, log: RunLog
+    ) -> Scene:
+        grid = InputGrid(
+            picture=request.picture,
+            stride=self.model.config.ldrm.grid_stride,
+            cells=canonical.cells,
         )
-        still = moving - len(trimmed.motion.moving_index)
-        if still:
-            why = f"they move by less than {still_px:g} px"
-            log.left_out("key times of still Gaussians", why, f"{still:,} tracks", still_px)
-        return trimmed
+        return match_input_view(scene, grid, request.settings.color_steps, log)
 
     def _provenance(self, request: Request) -> Provenance:
         return Provenance(

@@ -8,12 +8,25 @@ import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import torch
+
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.io.atomic import write_text
 from diff4splat.models.config import ModelConfig
-from diff4splat.models.factory import Networks, create_networks, parameter_counts
+from diff4splat.models.factory import (
+    Networks,
+    create_networks,
+    create_text_encoder,
+    parameter_counts,
+)
 from diff4splat.models.sizes import SIZES, size_by_name
-from diff4splat.models.weights import load_config, load_networks, save_networks, weights_sha256
+from diff4splat.models.weights import (
+    load_config,
+    load_networks,
+    load_text_encoder,
+    save_networks,
+    weights_sha256,
+)
 
 PROVENANCE_FILE = "provenance.json"
 BYTES_PER_WEIGHT = 4
@@ -29,6 +42,11 @@ class Model:
     """Where the weights lie; None for random ones."""
     weights_sha256: str = "none"
     untrained: bool = True
+
+    @property
+    def device(self) -> torch.device:
+        """Where the networks are."""
+        return next(self.networks.dit.parameters()).device
 
 
 def load_model(name_or_folder: str | Path) -> Model:
@@ -68,10 +86,10 @@ def with_text_encoder(model: Model) -> Model:
     if model.networks.text_encoder is not None:
         return model
     if model.folder is None:
-        complete = create_networks(model.config, with_text=True)
+        encoder = create_text_encoder(model.config)
     else:
-        complete = load_networks(model.folder, with_text=True)[1]
-    return replace(model, networks=replace(model.networks, text_encoder=complete.text_encoder))
+        encoder = load_text_encoder(model.folder, model.config)
+    return replace(model, networks=replace(model.networks, text_encoder=encoder.to(model.device)))
 
 
 def save_model(model: Model, folder: Path) -> None:

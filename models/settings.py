@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.guidance import Guidance
-from diff4splat.flow.levels import Schedule, make_levels
+from diff4splat.flow.levels import Schedule, make_levels, require_levels
+from diff4splat.flow.samplers import find_sampler
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
@@ -35,6 +36,8 @@ class GenerationSettings:
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
             raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
+        find_sampler(self.sampler)
+        require_levels(self.levels)
         if not 0 <= self.color_steps <= 100:
             raise ConfigError(f"color_steps: expected 0 to 100, got {self.color_steps}")
         if not 0 <= self.min_opacity <= 1:
@@ -47,3 +50,21 @@ class GenerationSettings:
         """Noise levels that the sampler visits."""
         measured: Schedule = "log_snr" if self.steps >= ENOUGH_STEPS else "uniform"
         return make_levels(self.schedule or measured, self.steps, self.shift)
+
+    @property
+    def why_unguided(self) -> str:
+        """Why a prompted generation leaves some unconditional passes out."""
+        if self.guidance.weight == 1:
+            return "a guidance weight of 1 needs no other pass"
+        return "outside the guidance interval"
+
+
+def require_seed(seed: int) -> int:
+    """Return ``seed`` when a random generator takes it.
+
+    Raises:
+        ConfigError: negative, or 2^63 and above.
+    """
+    if not 0 <= seed < 2**63:
+        raise ConfigError(f"--seed: expected 0 to 2^63 - 1, got {seed}")
+    return seed

@@ -37,7 +37,7 @@ test_size.__test__ = False
 
 
 def small_size() -> ModelConfig:
-    """Under 20 million weights: trained and run on two CPU cores in seconds."""
+    """Under 20 million weights: runs on two CPU cores in seconds, and can be trained there."""
     return ModelConfig(
         name="small",
         frames=17,

@@ -7,7 +7,6 @@ may be stored in half precision; they are read into float32.
 """
 
 import hashlib
-from dataclasses import fields
 from pathlib import Path
 
 import torch
@@ -18,10 +17,10 @@ from torch import Tensor, nn
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.atomic import atomic_path, write_text
 from diff4splat.models.config import ModelConfig
-from diff4splat.models.factory import Networks, create_networks
+from diff4splat.models.factory import PARTS, Networks, create_networks, create_text_encoder
+from diff4splat.models.text_encoder import TextEncoder
 
 CONFIG_FILE = "config.json"
-PARTS = tuple(field.name for field in fields(Networks))
 SHOWN = 3
 """Names listed in an error message before "and so on"."""
 
@@ -59,6 +58,17 @@ def load_networks(folder: Path, with_text: bool = True) -> tuple[ModelConfig, Ne
     for name, part in networks.parts():
         _fill(part, _read(part_file(folder, name)), name)
     return config, networks
+
+
+def load_text_encoder(folder: Path, config: ModelConfig) -> TextEncoder:
+    """The text encoder of a model folder, alone.
+
+    Raises:
+        CheckpointError, FileFormatError: as ``load_networks``.
+    """
+    encoder = create_text_encoder(config, "meta")
+    _fill(encoder, _read(part_file(folder, "text_encoder")), "text_encoder")
+    return encoder
 
 
 def load_config(folder: Path) -> ModelConfig:

@@ -4,11 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from diff4splat.errors import ConfigError
+
 if TYPE_CHECKING:
     from diff4splat.paths.camera_path import CameraPath
     from diff4splat.paths.settings import PathFrame
 
-PRESET_FRAMES = 49
+PRESET_FRAMES, DEFAULT_FPS = 49, 24.0
 FILE_SUFFIXES = (".txt", ".json", ".tum")
 
 
@@ -17,11 +19,11 @@ class CameraOptions:
     """Length and manner of a camera move, shared by every command that takes one."""
 
     frames: int | None = None
-    """Frames of the video (default: 49 for a preset, as many as it holds for a path file)."""
-    fps: float = 24.0
-    """Frames per second."""
+    """Frames of the video (default: 49 for presets, as many as it holds for a path file)."""
+    fps: float | None = None
+    """Frames per second (default: 24 for presets, its own times for a path file)."""
     amplitude: float | None = None
-    """Size of the move as a share of near depth (default: the preset's own)."""
+    """Size of a preset's move, in near depths or turns (default: the preset's own)."""
     easing: Literal["linear", "smooth", "ease-in", "ease-out"] = "smooth"
     """How a preset starts and stops."""
 
@@ -32,21 +34,38 @@ def choose_path(camera: str, view: "PathFrame", options: CameraOptions) -> "Came
     Raises:
         InputError: neither a known preset nor a readable path file.
     """
-    if not _is_file(camera):
-        from diff4splat.paths.build import build_path
-        from diff4splat.paths.settings import PathSettings
+    return _from_file(camera, view, options) if _is_file(camera) else _preset(camera, view, options)
 
-        frames = PRESET_FRAMES if options.frames is None else options.frames
-        settings = PathSettings(
-            frames=frames, fps=options.fps, amplitude=options.amplitude, easing=options.easing
-        )
-        return build_path(camera, view, settings)
+
+def _preset(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
+    from diff4splat.paths.build import build_path
+    from diff4splat.paths.settings import PathSettings
+
+    settings = PathSettings(
+        frames=PRESET_FRAMES if options.frames is None else options.frames,
+        fps=DEFAULT_FPS if options.fps is None else options.fps,
+        amplitude=options.amplitude,
+        easing=options.easing,
+    )
+    return build_path(camera, view, settings)
+
+
+def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
+    """The file's own poses and times, or as many frames as asked for over the same stretch."""
     from diff4splat.io.path_files import read_path
     from diff4splat.paths.picture_size import resized
     from diff4splat.paths.spline import resample
 
-    path = resized(read_path(Path(camera), view.camera, options.fps), view.camera.size_px)
-    return path if options.frames is None else resample(path, options.frames, options.fps)
+    if options.amplitude is not None:
+        raise ConfigError("--amplitude: expected with presets only, got a path file; leave it out")
+    read = read_path(Path(camera), view.camera, options.fps or DEFAULT_FPS)
+    path = resized(read, view.camera.size_px)
+    if options.frames is None and options.fps is None:
+        return path
+    frames = len(path) if options.frames is None else options.frames
+    duration_s = float(path.times_s[-1])
+    own_fps = (frames - 1) / duration_s if duration_s > 0 and frames > 1 else DEFAULT_FPS
+    return resample(path, frames, own_fps if options.fps is None else options.fps)
 
 
 def _is_file(camera: str) -> bool:

@@ -1,12 +1,16 @@
 """``diff4splat convert``: a scene as INRIA PLY, at one time or as a numbered sequence."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from diff4splat.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diff4splat.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +33,11 @@ class Convert:
         from diff4splat.io.scene_file import load_scene
 
         scene = load_scene(self.scene)
-        start_s, stop_s = scene.motion.time_range_s
+        start_s, _ = scene.motion.time_range_s
         if self.out.suffix.lower() == ".ply":
             time_s = start_s if self.time is None else self.time
+            if not math.isfinite(time_s):
+                raise ConfigError(f"--time: expected seconds, got {time_s:g}")
             write_ply(scene.state_at(time_s), self.out, comments=(f"time_s {time_s:g}",))
             note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians at {time_s:g} s)")
             return
@@ -41,8 +47,18 @@ class Convert:
             )
         if not 0 < self.fps < 1e4:
             raise ConfigError(f"--fps: expected a number above 0, got {self.fps:g}")
-        count = int((stop_s - start_s) * self.fps) + 1
-        times_s = [start_s + index / self.fps for index in range(count)]
+        times_s = file_times_s(scene, self.fps)
+        count = len(times_s)
         with ConsolePhases().phase("write PLY", count) as advance:
             write_ply_sequence(scene, self.out, times_s, advance=advance)
         note(f"wrote {count} files to {self.out}")
+
+
+def file_times_s(scene: "Scene", fps: float) -> list[float]:
+    """When each file of a sequence shows the scene; one file for a scene that stands still."""
+    start_s, stop_s = scene.motion.time_range_s
+    if len(scene.motion.moving_index) == 0:
+        return [start_s]
+    # Times are stored in float32, so the last one may lie a rounding error too early.
+    count = math.floor((stop_s - start_s) * fps + 1e-4) + 1
+    return [start_s + index / fps for index in range(count)]

@@ -5,6 +5,7 @@ photograph ─ load_picture ─┐
 --prompt ── require_prompt ┘
 """
 
+import hashlib
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -64,7 +65,7 @@ class Generate:
         from diff4splat.paths.summary import summarize
         from diff4splat.report.card import Result, describe, write_card
         from diff4splat.report.run_log import RunLog
-        from diff4splat.report.scene_folder import render_frames, write_scene_folder
+        from diff4splat.report.scene_folder import OUTPUT_FILES, render_frames, write_scene_folder
 
         settings, log = self.settings(), RunLog(phases=ConsolePhases())
         picture = self.picture()
@@ -73,22 +74,28 @@ class Generate:
         note("; ".join((f"focal length: {picture.focal_source}", *picture.notes)))
         for warning in summarize(path, PLANE_DEPTH).warnings:
             note(f"camera path: {warning}")
-        with atomic_folder(self.out) as folder:
+        with atomic_folder(self.out, OUTPUT_FILES) as folder:
             with log.phases.phase("load model"):
                 pipeline = Diff4SplatPipeline.from_pretrained(self.model)
             scene = pipeline(picture, path, self.prompt, seed=self.seed, settings=settings, log=log)
-            frames = render_frames(scene, path, log, with_depth=not self.skip_depth)
+            frames = render_frames(scene, scene.path, log, with_depth=not self.skip_depth)
             result = Result.of(scene, picture.rgb, frames.rgb[0])
             facts = describe(result, self.camera, picture.focal_source)
             write_scene_folder(folder, result, frames, facts, log.phases)
-            write_card(folder / "card.json", result, self.inputs(picture), log)
+            inputs = self.inputs(picture, settings, pipeline.model.config.fingerprint())
+            write_card(folder / "card.json", result, inputs, log)
         for line in (*(f"{name}: {value}" for name, value in facts), f"wrote {self.out}"):
             note(line)
 
     def settings(self) -> "GenerationSettings":
-        """Sampling, guidance and pruning, checked."""
-        from diff4splat.models.settings import DEFAULT_GUIDANCE, GenerationSettings
+        """Seed, prompt, sampling, guidance and pruning, checked before anything is loaded."""
+        from diff4splat.models.pretrained import find_config
+        from diff4splat.models.prompt import require_prompt
+        from diff4splat.models.settings import DEFAULT_GUIDANCE, GenerationSettings, require_seed
 
+        require_seed(self.seed)
+        if self.prompt is not None:
+            require_prompt(self.prompt, find_config(self.model).text.max_bytes)
         return GenerationSettings(
             steps=self.steps,
             sampler=self.sampler,
@@ -98,22 +105,28 @@ class Generate:
         )
 
     def picture(self) -> "Picture":
-        """The photograph at the model's size; the prompt is checked on the way, it is cheap."""
+        """The photograph at the model's size."""
         from diff4splat.models.picture import load_picture
         from diff4splat.models.pretrained import find_config
-        from diff4splat.models.prompt import require_prompt
 
         config = find_config(self.model)
-        if self.prompt is not None:
-            require_prompt(self.prompt, config.text.max_bytes)
         side_px = max(config.size_px) if self.resolution is None else self.resolution
-        return load_picture(self.image, side_px, self.fov, self.convert)
+        return load_picture(self.image, side_px, self.fov, self.convert, config.token_px)
 
-    def inputs(self, picture: "Picture") -> dict[str, object]:
+    def inputs(
+        self, picture: "Picture", settings: "GenerationSettings", model_fingerprint: str
+    ) -> dict[str, object]:
         """Every setting as it was used, for the card."""
         given = {name: value for name, value in asdict(self).items() if name != "options"}
-        given |= asdict(self.options)
+        given |= asdict(self.options) | {"generation": asdict(settings)}
         given |= {"focal_source": picture.focal_source, "notes": picture.notes}
+        given |= {"image_sha256": file_sha256(self.image), "model_fingerprint": model_fingerprint}
         return {
             name: str(value) if isinstance(value, Path) else value for name, value in given.items()
         }
+
+
+def file_sha256(file: Path) -> str:
+    """Which photograph it was."""
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()

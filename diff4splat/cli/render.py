@@ -1,5 +1,6 @@
 """``diff4splat render``: any camera path and any time, from a scene file alone."""
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +40,8 @@ class Render:
         from diff4splat.report.run_log import RunLog
         from diff4splat.report.scene_folder import write_view
 
+        if self.time is not None and not math.isfinite(self.time):
+            raise ConfigError(f"--time: expected seconds, got {self.time:g}")
         scene = load_scene(self.scene)
         path = self.chosen_path(scene)
         if self.out.suffix.lower() == ".png":

@@ -3,7 +3,7 @@
 import errno
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
@@ -66,8 +66,11 @@ def write_text(target: Path, text: str) -> None:
 
 
 @contextmanager
-def atomic_folder(target: Path) -> Iterator[Path]:
+def atomic_folder(target: Path, owned: Collection[str] = ()) -> Iterator[Path]:
     """Yield an empty staging folder and move its files into ``target`` when the block succeeds.
+
+    Files named in ``owned`` that were not made again are removed then: an older run's depth beside
+    a newer run's scene would be taken for its own.
 
     A set of files that belong together appears together: on any failure, an interrupt included,
     everything staged is removed and what stood in ``target`` before is untouched. Entering the
@@ -81,8 +84,11 @@ def atomic_folder(target: Path) -> Iterator[Path]:
     try:
         staging.mkdir(parents=True, exist_ok=True)
         yield staging
-        for file in sorted(staging.iterdir()):
+        staged = sorted(staging.iterdir())
+        for file in staged:
             os.replace(file, target / file.name)
+        for name in set(owned) - {file.name for file in staged}:
+            (target / name).unlink(missing_ok=True)
     except OutputError as error:
         # People know the folder they named, not the one it was staged in.
         raise OutputError(str(error).replace(str(staging), str(target))) from error

@@ -32,6 +32,10 @@ class CameraPath:
     def __len__(self) -> int:
         return len(self.times_s)
 
+    def to(self, target: torch.device | torch.dtype) -> "CameraPath":
+        """Move or cast cameras and times."""
+        return CameraPath(cameras=self.cameras.to(target), times_s=self.times_s.to(target))
+
 
 def require_usable(path: CameraPath, what: str) -> CameraPath:
     """Return ``path`` when a renderer can follow it.

@@ -22,7 +22,7 @@ _LEAST_MEMORY = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderSettings:
-    """How a picture is made; the defaults are those of Kerbl et al. 2023."""
+    """How a picture is made; defaults as in gsplat, which follows Kerbl et al. 2023."""
 
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """RGB behind the scene. For a learnt one render over black and add (1 - alpha) * background."""

@@ -28,6 +28,7 @@ from diff4splat.scene.scene import Scene
 UNTRAINED = "untrained: random weights; this is the photograph itself, standing in space"
 SheetFacts = tuple[tuple[str, str], ...]
 """(name, value) pairs printed beside the photograph."""
+OUTPUT_FILES = ("scene.safetensors", "video.mp4", "depth.exr", "preview.png", "card.json")
 VIEW_SUFFIXES = (".mp4", ".png", ".exr")
 
 

@@ -25,7 +25,8 @@ class DepthRange:
 
 def depth_range(scene: Scene) -> DepthRange:
     """Near (5 %) and focus (median) depth of the Gaussians that the first camera can see."""
-    camera = scene.path.cameras[0].to(scene.gaussians.means.dtype)
+    means = scene.gaussians.means
+    camera = scene.path.cameras[0].to(means.dtype).to(means.device)
     pixels, z = project(camera, scene.state_at(float(scene.path.times_s[0])).means)
     height, width = camera.size_px
     inside = (pixels >= 0).all(-1) & (pixels[:, 0] < width) & (pixels[:, 1] < height) & (z > 0)

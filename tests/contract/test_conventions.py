@@ -21,6 +21,7 @@ from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.reconstruction import Canonical, deform
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.sizes import size_by_name
+from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene import harmonics
@@ -213,7 +214,15 @@ def generated() -> Scene:
 
 
 def test_first_camera(generated: Scene) -> None:
-    assert torch.equal(generated.path.cameras.world_from_camera[0], torch.eye(4))
+    turn = quaternion.to_matrix(quarter_turn([0.0, 1.0, 0.0]))
+    elsewhere = rigid.from_parts(turn, torch.tensor([5.0, 6, 7]))
+    foreign = generated.path.cameras.world_from_camera[:3] @ elsewhere
+    cameras = generated.path.cameras[:3].with_pose(elsewhere @ foreign)
+    path = CameraPath(cameras=cameras, times_s=torch.arange(3.0))
+    picture = Picture(rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="")
+    pipeline = Diff4SplatPipeline.from_pretrained("test")
+    scene = pipeline(picture, path, settings=GenerationSettings(steps=1))
+    torch.testing.assert_close(scene.path.cameras.world_from_camera[0], torch.eye(4))
 
 
 def test_time(generated: Scene) -> None:

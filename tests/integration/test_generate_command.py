@@ -12,6 +12,7 @@ from diff4splat.io.images import read_photo, write_png
 from diff4splat.io.ply import read_ply
 from diff4splat.io.scene_file import load_scene
 from diff4splat.metrics.image import psnr
+from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.render.api import render, render_video
 from diff4splat.report import scene_folder
 
@@ -148,14 +149,44 @@ def test_a_field_of_view_overrides_and_is_reported(photo: Path, tmp_path: Path) 
     )
 
 
-def test_numbered_ply_files(folder: Path, tmp_path: Path) -> None:
+def test_a_scene_that_stands_still_is_one_ply_file(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "sequence"
-    assert (
-        run(["convert", str(folder / "scene.safetensors"), "--out", str(out), "--fps", "20"]) == 0
-    )
-    names = sorted(file.name for file in out.iterdir())
-    assert names[0] == "frame_0000.ply"
-    assert len(names) >= 3
+    assert run(["convert", str(folder / "scene.safetensors"), "--out", str(out)]) == 0
+    assert [file.name for file in out.iterdir()] == ["frame_0000.ply"]
+
+
+def test_a_second_run_leaves_no_file_of_the_first_beside_its_own(
+    photo: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    assert generate(photo, tmp_path) == 0
+    assert generate(photo, tmp_path, "--skip-depth") == 0
+    names = {file.name for file in tmp_path.iterdir()}
+    assert names == FILES - {"depth.exr"} | {"notes.txt"}
+
+
+@pytest.mark.parametrize("frames", [2, 6, 25])
+def test_a_moving_model_goes_all_the_way(photo: Path, tmp_path: Path, frames: int) -> None:
+    pipeline = Diff4SplatPipeline.from_pretrained("test")
+    for parameter in pipeline.model.networks.deformation.parameters():
+        if not bool(parameter.any()):
+            parameter.data = 0.05 * torch.randn(parameter.shape)
+    pipeline.save_pretrained(tmp_path / "model")
+    out = tmp_path / "out"
+    more = ["--model", str(tmp_path / "model"), "--frames", str(frames), "--steps", "1"]
+    assert run(["generate", str(photo), "--out", str(out), *more]) == 0
+    card = json.loads((out / "card.json").read_text())
+    assert card["scene"]["moving_gaussians"] > 100
+    assert len(card["provenance"]["weights_sha256"]) == 64
+    scene_file = str(out / "scene.safetensors")
+    assert run(["convert", scene_file, "--out", str(tmp_path / "ply")]) == 0
+    assert len(list((tmp_path / "ply").iterdir())) == frames
+    scene = load_scene(out / "scene.safetensors")
+    last_s, camera = float(scene.path.times_s[-1]), scene.path.cameras[0]
+    expected = render(scene, camera, last_s).rgb
+    actual = render(read_ply(tmp_path / "ply" / f"frame_{frames - 1:04d}.ply"), camera).rgb
+    assert float(psnr(actual, expected)) >= 50
+    assert not torch.equal(expected, render(scene, camera, 0.0).rgb)
 
 
 def test_inspect_counts_parameters_without_allocating(capsys: pytest.CaptureFixture) -> None:

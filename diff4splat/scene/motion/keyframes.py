@@ -43,6 +43,11 @@ class KeyframeMotion:
             raise ShapeError(
                 "KeyframeMotion.key_times_s: expected at least one time, strictly increasing"
             )
+        if bool((self.moving_index.diff() <= 0).any()):
+            raise ShapeError(
+                "KeyframeMotion.moving_index: expected indices that strictly increase, got repeats "
+                "or another order"
+            )
 
     @property
     def time_range_s(self) -> tuple[float, float]:
@@ -57,13 +62,13 @@ class KeyframeMotion:
         index = self.moving_index
         offset = self._offset(lower, weight)
         rotation = self._blend(self.rotations, lower, weight, slerp=True)
+        # A zero quaternion means no rotation, and must still be turned by the motion.
+        canonical = quaternion.normalize(gaussians.quats[index])
         stretch = self._blend(self.log_scale_offsets, lower, weight).exp()
         return replace(
             gaussians,
             means=gaussians.means.index_add(0, index, offset),
-            quats=gaussians.quats.index_copy(
-                0, index, quaternion.multiply(gaussians.quats[index], rotation)
-            ),
+            quats=gaussians.quats.index_copy(0, index, quaternion.multiply(canonical, rotation)),
             scales=gaussians.scales.index_copy(0, index, gaussians.scales[index] * stretch),
         )
 

@@ -10,7 +10,7 @@ from diff4splat.metrics.image import psnr
 from diff4splat.models.base_scene import OPAQUE, PLANE_DEPTH, UNSEEN, plane_base
 from diff4splat.models.config import ActivationConfig
 from diff4splat.models.heads import activate
-from diff4splat.models.input_colors import match_input_view
+from diff4splat.models.input_colors import InputGrid, match_input_view
 from diff4splat.models.picture import Picture
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
@@ -42,6 +42,10 @@ def first_view_scene(picture: Picture) -> Scene:
         path=CameraPath(cameras=cameras, times_s=torch.zeros(1)),
         provenance=Provenance(generator="test"),
     )
+
+
+def whole_grid(picture: Picture) -> InputGrid:
+    return InputGrid(picture=picture, stride=1, cells=torch.arange(picture.rgb[..., 0].numel()))
 
 
 def test_every_cell_of_every_frame_lies_on_the_plane() -> None:
@@ -96,22 +100,25 @@ def test_matched_colours_sharpen_the_input_view_and_stay_in_range() -> None:
     picture = smooth_picture()
     scene, cells = first_view_scene(picture), torch.arange(32 * 48)
     before = float(psnr(render(scene, picture.camera).rgb, picture.rgb))
-    matched = match_input_view(scene, cells, picture, 3, RunLog())
+    matched = match_input_view(
+        scene, InputGrid(picture=picture, stride=1, cells=cells), 3, RunLog()
+    )
     after = float(psnr(render(matched, picture.camera).rgb, picture.rgb))
     assert after > before + 5
     assert after > 35
     colors = 0.5 + 0.28209479177387814 * matched.gaussians.sh
     assert float(colors.min()) > -1e-6
     assert float(colors.max()) < 1 + 1e-6
-    assert match_input_view(scene, cells, picture, 0, RunLog()) is scene
+    assert (
+        match_input_view(scene, InputGrid(picture=picture, stride=1, cells=cells), 0, RunLog())
+        is scene
+    )
 
 
 def test_hard_edges_are_sharpened_without_leaving_the_range_of_colours() -> None:
     edges = torch.rand(32, 48, 3, generator=torch.Generator().manual_seed(0)).round()
     picture = replace(smooth_picture(), rgb=edges)
-    matched = match_input_view(
-        first_view_scene(picture), torch.arange(32 * 48), picture, 3, RunLog()
-    )
+    matched = match_input_view(first_view_scene(picture), whole_grid(picture), 3, RunLog())
     colors = 0.5 + 0.28209479177387814 * matched.gaussians.sh
     assert float(colors.min()) > -1e-6
     assert float(colors.max()) < 1 + 1e-6
@@ -122,7 +129,7 @@ def test_each_gaussian_is_compared_with_its_own_pixel() -> None:
     scene = first_view_scene(picture)
     cells = torch.arange(32 * 48)[100:]
     some = scene.select(torch.arange(32 * 48) >= 100)
-    matched = match_input_view(some, cells, picture, 3, RunLog())
+    matched = match_input_view(some, InputGrid(picture=picture, stride=1, cells=cells), 3, RunLog())
     seen = render(matched, picture.camera).rgb[8:]
     assert float(psnr(seen, picture.rgb[8:])) > 35
 
@@ -131,4 +138,32 @@ def test_only_the_pixels_of_the_picture_are_matched() -> None:
     picture = smooth_picture()
     scene = first_view_scene(picture)
     elsewhere = torch.arange(32 * 48) + 32 * 48
-    assert match_input_view(scene, elsewhere, picture, 3, RunLog()) is scene
+    assert (
+        match_input_view(scene, InputGrid(picture=picture, stride=1, cells=elsewhere), 3, RunLog())
+        is scene
+    )
+
+
+def test_gaussians_that_left_their_pixel_keep_their_colour() -> None:
+    picture = smooth_picture()
+    scene = first_view_scene(picture)
+    means = scene.gaussians.means.clone()
+    means[:48] += torch.tensor([0.0, 0.4, 0.0])
+    moved = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    matched = match_input_view(moved, whole_grid(picture), 3, RunLog())
+    assert torch.equal(matched.gaussians.sh[:48], scene.gaussians.sh[:48])
+    assert not torch.equal(matched.gaussians.sh[48:], scene.gaussians.sh[48:])
+
+
+def test_a_half_grid_covers_the_picture_and_is_matched_cell_by_cell() -> None:
+    picture = smooth_picture()
+    cameras = picture.camera.with_pose(torch.eye(4)[None])
+    config = ActivationConfig(footprint_px=0.6)
+    gaussians = activate(torch.zeros(12, 1, 16, 24), plane_base(picture, cameras, 2), config)
+    scene = replace(first_view_scene(picture), gaussians=gaussians)
+    grid = InputGrid(picture=picture, stride=2, cells=torch.arange(16 * 24))
+    alpha = render(scene, picture.camera, outputs=("alpha",)).alpha
+    assert float(alpha[2:-2, 2:-2].min()) > 0.97
+    before = float(psnr(render(scene, picture.camera).rgb, picture.rgb))
+    matched = match_input_view(scene, grid, 3, RunLog())
+    assert float(psnr(render(matched, picture.camera).rgb, picture.rgb)) > before + 3

@@ -70,3 +70,11 @@ def test_context_spans_the_time_of_the_path(frames: int, count: int) -> None:
     if frames > 1 and count > 1:
         torch.testing.assert_close(context.times_s[-1], path.times_s[-1])
         torch.testing.assert_close(context.cameras.focal_px[-1], path.cameras.focal_px[-1])
+
+
+def test_a_path_on_another_clock_and_in_double_precision_starts_at_zero() -> None:
+    path = zooming_path(pinhole(40.0, (32, 48)), (40.0, 40.0, 40.0))
+    later = replace(path, times_s=path.times_s + 5).to(torch.float64)
+    shown = as_path(later, pinhole(40.0, (32, 48)))
+    assert shown.times_s.tolist() == [0.0, 1.0, 2.0]
+    assert shown.cameras.focal_px.dtype == torch.float32

@@ -102,7 +102,7 @@ def test_gaussians_that_hardly_move_store_no_keys(
     assert "key times of still Gaussians" in {omission.what for omission in log.omissions}
 
 
-def test_a_prompt_changes_the_latents_and_guidance_costs_what_it_says(
+def test_a_prompt_changes_the_scene_and_builds_the_text_encoder(
     pipeline: Diff4SplatPipeline, picture: Picture
 ) -> None:
     for part in ("dit", "ldrm"):
@@ -178,3 +178,36 @@ def test_a_single_camera_and_a_file_name_are_enough(
 def test_bad_prompts_are_refused(pipeline: Diff4SplatPipeline, picture: Picture) -> None:
     with pytest.raises(InputError, match="prompt"):
         pipeline(picture, "static", "", settings=QUICK)
+
+
+def test_double_precision_is_taken_and_wrong_sizes_are_named(
+    pipeline: Diff4SplatPipeline, picture: Picture
+) -> None:
+    exact = replace(picture, rgb=picture.rgb.double(), camera=picture.camera.to(torch.float64))
+    expected = pipeline(picture, "arc", settings=QUICK)
+    assert_same_scene(pipeline(exact, expected.path.to(torch.float64), settings=QUICK), expected)
+    odd = Picture(rgb=torch.rand(24, 24, 3), camera=pinhole(30.0, (24, 24)), focal_source="test")
+    with pytest.raises(InputError, match="multiples of 16"):
+        pipeline(odd, "arc", settings=QUICK)
+
+
+def test_a_path_that_starts_later_is_shown_moving(
+    pipeline: Diff4SplatPipeline, picture: Picture
+) -> None:
+    randomize(pipeline, "deformation", 0.05)
+    path = pipeline(picture, "arc", settings=QUICK).path
+    later = replace(path, times_s=path.times_s + 5)
+    scene = pipeline(picture, later, settings=QUICK)
+    assert float(scene.path.times_s[0]) == 0
+    assert scene.motion.time_range_s == pytest.approx((0.0, float(scene.path.times_s[-1])))
+
+
+def test_the_text_encoder_is_built_alone_and_the_same_as_with_the_others(
+    pipeline: Diff4SplatPipeline,
+) -> None:
+    from diff4splat.models.factory import create_networks, create_text_encoder
+
+    config = pipeline.model.config
+    alone = create_text_encoder(config).state_dict()
+    together = create_networks(config, with_text=True).text_encoder.state_dict()
+    assert all(torch.equal(alone[key], together[key]) for key in together)

@@ -171,6 +171,8 @@ def test_wrong_shapes_are_named() -> None:
         Gaussians(**parts | {"sh": torch.zeros(2, 5, 3)})
     with pytest.raises(ShapeError, match="strictly increasing"):
         random_motion([1.0, 1.0], [0])
+    with pytest.raises(ShapeError, match="indices that strictly increase"):
+        random_motion([0.0, 1.0], [3, 1])
     with pytest.raises(ShapeError, match=r"KeyframeMotion\.offsets"):
         KeyframeMotion(
             key_times_s=torch.zeros(1),
@@ -179,3 +181,13 @@ def test_wrong_shapes_are_named() -> None:
             rotations=torch.zeros(1, 1, 4),
             log_scale_offsets=torch.zeros(1, 1, 3),
         )
+
+
+def test_a_zero_quaternion_is_turned_by_the_motion() -> None:
+    still = random_gaussians(1)
+    still = Gaussians(
+        **{f.name: getattr(still, f.name) for f in fields(still)}
+        | {"quats": torch.zeros(1, 4).double()}
+    )
+    motion = random_motion([0.0], [0])
+    torch.testing.assert_close(motion.state_at(still, 0.0).quats, motion.rotations[0])
