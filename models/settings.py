@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from diff4splat.errors import ConfigError
-from diff4splat.flow.guidance import Guidance
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE, Guidance
 from diff4splat.flow.levels import Schedule, make_levels, require_levels
 from diff4splat.flow.samplers import find_sampler
 from diff4splat.scene.edit import MIN_OPACITY
@@ -11,8 +11,6 @@ from diff4splat.scene.edit import MIN_OPACITY
 MAX_STEPS = 1000
 ENOUGH_STEPS = 6
 """With fewer, evenly spaced in log signal-to-noise ratio throws guided samples off their course."""
-DEFAULT_GUIDANCE = Guidance(weight=4.0, low=0.2, high=0.9)
-"""At high noise guidance hurts, at low noise it is useless (Kynkäänniemi et al. 2404.07724)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -89,9 +89,10 @@ class Generate:
 
     def settings(self) -> "GenerationSettings":
         """Seed, prompt, sampling, guidance and pruning, checked before anything is loaded."""
+        from diff4splat.flow.guidance import DEFAULT_GUIDANCE
         from diff4splat.models.pretrained import find_config
         from diff4splat.models.prompt import require_prompt
-        from diff4splat.models.settings import DEFAULT_GUIDANCE, GenerationSettings, require_seed
+        from diff4splat.models.settings import GenerationSettings, require_seed
 
         require_seed(self.seed)
         if self.prompt is not None:

@@ -44,6 +44,10 @@ class Guidance:
         return self.weight != 1 and self.low <= level <= self.high
 
 
+DEFAULT_GUIDANCE = Guidance(weight=4.0, low=0.2, high=0.9)
+"""What a prompted generation uses unless told otherwise."""
+
+
 @dataclass(slots=True, kw_only=True)
 class CallCount:
     """Network evaluations of a guided run, against always evaluating both branches."""

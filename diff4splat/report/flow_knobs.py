@@ -7,13 +7,13 @@ mean would be set by the few trajectories that end at another component. Seconds
 toy field; what carries over to a network is the number of calls, which labels the points.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import torch
 from torch import Tensor
 
-from diff4splat.flow.guidance import Guidance, guided
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE, Guidance, guided
 from diff4splat.flow.levels import Schedule, make_levels
 from diff4splat.flow.mixture import GaussianMixture, random_mixture
 from diff4splat.flow.samplers import SAMPLERS, VelocityFn, find_sampler, integrate
@@ -103,7 +103,7 @@ def guidance_knob() -> Knob:
         summary=f"guidance (weight {GUIDANCE_WEIGHT:g}) only inside an interval of noise levels",
         error_unit=_ERROR_UNIT,
         settings=settings,
-        default=settings[0],
+        default=replace(DEFAULT_GUIDANCE, weight=GUIDANCE_WEIGHT),
         reference=settings[0],
         run=lambda guidance: _sample(DEFAULT, _field(guidance)),
         error=median_relative_error,
