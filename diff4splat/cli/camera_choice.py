@@ -19,11 +19,11 @@ class CameraOptions:
     """Length and manner of a camera move, shared by every command that takes one."""
 
     frames: int | None = None
-    """Frames of the video (default: 49 for presets, as many as it holds for a path file)."""
+    """Frames of the video; if left out, 49 for presets, as many as it holds for a path file."""
     fps: float | None = None
-    """Frames per second (default: 24 for presets, its own times for a path file)."""
+    """Frames per second; if left out, 24 for presets, its own times for a path file."""
     amplitude: float | None = None
-    """Size of a preset's move, in near depths or turns (default: the preset's own)."""
+    """Size of a preset's move, in near depths or turns; if left out, the preset's own."""
     easing: Literal["linear", "smooth", "ease-in", "ease-out"] = "smooth"
     """How a preset starts and stops."""
 

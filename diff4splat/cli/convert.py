@@ -22,7 +22,7 @@ class Convert:
     out: Path
     """A name ending in .ply for one time, or a folder for a sequence."""
     time: float | None = None
-    """Seconds, for a single file (default: the first time of the motion)."""
+    """Seconds, for a single file; if left out, the first time of the motion."""
     fps: float = 24.0
     """Files per second of a sequence."""
 

@@ -28,7 +28,7 @@ class Generate:
     camera: str = "spiral"
     """Presets chained with `+`, such as `spiral` or `orbit:0.25+up`, or a path file."""
     prompt: str | None = None
-    """What happens in the scene (default: no text, and no text encoder)."""
+    """What happens in the scene; if left out, no text, and no text encoder."""
     out: Path = Path("out")
     """Folder for the results."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
@@ -37,9 +37,9 @@ class Generate:
     model: str = "small"
     """A model folder, or the name of a size with random weights: test, small."""
     resolution: int | None = None
-    """Side of a square with as many pixels as the picture will have (default: the model's)."""
+    """Side of a square with as many pixels as the picture will have; if left out, the model's."""
     fov: float | None = None
-    """Horizontal field of view in degrees (default: from EXIF, else a 30 mm lens)."""
+    """Horizontal field of view in degrees; if left out, from EXIF, else a 30 mm lens."""
     steps: int = 16
     """Steps of the sampler."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"

@@ -24,13 +24,13 @@ class Render:
     out: Path = Path("render.mp4")
     """A video (.mp4), one picture (.png) or depth (.exr)."""
     camera: str | None = None
-    """Presets or a path file (default: the path that the scene suggests)."""
+    """Presets or a path file; if left out, the path that the scene suggests."""
     time: float | None = None
-    """Stop the clock at this many seconds (default: time runs along the path)."""
+    """Stop the clock at this many seconds; if left out, time runs along the path."""
     frame: int = 0
     """Which pose of the path a single picture shows; -1 is the last."""
     resolution: int | None = None
-    """Pixels on the longer side (default: as the scene suggests)."""
+    """Pixels on the longer side; if left out, as the scene suggests."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
 
     def run(self) -> None:

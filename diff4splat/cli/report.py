@@ -11,7 +11,7 @@ class ErrorTime:
     out: Path = Path("error-time")
     """Folder for the results."""
     knob: tuple[str, ...] = ()
-    """Names to sweep (default: all; see `diff4splat report knobs`)."""
+    """Names to sweep; if left out, all; see `diff4splat report knobs`."""
     repeats: int = 3
     """Timed runs per setting; the fastest counts."""
 
