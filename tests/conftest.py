@@ -1,6 +1,10 @@
 """Seeding, dtypes and switches shared by all tests."""
 
+import os
 from collections.abc import Iterator
+
+# As the command line does, and before torch is loaded: waiting threads sleep.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import jaxtyping
 import pytest

@@ -108,13 +108,17 @@ def write_view(
         )
     if time_s is not None:
         scene = replace(scene, gaussians=scene.state_at(time_s), motion=StaticMotion())
-    frames = render_frames(scene, path, log, with_depth=suffix == ".exr")
-    if suffix == ".mp4":
-        _write_video(frames, path, file, log.phases)
-    elif suffix == ".png":
-        write_png(frames.rgb[0], file)
-    else:
-        write_depth_exr(frames.depth, path, file)
+    wanted = ("depth",) if suffix == ".exr" else ("rgb",)
+    with log.phases.phase("render", len(path)) as advance, torch.no_grad():
+        frames = render_video(scene, path, outputs=wanted, advance=advance)
+        if suffix == ".mp4":
+            # Frame by frame: memory holds one, however long the path is.
+            write_video((frame.rgb for frame in frames), file, frames_per_second(path))
+        elif suffix == ".png":
+            write_png(next(frames).rgb, file)
+        else:
+            depth = torch.stack([frame.depth for frame in frames])
+            write_depth_exr(depth, path, file)
 
 
 def _write_video(frames: Frames, path: CameraPath, file: Path, phases: Phases) -> None:
