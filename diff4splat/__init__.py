@@ -16,7 +16,6 @@ _PUBLIC = {
     "Scene": "diff4splat.scene.scene",
     "StaticMotion": "diff4splat.scene.motion.static",
     "load_scene": "diff4splat.io.scene_file",
-    "render": "diff4splat.render.api",
     "save_scene": "diff4splat.io.scene_file",
 }
 

@@ -104,10 +104,8 @@ class ModelConfig:
         """
         try:
             data = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise ConfigError(
-                f"model configuration: expected JSON, got {error.msg} in line {error.lineno}"
-            ) from error
+        except (json.JSONDecodeError, RecursionError) as error:
+            raise ConfigError(f"model configuration: expected JSON, got {error}") from error
         return _build(cls, data, "model configuration")
 
     def fingerprint(self) -> str:

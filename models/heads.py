@@ -6,7 +6,7 @@ colour, distance and opacity per cell, and the cameras that saw it. With raw = 0
 exactly the base:
 
     mean  = camera centre + distance · ray
-    scale = footprint_px · distance / focal_px · exp(L tanh(raw / L))
+    scale = footprint_px · z / focal_px · exp(L tanh(raw / L)), z = distance · cos(ray, view axis)
     quat  = camera rotation ⊗ normalize((1, 0, 0, 0) + raw)
     colour, opacity and distance: see activations.py
 """
@@ -19,6 +19,7 @@ from torch import Tensor
 from diff4splat.errors import ShapeError
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
+from diff4splat.geometry.depth import depth_from_distance
 from diff4splat.geometry.rays import world_rays
 from diff4splat.models import activations
 from diff4splat.models.config_parts import GAUSSIAN_SPLIT, ActivationConfig
@@ -66,7 +67,9 @@ def activate(
     factor = activations.bounded_factor(distance[:, 0], config.log_distance_limit)
     far = base.distance.flatten() * factor
     origins, directions = world_rays(base.cameras)
-    footprint = config.footprint_px * far / _focal_px(base)
+    # Neighbouring rays of a pinhole are z / focal apart on a plane that faces the camera.
+    depth = depth_from_distance(base.cameras, far.unflatten(0, base.distance.shape)).flatten()
+    footprint = config.footprint_px * depth / _focal_px(base)
     return Gaussians(
         means=origins.flatten(0, 2) + far[:, None] * directions.flatten(0, 2),
         quats=quaternion.multiply(_camera_quats(base), activations.rotation(rotation)),

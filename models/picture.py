@@ -20,6 +20,8 @@ from diff4splat.io.images import read_photo
 
 SIDE_MULTIPLE = 16
 """Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""
+MAX_SIDE_PX = 1024
+"""Seventeen frames of more pixels do not fit into 8 GiB."""
 DEFAULT_FOCAL_35MM = 30.0
 """What phones see with their main lens, when nothing is known."""
 
@@ -107,8 +109,10 @@ def model_size(
         ConfigError: the side is too small for one patch or too large to be meant.
         InputError: the photograph is too long and thin to fit.
     """
-    if not multiple_px <= side_px <= 4096:
-        raise ConfigError(f"--resolution: expected {multiple_px} to 4096 pixels, got {side_px}")
+    if not multiple_px <= side_px <= MAX_SIDE_PX:
+        raise ConfigError(
+            f"--resolution: expected {multiple_px} to {MAX_SIDE_PX} pixels, got {side_px}"
+        )
     aspect = photo_size_px[1] / photo_size_px[0]
     rows = range(multiple_px, side_px * side_px // multiple_px + 1, multiple_px)
     columns = [(math.floor(h * aspect / multiple_px), h) for h in rows]

@@ -57,7 +57,7 @@ def load_model(name_or_folder: str | Path) -> Model:
         CheckpointError: weights and configuration do not belong together.
     """
     folder = Path(name_or_folder)
-    if not folder.is_dir():
+    if not _is_folder(folder):
         config = size_by_name(str(name_or_folder))
         _require_memory(config)
         return Model(config=config, networks=create_networks(config, with_text=False))
@@ -78,7 +78,7 @@ def find_config(name_or_folder: str | Path) -> ModelConfig:
         ConfigError, CheckpointError: as ``load_model``.
     """
     folder = Path(name_or_folder)
-    return load_config(folder) if folder.is_dir() else size_by_name(str(name_or_folder))
+    return load_config(folder) if _is_folder(folder) else size_by_name(str(name_or_folder))
 
 
 def with_text_encoder(model: Model) -> Model:
@@ -100,6 +100,13 @@ def save_model(model: Model, folder: Path) -> None:
     save_networks(complete.networks, model.config, folder)
 
 
+def _is_folder(folder: Path) -> bool:
+    try:
+        return folder.is_dir()
+    except OSError:
+        return False  # longer than any name
+
+
 def _is_untrained(folder: Path) -> bool:
     """What the provenance file says; a model without one counts as untrained."""
     file = folder / PROVENANCE_FILE
@@ -107,7 +114,7 @@ def _is_untrained(folder: Path) -> bool:
         return True
     try:
         return bool(json.loads(file.read_text(encoding="utf-8"))["untrained"])
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise CheckpointError(
             f"{file}: expected a JSON object with 'untrained', got something else; "
             "fetch the model again"

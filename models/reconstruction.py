@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from diff4splat.errors import ConfigError
 from diff4splat.models.config import ActivationConfig
 from diff4splat.models.deformation import DeformationNetwork
 from diff4splat.models.deformation_heads import (
@@ -52,6 +53,11 @@ def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canoni
     opacities = canonical.gaussians.opacities
     kept = opacities >= min_opacity
     dropped = len(kept) - int(kept.sum())
+    if dropped == len(kept):
+        raise ConfigError(
+            f"--min-opacity: expected a value that leaves some Gaussians, got {min_opacity:g}; "
+            "lower it"
+        )
     if dropped:
         faintest = float(opacities[~kept].max())
         log.left_out(

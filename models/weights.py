@@ -124,6 +124,7 @@ def _fill(part: nn.Module, tensors: dict[str, Tensor], name: str) -> None:
         f"{key} {got[key]} instead of {wanted[key]}" for key in wanted if got[key] != wanted[key]
     ]
     _refuse(wrong, f"{name} weights: wrong shape of")
+    _require_finite(tensors, name)
     part.load_state_dict({key: value.float() for key, value in tensors.items()}, assign=True)
 
 

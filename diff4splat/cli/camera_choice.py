@@ -69,4 +69,7 @@ def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "Camer
 
 
 def _is_file(camera: str) -> bool:
-    return camera.lower().endswith(FILE_SUFFIXES) or "/" in camera or Path(camera).is_file()
+    try:
+        return camera.lower().endswith(FILE_SUFFIXES) or "/" in camera or Path(camera).is_file()
+    except OSError:
+        return False  # longer than any file name: presets, then

@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
+
+
+MAX_FILES = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +36,7 @@ class Convert:
         from diff4splat.io.ply import write_ply, write_ply_sequence
         from diff4splat.io.scene_file import load_scene
 
+        require_inputs_kept((self.scene,), (self.out,))
         scene = load_scene(self.scene)
         start_s, _ = scene.motion.time_range_s
         if self.out.suffix.lower() == ".ply":
@@ -61,4 +66,6 @@ def file_times_s(scene: "Scene", fps: float) -> list[float]:
         return [start_s]
     # Times are stored in float32, so the last one may lie a rounding error too early.
     count = math.floor((stop_s - start_s) * fps + 1e-4) + 1
+    if count > MAX_FILES:
+        raise ConfigError(f"--fps: expected at most {MAX_FILES:,} files, got {count:,}; lower it")
     return [start_s + index / fps for index in range(count)]

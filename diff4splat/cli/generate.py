@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.cli.overwriting import require_inputs_kept
 
 if TYPE_CHECKING:
     from diff4splat.models.picture import Picture
@@ -67,6 +68,8 @@ class Generate:
         from diff4splat.report.run_log import RunLog
         from diff4splat.report.scene_folder import OUTPUT_FILES, render_frames, write_scene_folder
 
+        outputs = [self.out / name for name in OUTPUT_FILES]
+        require_inputs_kept((self.image, Path(self.camera)), outputs)
         settings, log = self.settings(), RunLog(phases=ConsolePhases())
         picture = self.picture()
         asked = choose_path(self.camera, view_of(picture.camera), self.options)

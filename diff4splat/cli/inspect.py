@@ -22,7 +22,7 @@ class Inspect:
         """Print a table to standard output."""
         if (self.scene is None) == (self.config is None):
             raise ConfigError("inspect: expected a scene file or --config NAME, one of the two")
-        lines = size_lines(self.config) if self.config else scene_lines(self.scene)
+        lines = scene_lines(self.scene) if self.config is None else size_lines(self.config)
         print("\n".join(lines))
 
 
@@ -56,7 +56,7 @@ def scene_lines(file: Path) -> list[str]:
         "moving": f"{len(scene.motion.moving_index):,} ({type(scene.motion).__name__})",
         "harmonics": f"degree {scene.gaussians.degree}",
         "time": f"{start_s:g} to {stop_s:g} s",
-        "cameras": f"{len(scene.path)} of {width}×{height} px",
+        "cameras": f"{len(scene.path)} of {width} by {height} px",
         "depth": f"near {depths.near:.3g}, median {depths.focus:.3g} scene units",
         **{key: str(value) for key, value in asdict(scene.provenance).items()},
     }

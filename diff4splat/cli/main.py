@@ -13,7 +13,7 @@ from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.render import Render
 from diff4splat.cli.report import ErrorTime, ListKnobs
-from diff4splat.errors import Diff4SplatError
+from diff4splat.errors import Diff4SplatError, InputError
 
 subcommand = tyro.conf.subcommand
 Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
@@ -26,7 +26,7 @@ Command = (
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]
 )
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 2, 130, 141
 
 
 def main() -> NoReturn:
@@ -34,10 +34,19 @@ def main() -> NoReturn:
     # Threads that wait must sleep: with a core busy elsewhere, spinning ones make small parallel
     # loops up to fifty times slower. Read once, when torch is loaded.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-    if hasattr(signal, "SIGPIPE"):
-        # `diff4splat ... | head` ends quietly, like any other filter.
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    sys.exit(run(sys.argv[1:]))
+    try:
+        code = run(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # `diff4splat ... | head` ends quietly; nothing may be written to the closed pipe again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = PIPE_CLOSED
+    if code == INTERRUPTED:
+        # Python remembers an interrupt that passed through the import of a compiled module, and
+        # would end by that signal instead of with our exit code, handled or not.
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:
@@ -49,9 +58,12 @@ def run(arguments: list[str]) -> int:
         args=arguments,
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
     )
-    # A polite kill unwinds like Ctrl-C, so that staged files are removed.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A polite kill or a closed terminal unwinds like Ctrl-C, so that staged files are removed.
+    for stop in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, stop):
+            signal.signal(getattr(signal, stop), signal.default_int_handler)
     try:
+        require_readable(arguments)
         command.run()
     except Diff4SplatError as error:
         from diff4splat.cli.console import fail
@@ -64,6 +76,21 @@ def run(arguments: list[str]) -> int:
         note("diff4splat: stopped; no half-written file was left")
         return INTERRUPTED
     return 0
+
+
+def require_readable(arguments: list[str]) -> None:
+    """Refuse names that are not text: image and video libraries crash on them.
+
+    Raises:
+        InputError: an argument holds bytes that are not UTF-8.
+    """
+    for argument in arguments:
+        try:
+            argument.encode()
+        except UnicodeEncodeError as error:
+            raise InputError(
+                f"argument {argument!r}: expected a name in UTF-8, got other bytes; rename the file"
+            ) from error
 
 
 if __name__ == "__main__":

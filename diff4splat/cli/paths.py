@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.paths.summary import PathSummary
 
 PREVIEW_SIZE_PX = (360, 640)
+PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +39,11 @@ class PreviewPath:
         from diff4splat.paths.summary import summarize
         from diff4splat.report.plot import save_path_preview
 
+        require_inputs_kept((Path(self.camera),), (self.out,))
+        if self.out.suffix.lower() not in PICTURE_SUFFIXES:
+            raise ConfigError(
+                f"--out: expected a name ending in {', '.join(PICTURE_SUFFIXES)}, got {self.out}"
+            )
         if not 1 <= self.fov <= 170:
             raise ConfigError(f"--fov: expected 1 to 170 degrees, got {self.fov:g}")
         camera = pinhole(focal_from_fov(self.fov, PREVIEW_SIZE_PX[1]), PREVIEW_SIZE_PX)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ class Render:
 
         if self.time is not None and not math.isfinite(self.time):
             raise ConfigError(f"--time: expected seconds, got {self.time:g}")
+        require_inputs_kept((self.scene, Path(self.camera or "")), (self.out,))
+        if self.camera is None and self.options != CameraOptions():
+            raise ConfigError("--frames, --fps, --amplitude, --easing: expected with --camera only")
         scene = load_scene(self.scene)
         path = self.chosen_path(scene)
         if self.out.suffix.lower() == ".png":

@@ -3,7 +3,7 @@
 import errno
 import os
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
@@ -79,15 +79,16 @@ def atomic_folder(target: Path, owned: Collection[str] = ()) -> Iterator[Path]:
     Raises:
         OutputError: the folder cannot be made or written.
     """
-    existed = target.exists()
-    staging = target / f".partial-{os.getpid()}-{next(_NUMBERS)}"
+    existed, staging = True, target / f".partial-{os.getpid()}-{next(_NUMBERS)}"
     try:
+        existed = target.exists()
         staging.mkdir(parents=True, exist_ok=True)
         yield staging
-        staged = sorted(staging.iterdir())
-        for file in staged:
-            os.replace(file, target / file.name)
-        for name in set(owned) - {file.name for file in staged}:
+        staged = {file.name: file for file in sorted(staging.iterdir())}
+        _require_no_folder(target / name for name in {*staged, *owned})
+        for name, file in staged.items():
+            os.replace(file, target / name)
+        for name in set(owned) - set(staged):
             (target / name).unlink(missing_ok=True)
     except OutputError as error:
         # People know the folder they named, not the one it was staged in.
@@ -98,3 +99,10 @@ def atomic_folder(target: Path, owned: Collection[str] = ()) -> Iterator[Path]:
         shutil.rmtree(staging, ignore_errors=True)
         if not existed and target.is_dir() and not any(target.iterdir()):
             target.rmdir()
+
+
+def _require_no_folder(files: Iterable[Path]) -> None:
+    """Found before the first file is replaced, so that a set is never half new."""
+    for file in files:
+        if file.is_dir():
+            raise output_error(file, OSError(errno.EISDIR, os.strerror(errno.EISDIR)))

@@ -5,7 +5,6 @@ conversion (alpha, palette, 16 bits) changes the picture in ways that show only 
 """
 
 import io
-import math
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +24,8 @@ from diff4splat.io.pixels import from_bytes, to_bytes
 _EXIF_IFD = 0x8769
 _FOCAL_LENGTH_IN_35MM_FILM = 0xA405
 _ORIENTATION = 0x0112
+_SHORTEST_MM, _LONGEST_MM = 5.0, 3000.0
+"""Equivalent focal lengths outside are writing errors."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,12 +135,12 @@ def _read_exif(image: Image.Image) -> _Exif:
 
 
 def _usable_focal(value: object) -> float | None:
-    """A positive number of millimetres; 0 means unknown in EXIF."""
+    """Millimetres within what lenses are built for; 0 means unknown in EXIF."""
     try:
         number = float(value)
     except (TypeError, ValueError, ZeroDivisionError):
         return None
-    return number if math.isfinite(number) and number > 0 else None
+    return number if _SHORTEST_MM <= number <= _LONGEST_MM else None
 
 
 def _upright(image: Image.Image) -> Image.Image:

@@ -72,7 +72,7 @@ def is_deep(image: Image.Image) -> bool:
 
 def first_of_many(image: Image.Image) -> tuple[str, ...]:
     """A note when the file holds more than the picture that is used."""
-    count = getattr(image, "n_frames", 1)
+    count = _frame_count(image)
     return (f"the first of {count} pictures in the file was used",) if count > 1 else ()
 
 
@@ -89,7 +89,7 @@ def describe_unknown(file: Path) -> str:
 
 def _unusual(image: Image.Image) -> str | None:
     """What makes a picture more or less than 8-bit RGB."""
-    frames = getattr(image, "n_frames", 1)
+    frames = _frame_count(image)
     found = {
         # Phones store a second view or a depth map behind an ordinary JPEG and call the file MPO.
         f"an animation or a stack of {frames} pictures": frames > 1 and image.format != "MPO",
@@ -101,3 +101,11 @@ def _unusual(image: Image.Image) -> str | None:
         _ODD_MODES.get(image.mode, f"colours of kind {image.mode}"): image.mode != "RGB",
     }
     return next((what for what, holds in found.items() if holds), None)
+
+
+def _frame_count(image: Image.Image) -> int:
+    """Pictures in the file; a damaged directory of further ones counts as none."""
+    try:
+        return getattr(image, "n_frames", 1)
+    except (TypeError, ValueError, KeyError, OSError, SyntaxError):
+        return 1

@@ -26,6 +26,10 @@ CONVENTIONS = {
 }
 
 
+MAX_SIDE_PX = 16384
+"""Larger pictures are damage, not wishes."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneMetadata:
     """Everything about a scene that is not a tensor."""
@@ -59,6 +63,10 @@ def decode(strings: Mapping[str, str]) -> SceneMetadata:
     document = _parse(strings.get("scene", ""))
     provenance = take_value(document, "provenance", dict)
     height, width = take_numbers(take_value(document, "path", dict), "size_px", 2, whole=True)
+    if not (1 <= height <= MAX_SIDE_PX and 1 <= width <= MAX_SIDE_PX):
+        raise FileFormatError(
+            f"path.size_px: expected 1 to {MAX_SIDE_PX} pixels per side, got {height} and {width}"
+        )
     return SceneMetadata(
         motion=take_value(document, "motion", dict),
         size_px=(height, width),

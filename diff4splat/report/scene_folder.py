@@ -29,6 +29,7 @@ UNTRAINED = "untrained: random weights; this is the photograph itself, standing 
 SheetFacts = tuple[tuple[str, str], ...]
 """(name, value) pairs printed beside the photograph."""
 OUTPUT_FILES = ("scene.safetensors", "video.mp4", "depth.exr", "preview.png", "card.json")
+VIDEO_FPS = (0.5, 240.0)
 VIEW_SUFFIXES = (".mp4", ".png", ".exr")
 
 
@@ -127,6 +128,7 @@ def _write_video(frames: Frames, path: CameraPath, file: Path, phases: Phases) -
 
 
 def frames_per_second(path: CameraPath) -> float:
-    """The mean rate of a path; 24 for a single frame."""
+    """The mean rate of a path, as far as videos can hold it; 24 for a single frame."""
     duration_s = float(path.times_s[-1] - path.times_s[0])
-    return (len(path) - 1) / duration_s if duration_s > 0 else 24.0
+    low, high = VIDEO_FPS
+    return min(max((len(path) - 1) / duration_s, low), high) if duration_s > 0 else 24.0

@@ -299,3 +299,50 @@ def test_render_settings(
     capsys.readouterr()
     code = run(["render", str(tmp_path / "out" / "scene.safetensors"), *arguments])
     assert_refused(code, capsys, "expected", word)
+
+
+def test_an_input_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    write_png(torch.rand(40, 40, 3), tmp_path / "preview.png")
+    before = (tmp_path / "preview.png").read_bytes()
+    code = generate(tmp_path / "preview.png", tmp_path)
+    assert_refused(code, capsys, "another place than the input")
+    assert (tmp_path / "preview.png").read_bytes() == before
+    scene = tmp_path / "scene.png"
+    scene.write_bytes(b"a scene")
+    assert_refused(run(["render", str(scene), "--out", str(scene)]), capsys, "another place")
+    assert scene.read_bytes() == b"a scene"
+
+
+def test_a_folder_in_the_way_of_one_file_keeps_all_the_others(
+    photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    out = tmp_path / "out"
+    (out / "video.mp4").mkdir(parents=True)
+    (out / "card.json").write_text("older")
+    assert_refused(generate(photo, out), capsys, "video.mp4", "a folder stands")
+    assert (out / "card.json").read_text() == "older"
+    assert {file.name for file in out.iterdir()} == {"video.mp4", "card.json"}
+
+
+@pytest.mark.parametrize("option", ["--camera", "--model", "--out"])
+def test_names_longer_than_any_file(
+    option: str, photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    arguments = ["generate", str(photo), "--out", str(tmp_path / "out"), "--model", "test"]
+    assert_refused(run([*arguments, "--frames", "2", option, "x" * 300]), capsys, "expected")
+
+
+def test_names_that_are_not_text(
+    photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert_refused(generate(photo, tmp_path / "o\udcff"), capsys, "UTF-8")
+
+
+def test_nothing_left_to_show_and_a_preview_that_is_no_picture(
+    photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert_refused(generate(photo, tmp_path / "out", "--min-opacity", "1"), capsys, "leaves some")
+    preview = ["paths", "preview", "spiral", "--out", str(tmp_path / "p.xyz")]
+    assert_refused(run(preview), capsys, ".png")
+    assert_refused(run(["inspect", "--config", ""]), capsys, "expected")
+    assert list(tmp_path.iterdir()) == [photo]

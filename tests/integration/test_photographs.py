@@ -58,6 +58,8 @@ def textured(rgb: torch.Tensor) -> torch.Tensor:
 
 def measured_flow(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
     solver = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    # Down to single pixels: the coarse default stops at half resolution.
+    solver.setFinestScale(0)
     return torch.from_numpy(solver.calc(grey(first), grey(second), None))
 
 

@@ -139,7 +139,7 @@ def test_metadata_that_is_no_object(file: Path, text: str) -> None:
         (("path", "size_px"), [4], "'size_px': expected 2 whole numbers, got [4]"),
         (("path", "size_px"), [4.5, 4], "'size_px': expected 2 whole numbers"),
         (("path", "size_px"), [True, 4], "'size_px': expected 2 whole numbers"),
-        (("path", "size_px"), [0, 4], "Camera.size_px: expected (height, width) of at least 1"),
+        (("path", "size_px"), [0, 4], "path.size_px: expected 1 to 16384 pixels per side"),
         (("motion",), "still", "'motion': expected an object"),
         (("motion", "kind"), ..., "'kind': expected text, got nothing"),
         (("motion", "kind"), "jelly", "expected one of keyframes, static, got 'jelly'; update"),

@@ -51,13 +51,13 @@ def test_zero_is_the_base_scene_in_frame_row_column_order() -> None:
     gaussians = activate(zeros(), scene, CONFIG)
     for index in [(0, 0, 0), (1, 1, 2), (2, 0, 3)]:
         n, camera = cell(*index), scene.cameras[index[0]]
-        pixel, _ = project(camera, gaussians.means[n : n + 1])
+        pixel, depth = project(camera, gaussians.means[n : n + 1])
         torch.testing.assert_close(pixel[0], pixel.new_tensor([index[2] + 0.5, index[1] + 0.5]))
         length = (gaussians.means[n] - camera.position).norm()
         torch.testing.assert_close(length, scene.distance[index])
         torch.testing.assert_close(color_from_dc(gaussians.sh[n, 0]), scene.rgb[index])
         assert float(gaussians.opacities[n]) == float(scene.opacity[index])
-        want = 0.7 * float(scene.distance[index]) / math.sqrt(40.0 * 62.5)
+        want = 0.7 * float(depth) / math.sqrt(40.0 * 62.5)
         torch.testing.assert_close(gaussians.scales[n], torch.full((3,), want, dtype=torch.float64))
         turn = quaternion.to_matrix(gaussians.quats[n : n + 1])[0]
         torch.testing.assert_close(turn, camera.world_from_camera[:3, :3])
@@ -74,7 +74,8 @@ def test_every_channel_group_does_what_it_says() -> None:
     length = (gaussians.means[n] - camera.position).norm()
     assert float(length) == pytest.approx(far)
     factor = (limit * torch.tanh(scale / limit)).exp()
-    torch.testing.assert_close(gaussians.scales[n], 0.7 * far / math.sqrt(40.0 * 62.5) * factor)
+    depth = project(camera, gaussians.means[n : n + 1])[1]
+    torch.testing.assert_close(gaussians.scales[n], 0.7 * depth / math.sqrt(40.0 * 62.5) * factor)
     torch.testing.assert_close(
         color_from_dc(gaussians.sh[n, 0]), scene.rgb[index] + torch.tanh(rgb)
     )

@@ -32,7 +32,7 @@ def test_square_and_common_shapes() -> None:
 def test_a_thread_of_pixels_is_refused() -> None:
     with pytest.raises(InputError, match="crop it"):
         model_size((16, 16000), 256)
-    with pytest.raises(ConfigError, match="16 to 4096"):
+    with pytest.raises(ConfigError, match="16 to 1024"):
         model_size((100, 100), 8)
 
 
