@@ -82,13 +82,28 @@ def _assemble(tensors: Mapping[str, Tensor], metadata: SceneMetadata) -> Scene:
 def _read_gaussians(tensors: Mapping[str, Tensor]) -> Gaussians:
     opacities = take_floats(tensors, "opacities", (None,))
     count = len(opacities)
-    return Gaussians(
+    gaussians = Gaussians(
         means=take_floats(tensors, "means", (count, 3)),
         quats=take_floats(tensors, "quats", (count, 4)),
         scales=take_floats(tensors, "scales", (count, 3)),
         opacities=opacities,
         sh=take_floats(tensors, "sh", (count, None, 3)),
     )
+    _require_activated(gaussians)
+    return gaussians
+
+
+def _require_activated(gaussians: Gaussians) -> None:
+    """Logits and logarithms in a scene file would render as something else without a word."""
+    if bool(((gaussians.opacities < 0) | (gaussians.opacities > 1)).any()):
+        raise FileFormatError("opacities: expected probabilities in [0, 1], got values outside")
+    if bool((gaussians.scales < 0).any()):
+        raise FileFormatError(
+            "scales: expected standard deviations of at least 0, got negative ones"
+        )
+    kinds = {str(getattr(gaussians, field.name).dtype) for field in fields(gaussians)}
+    if len(kinds) != 1:
+        raise FileFormatError(f"Gaussians: expected one dtype, got {', '.join(sorted(kinds))}")
 
 
 def _read_path(tensors: Mapping[str, Tensor], size_px: tuple[int, int]) -> CameraPath:

@@ -2,6 +2,7 @@
 
 import json
 import random
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -235,3 +236,24 @@ def test_times_that_go_back_and_poses_that_are_none(file: Path) -> None:
         "path_world_from_camera": torch.zeros(2, 4, 4),
     }
     assert "path: expected rotations" in refusal(changed(file, tensors=flat))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "word"),
+    [
+        ("opacities", lambda tensor: tensor + 5, "probabilities"),
+        ("opacities", lambda tensor: tensor - 5, "probabilities"),
+        ("scales", lambda tensor: tensor - 5, "standard deviations"),
+        ("means", lambda tensor: tensor.double(), "one dtype"),
+    ],
+)
+def test_values_that_are_not_activated_and_mixed_dtypes(
+    tmp_path: Path, name: str, change: Callable, word: str
+) -> None:
+    save_scene(oracles_io.scene(), tmp_path / "s.safetensors")
+    tensors = dict(read_tensors(tmp_path / "s.safetensors"))
+    tensors[name] = change(tensors[name])
+    content = TensorFile(tensors=tensors, metadata=read_metadata(tmp_path / "s.safetensors"))
+    write_tensors(content, tmp_path / "t.safetensors")
+    with pytest.raises(FileFormatError, match=word):
+        load_scene(tmp_path / "t.safetensors")
