@@ -7,12 +7,20 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import fields, replace
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError, ShapeError
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.backends import choose
-from diff4splat.render.settings import RenderJob, RenderOutput, RenderSettings, require_outputs
+from diff4splat.render.settings import (
+    RenderJob,
+    RenderOutput,
+    RenderSettings,
+    require_outputs,
+    stack_outputs,
+)
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
@@ -27,42 +35,78 @@ def _nothing() -> None:
 def render(
     scene_or_gaussians: Scene | Gaussians,
     camera: Camera,
-    time_s: float = 0.0,
+    time_s: float | Float[Tensor, " b"] = 0.0,
     *,
     outputs: Collection[str] = ("rgb",),
     settings: RenderSettings = DEFAULTS,
     backend: str = "auto",
 ) -> RenderOutput:
-    """Pictures named in ``outputs``, one camera at one time; the others are not computed.
+    """Pictures named in ``outputs``; the others are not computed.
 
-    The camera takes the dtype and device of the Gaussians.
+    One camera gives one picture of each. A batch of cameras, at one time or one each, gives
+    pictures with a leading axis. Cameras take the dtype and device of the Gaussians.
 
     Raises:
-        ConfigError: an unknown output or back end, or a flow without a place or time to flow to.
-        ShapeError: a batch of cameras, half precision, or mixed dtypes or devices.
+        ConfigError: an unknown output or back end, a flow without a place or time to flow to, or
+            features without values.
+        ShapeError: cameras with more than one batch axis, another number of times or features,
+            half precision, or mixed dtypes or devices.
         InputError: a camera with NaN, infinity or a focal length of 0 or less.
     """
-    wanted = require_outputs(outputs)
-    if "flow" in wanted and settings.flow_camera is None and settings.flow_time_s is None:
-        raise ConfigError(
-            "outputs: flow expected settings.flow_time_s or settings.flow_camera, got neither"
-        )
+    wanted = _require_sources(require_outputs(outputs), settings)
+    if camera.batch_shape == () and not isinstance(time_s, Tensor):
+        job = _job(scene_or_gaussians, camera, time_s, wanted, settings)
+        return choose(backend, job).render(job)
+    cameras, times_s = _batch(camera, time_s)
+    if len(set(times_s)) == 1 and "flow" not in wanted:
+        # One state serves all cameras.
+        scene_or_gaussians = _state(scene_or_gaussians, times_s[0])
+    frames = [
+        render(scene_or_gaussians, one, at, outputs=wanted, settings=settings, backend=backend)
+        for one, at in zip(cameras, times_s, strict=True)
+    ]
+    return stack_outputs(frames)
+
+
+def _job(
+    subject: Scene | Gaussians,
+    camera: Camera,
+    time_s: float,
+    outputs: frozenset[str],
+    settings: RenderSettings,
+) -> RenderJob:
+    """One picture, with both ends of the flow."""
     later_s = time_s if settings.flow_time_s is None else settings.flow_time_s
-    gaussians = _uniform(_state(scene_or_gaussians, time_s))
+    gaussians = _uniform(_state(subject, time_s))
     later = gaussians
-    if "flow" in wanted and later_s != time_s:
-        later = _uniform(_state(scene_or_gaussians, later_s))
-    job = RenderJob(
+    if "flow" in outputs and later_s != time_s:
+        later = _uniform(_state(subject, later_s))
+    later_camera = camera if settings.flow_camera is None else settings.flow_camera
+    return RenderJob(
         gaussians=gaussians,
         camera=_usable(camera, gaussians),
-        outputs=wanted,
-        settings=settings,
+        outputs=outputs,
+        settings=_matching(settings, gaussians),
         flow_gaussians=later,
-        flow_camera=_usable(
-            camera if settings.flow_camera is None else settings.flow_camera, gaussians
-        ),
+        flow_camera=_usable(later_camera, gaussians),
     )
-    return choose(backend, job).render(job)
+
+
+def _batch(camera: Camera, time_s: float | Float[Tensor, " b"]) -> tuple[list[Camera], list[float]]:
+    """Cameras and times one by one; one of either serves all of the other."""
+    if len(camera.batch_shape) > 1:
+        raise ShapeError(
+            f"camera: expected at most one batch axis, got shape {camera.batch_shape}; flatten it"
+        )
+    times_s = time_s.tolist() if isinstance(time_s, Tensor) else [float(time_s)]
+    times_s = times_s if isinstance(times_s, list) else [times_s]
+    cameras = [camera] if camera.batch_shape == () else [camera[i] for i in range(len(camera))]
+    if not cameras or not times_s:
+        raise ShapeError("camera and time_s: expected at least one of each, got an empty batch")
+    count = len(times_s) if len(cameras) == 1 else len(cameras)
+    if len(times_s) not in (1, count):
+        raise ShapeError(f"time_s: expected 1 or {count} times for the cameras, got {len(times_s)}")
+    return cameras * (count // len(cameras)), times_s * (count // len(times_s))
 
 
 def render_video(
@@ -109,6 +153,29 @@ def render_video(
     return map(frame, range(len(path)))
 
 
+def _require_sources(outputs: frozenset[str], settings: RenderSettings) -> frozenset[str]:
+    """``outputs`` when the settings hold what they are made of."""
+    if "flow" in outputs and settings.flow_camera is None and settings.flow_time_s is None:
+        raise ConfigError(
+            "outputs: flow expected settings.flow_time_s or settings.flow_camera, got neither"
+        )
+    if "features" in outputs and settings.features is None:
+        raise ConfigError("outputs: features expected settings.features, got None")
+    return outputs
+
+
+def _matching(settings: RenderSettings, gaussians: Gaussians) -> RenderSettings:
+    """Settings whose features belong to ``gaussians``, in their dtype and on their device."""
+    features = settings.features
+    if features is None:
+        return settings
+    if features.ndim != 2 or len(features) != len(gaussians):
+        raise ShapeError(
+            f"settings.features: expected ({len(gaussians)}, channels), got {tuple(features.shape)}"
+        )
+    return replace(settings, features=features.to(gaussians.means))
+
+
 def _state(scene_or_gaussians: Scene | Gaussians, time_s: float) -> Gaussians:
     if isinstance(scene_or_gaussians, Scene):
         return scene_or_gaussians.state_at(time_s)
@@ -134,8 +201,7 @@ def _usable(camera: Camera, gaussians: Gaussians) -> Camera:
     """One finite camera in the arithmetic of ``gaussians``."""
     if camera.batch_shape != ():
         raise ShapeError(
-            f"camera: expected one camera, got a batch of shape {camera.batch_shape}; "
-            "index it, or use render_video"
+            f"settings.flow_camera: expected one camera, got a batch of shape {camera.batch_shape}"
         )
     numbers = [camera.world_from_camera.flatten(), camera.focal_px, camera.center_px]
     if not bool(torch.isfinite(torch.cat(numbers)).all() and (camera.focal_px > 0).all()):

@@ -10,6 +10,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.render.settings import RenderJob, RenderOutput
 
 BACKENDS = {
+    "raster": "diff4splat.render.raster.backend",
     "reference": "diff4splat.render.reference",
 }
 """Name to module, the preferred one first; ``reference`` stays last because it refuses nothing."""

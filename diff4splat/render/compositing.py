@@ -27,6 +27,7 @@ from diff4splat.render.settings import RenderSettings
 from diff4splat.render.support import pixel_boxes
 from diff4splat.render.tiling import Region, batches, grid_size, regions, tile_boxes
 
+DEFAULT_TILE_PX = 8
 _LIVE_BUFFERS = 16
 """Arrays of one value per tile, Gaussian and pixel that are alive at once, with their gradients."""
 _BYTES_PER_PAIR = 256
@@ -62,12 +63,17 @@ class _Plan:
     medians: bool
 
     @property
+    def tile_px(self) -> int:
+        """Edge of a tile."""
+        return self.settings.tile_px or DEFAULT_TILE_PX
+
+    @property
     def piece_pairs(self) -> int:
         """How many pairs (tile, Gaussian) are blended at once."""
         values = self.settings.memory_bytes // (_LIVE_BUFFERS * self.table.element_size())
         if self.table.device.type == "cpu":
             values = min(values, _CPU_VALUES)
-        return max(1, values // self.settings.tile_px**2)
+        return max(1, values // self.tile_px**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,10 +94,11 @@ def composite(
 ) -> Composite:
     """Blend ``channels`` of footprints in depth order; ``medians`` also finds the median depth."""
     columns = [prints.center_px, prints.whitening, prints.opacities[:, None], prints.depth[:, None]]
+    tile_px = settings.tile_px or DEFAULT_TILE_PX
     plan = _Plan(
         table=pad(torch.cat([*columns, channels], 1), (0, 0, 0, 1)),
-        boxes=tile_boxes(pixel_boxes(prints, size_px, settings.alpha_cutoff), settings.tile_px),
-        grid=grid_size(size_px, settings.tile_px),
+        boxes=tile_boxes(pixel_boxes(prints, size_px, settings.alpha_cutoff), tile_px),
+        grid=grid_size(size_px, tile_px),
         settings=settings,
         medians=medians,
     )
@@ -129,7 +136,7 @@ def _blend_tiles(
     plan: _Plan, numbers: Int[Tensor, " b"], rows: Float[Tensor, "b l f"]
 ) -> Float[Tensor, "b p c"]:
     """Channels, median depth and light of tiles with lists of one length."""
-    edge = plan.settings.tile_px
+    edge = plan.tile_px
     corner_px = torch.stack([numbers % plan.grid[1], numbers // plan.grid[1]], -1) * edge
     pixels = corner_px[:, None] + pixel_centers((edge, edge), rows).flatten(0, 1)
     sums, light = _nothing(plan, len(numbers)).mT.split([rows.shape[2] - _LEADING + 1, 1], 1)
@@ -174,13 +181,13 @@ def _alphas(
 def _nothing(plan: _Plan, count: int) -> Float[Tensor, "b p c"]:
     """``count`` tiles that no Gaussian touches: all light passes."""
     dark = plan.table.shape[1] - _LEADING + 1
-    empty = plan.table.new_zeros(count, plan.settings.tile_px**2, dark)
+    empty = plan.table.new_zeros(count, plan.tile_px**2, dark)
     return pad(empty, (0, 1), value=1.0)
 
 
 def _assemble(plan: _Plan, done: list[_Tiles]) -> Float[Tensor, "h w c"]:
     """Put tiles in their places and empty ones in between."""
-    (rows, columns), edge = plan.grid, plan.settings.tile_px
+    (rows, columns), edge = plan.grid, plan.tile_px
     values = torch.cat([_nothing(plan, 1), *(tiles.values for tiles in done)])
     numbers = torch.cat([tiles.numbers for tiles in done])
     rank = torch.arange(1, len(values), device=numbers.device)

@@ -21,7 +21,7 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
-_GUARD_BAND = 0.15
+GUARD_BAND = 0.15
 """How far beyond the picture J follows the mean, in picture sizes: to 1.3 tan(fov / 2)."""
 
 
@@ -88,7 +88,7 @@ def _covariance_root(
     axes = axes * gaussians.scales[:, None, :]
     depth = local[:, 2:]
     width_height = camera.center_px.new_tensor([camera.size_px[1], camera.size_px[0]])
-    lowest = (-_GUARD_BAND * width_height - camera.center_px) / camera.focal_px
-    highest = ((1 + _GUARD_BAND) * width_height - camera.center_px) / camera.focal_px
+    lowest = (-GUARD_BAND * width_height - camera.center_px) / camera.focal_px
+    highest = ((1 + GUARD_BAND) * width_height - camera.center_px) / camera.focal_px
     tangent = torch.clamp(local[:, :2] / depth, lowest, highest)
     return (axes[:, :2] - tangent[..., None] * axes[:, 2:]) * (camera.focal_px / depth)[..., None]

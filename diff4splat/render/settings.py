@@ -4,9 +4,11 @@ Axes: ``h w`` pixels. Depth is camera-space z in scene units, flow is in pixels 
 """
 
 import math
+from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -14,18 +16,19 @@ from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import Camera
 from diff4splat.scene.gaussians import Gaussians
 
-OUTPUTS = ("rgb", "depth", "median_depth", "alpha", "flow")
+OUTPUTS = ("rgb", "depth", "median_depth", "alpha", "flow", "features")
 """Every picture that a renderer can make."""
 
 _LEAST_MEMORY = 1 << 20
+LEAST_LIGHT = 1e-30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderSettings:
     """How a picture is made; defaults as in gsplat, which follows Kerbl et al. 2023."""
 
-    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """RGB behind the scene. For a learnt one render over black and add (1 - alpha) * background."""
+    background: tuple[float, float, float] | Float[Tensor, "3"] = (0.0, 0.0, 0.0)
+    """RGB behind the scene; a tensor gets a gradient."""
     dilation_px2: float = 0.3
     """Variance added to both axes of every footprint, in square pixels; 0 switches it off."""
     antialias: bool = False
@@ -34,25 +37,31 @@ class RenderSettings:
     """Contributions to a pixel below this are nothing; it also bounds the support."""
     alpha_max: float = 0.999
     """Largest opacity of one contribution; below 1 so that the light behind has a gradient."""
+    light_cutoff: float = 1e-5
+    """A pixel that sees less than this of what lies behind is done; the reference goes on."""
     near_depth: float = 0.01
     """Gaussians whose centre is nearer than this, in scene units, are not drawn."""
-    tile_px: int = 8
-    """Edge of the square tiles that share one list of Gaussians."""
+    tile_px: int | None = None
+    """Edge of the square tiles that share one list of Gaussians; None is the back end's best."""
     memory_bytes: int = 256 << 20
     """What the compositing may allocate beyond its inputs and outputs."""
     flow_camera: Camera | None = None
     """Where the camera is at the end of the flow; None is the same camera."""
     flow_time_s: float | None = None
     """When the flow ends; None is the same time."""
+    features: Float[Tensor, "n f"] | None = None
+    """What the output ``features`` blends: any numbers per Gaussian."""
 
     def __post_init__(self) -> None:
         accepted = {
-            "background": len(self.background) == 3 and all(map(math.isfinite, self.background)),
+            "background": _is_finite_rgb(self.background),
             "dilation_px2": 0 <= self.dilation_px2 < math.inf,
             "alpha_cutoff": 0 < self.alpha_cutoff < 1,
             "alpha_max": self.alpha_cutoff < self.alpha_max < 1,
             "near_depth": 0 < self.near_depth < math.inf,
-            "tile_px": self.tile_px >= 1,
+            # Smaller ones would let the light underflow before a pixel is done.
+            "light_cutoff": LEAST_LIGHT <= self.light_cutoff < 1,
+            "tile_px": self.tile_px is None or self.tile_px >= 1,
             "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
         }
         for name, fine in accepted.items():
@@ -62,11 +71,18 @@ class RenderSettings:
                 )
 
 
+def _is_finite_rgb(background: tuple[float, ...] | Tensor) -> bool:
+    if isinstance(background, Tensor):
+        return background.shape == (3,) and bool(torch.isfinite(background.detach()).all())
+    return len(background) == 3 and all(map(math.isfinite, background))
+
+
 _EXPECTED = {
     "background": "three finite numbers",
     "dilation_px2": "a finite number of at least 0",
     "alpha_cutoff": "a number above 0 and below 1",
     "alpha_max": "a number above alpha_cutoff and below 1",
+    "light_cutoff": f"at least {LEAST_LIGHT} and below 1",
     "near_depth": "a finite number above 0",
     "tile_px": "at least 1",
     "memory_bytes": f"at least {_LEAST_MEMORY}",
@@ -75,18 +91,22 @@ _EXPECTED = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderOutput:
-    """The pictures asked for; None for the others."""
+    """The pictures asked for, None for the others; ``b`` is there for batches of cameras."""
 
-    rgb: Float[Tensor, "h w 3"] | None = None
-    depth: Float[Tensor, "h w"] | None = None
+    rgb: Float[Tensor, "*b h w 3"] | None = None
+    depth: Float[Tensor, "*b h w"] | None = None
     """Expected z, Σ w z / Σ w; 0 where nothing is seen."""
-    median_depth: Float[Tensor, "h w"] | None = None
+    median_depth: Float[Tensor, "*b h w"] | None = None
     """z of the Gaussian behind which at most half of the light is left; 0 where more is left."""
-    alpha: Float[Tensor, "h w"] | None = None
-    flow: Float[Tensor, "h w 2"] | None = None
+    alpha: Float[Tensor, "*b h w"] | None = None
+    flow: Float[Tensor, "*b h w 2"] | None = None
     """Where the surface goes, in pixels; 0 where nothing is seen."""
+    features: Float[Tensor, "*b h w f"] | None = None
+    """Σ w v; nothing lies behind."""
     dropped_nonfinite: int = 0
     """Gaussians left out because a parameter is NaN, infinite, or too large to be squared."""
+    dropped_by_parameter: dict[str, int] = field(default_factory=dict)
+    """The same, by the first such parameter."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,3 +135,21 @@ def require_outputs(outputs: Collection[str]) -> frozenset[str]:
     if unknown:
         raise ConfigError(f"outputs: expected names among {known}, got {', '.join(unknown)}")
     return frozenset(outputs)
+
+
+def stack_outputs(frames: list[RenderOutput]) -> RenderOutput:
+    """Several pictures as one batch.
+
+    A Gaussian that is left out of several counts in each of them.
+    """
+    pictures = {
+        name: torch.stack([getattr(frame, name) for frame in frames])
+        for name in OUTPUTS
+        if getattr(frames[0], name) is not None
+    }
+    dropped: Counter[str] = Counter()
+    for frame in frames:
+        dropped.update(frame.dropped_by_parameter)
+    return RenderOutput(
+        **pictures, dropped_nonfinite=dropped.total(), dropped_by_parameter=dict(dropped)
+    )

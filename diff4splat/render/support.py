@@ -23,12 +23,12 @@ _THINNEST_PX = 1e-6
 @torch.no_grad()
 def visible_order(
     gaussians: Gaussians, camera: Camera, settings: RenderSettings
-) -> tuple[Int[Tensor, " m"], int]:
-    """Indices of the Gaussians that touch the picture, nearest first, and how many are not finite.
+) -> tuple[Int[Tensor, " m"], dict[str, int]]:
+    """Indices of the Gaussians that touch the picture, nearest first, and what was not finite.
 
     Equal depths keep the order of their indices.
     """
-    usable = _usable(gaussians)
+    usable, dropped = usable_gaussians(gaussians)
     depth = camera_space(camera, gaussians.means)[:, 2]
     candidate = (
         usable & (depth > settings.near_depth) & (gaussians.opacities >= settings.alpha_cutoff)
@@ -38,7 +38,7 @@ def visible_order(
     box = pixel_boxes(prints, camera.size_px, settings.alpha_cutoff)
     seen = (box[:, 2:] > box[:, :2]).all(-1) & (_thin_axis_px(prints) >= _THINNEST_PX)
     index, depth = index[seen], prints.depth[seen]
-    return index[depth.argsort(stable=True)], len(gaussians) - int(usable.sum())
+    return index[depth.argsort(stable=True)], dropped
 
 
 @torch.no_grad()
@@ -59,11 +59,22 @@ def pixel_boxes(
     return torch.where(reachable[:, None], torch.cat([start, stop], -1), 0).nan_to_num().long()
 
 
-def _usable(gaussians: Gaussians) -> Bool[Tensor, " n"]:
-    """Every parameter is finite, and can be squared without overflow."""
+@torch.no_grad()
+def usable_gaussians(gaussians: Gaussians) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
+    """Those whose parameters are finite and can be squared, and what was wrong with the others.
+
+    The counts go by the first such parameter, so that they add up to the Gaussians left out.
+    """
     largest = torch.finfo(gaussians.means.dtype).max ** 0.5
-    rows = [getattr(gaussians, field.name)[:, None].flatten(1) for field in fields(gaussians)]
-    return (torch.cat(rows, 1).abs() < largest).all(1)
+    usable = torch.ones(len(gaussians), dtype=torch.bool, device=gaussians.means.device)
+    dropped = {}
+    for field in fields(gaussians):
+        values = getattr(gaussians, field.name)[:, None].flatten(1)
+        fine = usable & (values.abs() < largest).all(1)
+        if count := int(usable.sum() - fine.sum()):
+            dropped[field.name] = count
+        usable = fine
+    return usable, dropped
 
 
 def _thin_axis_px(prints: Footprints) -> Float[Tensor, " n"]:

@@ -12,6 +12,7 @@ from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render import backends
 from diff4splat.render.api import render, render_video
 from diff4splat.render.settings import OUTPUTS, RenderOutput, RenderSettings
+from diff4splat.scene import harmonics
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.static import StaticMotion
@@ -52,7 +53,8 @@ def test_only_what_is_asked_for_is_made() -> None:
 
 @pytest.mark.parametrize("name", OUTPUTS)
 def test_a_picture_is_the_same_alone_and_in_company(name: str) -> None:
-    settings = RenderSettings(flow_camera=small_camera((6, 7)))
+    features = torch.rand(COUNT, 2, dtype=torch.float64)
+    settings = RenderSettings(flow_camera=small_camera((6, 7)), features=features)
     gaussians = random_gaussians(COUNT)
     alone = render(gaussians, CAMERA, outputs=(name,), settings=settings)
     together = render(gaussians, CAMERA, outputs=OUTPUTS, settings=settings)
@@ -91,10 +93,76 @@ def test_mixed_precision_is_refused() -> None:
         render(mixed, CAMERA)
 
 
-def test_batches_of_cameras_are_refused() -> None:
+def test_a_batch_of_cameras_and_times_is_a_stack_of_pictures() -> None:
+    scene = scene_with(drifting((0.4, 0.0, 0.0)))
+    times_s = torch.tensor([0.0, 0.25, 1.0])
+    made = render(scene, scene.path.cameras, times_s, outputs=("rgb", "depth"))
+    for index, time_s in enumerate(times_s.tolist()):
+        one = render(scene, scene.path.cameras[index], time_s, outputs=("rgb", "depth"))
+        assert torch.equal(made.rgb[index], one.rgb)
+        assert torch.equal(made.depth[index], one.depth)
+    assert made.alpha is None
+
+
+def test_one_camera_serves_all_times_and_one_time_all_cameras() -> None:
+    scene = scene_with(drifting((0.4, 0.0, 0.0)))
+    assert render(scene, CAMERA, torch.tensor([0.0, 0.5])).rgb.shape == (2, 6, 7, 3)
+    assert render(scene, scene.path.cameras, 0.5).rgb.shape == (3, 6, 7, 3)
+
+
+def test_what_is_left_out_counts_in_every_picture() -> None:
+    gaussians = random_gaussians(COUNT, dtype=torch.float32)
+    gaussians.scales[2] = float("nan")
+    made = render(gaussians, CAMERA.with_pose(torch.eye(4).expand(2, 4, 4)))
+    assert made.dropped_by_parameter == {"scales": 2}
+    assert made.dropped_nonfinite == 2
+
+
+def test_other_numbers_of_times_and_axes_are_refused() -> None:
     batch = CAMERA.with_pose(torch.eye(4).expand(2, 4, 4))
-    with pytest.raises(ShapeError, match=r"expected one camera, got a batch of shape \(2,\)"):
-        render(random_gaussians(COUNT), batch)
+    with pytest.raises(ShapeError, match="expected 1 or 2 times for the cameras, got 3"):
+        render(random_gaussians(COUNT), batch, torch.zeros(3))
+    grid = CAMERA.with_pose(torch.eye(4).expand(2, 2, 4, 4))
+    with pytest.raises(ShapeError, match=r"at most one batch axis, got shape \(2, 2\)"):
+        render(random_gaussians(COUNT), grid)
+    with pytest.raises(ShapeError, match="expected one camera, got a batch"):
+        settings = RenderSettings(flow_camera=batch)
+        render(random_gaussians(COUNT), CAMERA, outputs=("flow",), settings=settings)
+    with pytest.raises(ShapeError, match="at least one of each, got an empty batch"):
+        render(random_gaussians(COUNT), CAMERA.with_pose(torch.eye(4).expand(0, 4, 4)))
+
+
+def test_features_are_blended_like_colours() -> None:
+    gaussians = random_gaussians(COUNT, bands=1)
+    settings = RenderSettings(features=harmonics.color_from_dc(gaussians.sh[:, 0]).clamp_min(0))
+    made = render(gaussians, CAMERA, outputs=("rgb", "features"), settings=settings)
+    torch.testing.assert_close(made.features, made.rgb)
+
+
+def test_features_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"features expected .*features, got None"):
+        render(random_gaussians(COUNT), CAMERA, outputs=("features",))
+    settings = RenderSettings(features=torch.zeros(3, 2))
+    with pytest.raises(ShapeError, match=r"expected \(10, channels\), got \(3, 2\)"):
+        render(random_gaussians(COUNT), CAMERA, outputs=("features",), settings=settings)
+
+
+@pytest.mark.parametrize("backend", ["raster", "reference"])
+def test_a_background_can_be_learnt(backend: str) -> None:
+    background = torch.tensor([0.1, 0.2, 0.3], requires_grad=True)
+    settings = RenderSettings(background=background)
+    gaussians = random_gaussians(COUNT, dtype=torch.float32)
+    made = render(gaussians, CAMERA, outputs=("rgb", "alpha"), settings=settings, backend=backend)
+    made.rgb.sum().backward()
+    expected = (1 - made.alpha).sum().expand(3)
+    torch.testing.assert_close(background.grad, expected)
+    fixed = render(gaussians, CAMERA, settings=RenderSettings(background=(0.1, 0.2, 0.3)))
+    torch.testing.assert_close(made.rgb, fixed.rgb)
+
+
+def test_a_background_that_is_no_colour_is_refused() -> None:
+    with pytest.raises(ConfigError, match="background: expected three finite numbers"):
+        RenderSettings(background=torch.tensor([0.0, float("nan"), 0.0]))
 
 
 @pytest.mark.parametrize("focal", [0.0, -1.0, float("nan")])
@@ -147,7 +215,7 @@ def test_a_video_refuses_before_the_first_frame() -> None:
 
 
 def test_unknown_back_ends_are_answered_with_the_known() -> None:
-    with pytest.raises(ConfigError, match="backend: expected auto, reference, got 'magic'"):
+    with pytest.raises(ConfigError, match=r"backend: expected auto, .*reference, got 'magic'"):
         render(random_gaussians(COUNT), CAMERA, backend="magic")
 
 

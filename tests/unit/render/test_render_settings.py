@@ -33,5 +33,7 @@ def test_outputs_come_back_as_a_set() -> None:
 
 @pytest.mark.parametrize("outputs", [(), ("rgb", "normals"), "rgb"])
 def test_unknown_outputs_are_answered_with_the_known(outputs: object) -> None:
-    with pytest.raises(ConfigError, match="among rgb, depth, median_depth, alpha, flow, got"):
+    with pytest.raises(
+        ConfigError, match="among rgb, depth, median_depth, alpha, flow, features, got"
+    ):
         require_outputs(outputs)

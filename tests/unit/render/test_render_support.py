@@ -64,7 +64,7 @@ def test_the_order_is_by_depth_then_by_index() -> None:
         replace(gaussians, means=means), pinhole(10.0, SIZE, torch.float64), RenderSettings()
     )
     assert order.tolist() == [1, 3, 2, 4, 0]
-    assert dropped == 0
+    assert dropped == {}
 
 
 def test_what_is_not_seen_is_not_kept() -> None:

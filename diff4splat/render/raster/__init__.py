@@ -1,0 +1,1 @@
+"""The CPU renderer: Numba kernels with explicit lanes, compiled on first use."""

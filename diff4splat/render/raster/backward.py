@@ -1,0 +1,98 @@
+"""The way back: blend → sums per Gaussian → colours → Gaussians and camera.
+
+Sums over the picture run in the order of the tiles, sums over Gaussians part by part in float64, so
+gradients have the same bits whatever the number of threads.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diff4splat.render.raster.blend_backward import blend_backward, sum_slots
+from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.render.raster.forward import (
+    GAUSSIANS_PER_PART,
+    Binned,
+    Filled,
+    Footprints,
+    fill,
+    numbered,
+    tiles_of,
+)
+from diff4splat.render.raster.harmonics import colors_backward
+from diff4splat.render.raster.plan import Plan
+from diff4splat.render.raster.project_backward import CAMERA_COLUMNS, POSITION, project_backward
+from diff4splat.render.raster.tables import SHAPE_COLUMNS, Cloud, Doubles, Floats, View
+from diff4splat.render.raster.threads import ranges, spread
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """What the way back needs of the way forward."""
+
+    plan: Plan
+    view: View
+    found: Footprints
+    values: Floats
+    canvas: Canvas
+    binned: Binned
+    filled: Filled | None
+    """The lists, unless there were several regions; then they are made again."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gradients:
+    """Of everything that went in."""
+
+    cloud: Cloud
+    sh: Floats
+    values: Floats
+    camera: Doubles
+    """Rotation row by row (9), position (3), focal lengths (2), centre (2)."""
+
+
+def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradients:
+    """From gradients of the padded planes and the light."""
+    shape_grads = np.zeros((len(sh), SHAPE_COLUMNS), np.float32)
+    value_grads = np.zeros(drawn.values.shape, np.float32)
+    for region in drawn.binned.regions:
+        filled = drawn.filled or fill(drawn.found, drawn.plan.grid, drawn.binned, region)
+        _blend_backward(drawn, filled, incoming, shape_grads, value_grads)
+    grads = Cloud(*(np.zeros(array.shape, np.float32) for array in cloud))
+    sh_grads = np.zeros(sh.shape, np.float32)
+    parts, order = ranges(len(drawn.found.order), GAUSSIANS_PER_PART), drawn.found.order
+    camera = np.zeros((len(parts), CAMERA_COLUMNS))
+
+    def work(part: int, first: int, last: int) -> None:
+        project_backward(
+            first, last, order, cloud, drawn.view, drawn.plan.rules, shape_grads, grads,
+            camera[part],
+        )  # fmt: skip
+        if drawn.plan.colors:
+            colors_backward(
+                first, last, order, cloud.means, sh, drawn.view.position, value_grads, sh_grads,
+                grads.means, camera[part, POSITION:],
+            )  # fmt: skip
+
+    spread(work, numbered(parts))
+    return Gradients(cloud=grads, sh=sh_grads, values=value_grads, camera=camera.sum(0))
+
+
+def _blend_backward(
+    drawn: Drawn, filled: Filled, incoming: Floats, shape_grads: Floats, value_grads: Floats
+) -> None:
+    """Add the gradients of the tiles of a region."""
+    order, canvas = drawn.found.order, drawn.canvas
+    slots = empty(len(filled.lists.members), SHAPE_COLUMNS + drawn.values.shape[1])
+
+    def blend_tiles(tiles: np.ndarray) -> None:
+        blend_backward(
+            tiles, drawn.plan.grid, filled.lists, drawn.found.prints, drawn.values,
+            drawn.plan.rules, canvas.light, canvas.stops, incoming, slots,
+        )  # fmt: skip
+
+    def add(first: int, last: int) -> None:
+        sum_slots(first, last, order, filled.first_slots, slots, shape_grads, value_grads)
+
+    spread(blend_tiles, tiles_of(filled.region, drawn.plan.grid))
+    spread(add, ranges(len(order), GAUSSIANS_PER_PART))

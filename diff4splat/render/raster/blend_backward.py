@@ -1,0 +1,202 @@
+"""Kernels: gradients of blending, back to front, and their sums per Gaussian.
+
+With g the gradient of a pixel, B = Σ over what lies behind of w (channel · g), plus the light left
+times its gradient:
+
+    ∂/∂α = T (channel · g) - B / (1 - α),   ∂/∂channel = w g
+
+T is recovered by dividing by (1 - α), never below 1 - α_max. Every pair (tile, Gaussian) has its
+own slot, and slots of one Gaussian are neighbours, so the sums are taken in one order whatever the
+threads do. The exponent is e = log2 o - u² - v², and lanes collect ∂/∂ln α times 1, v and v² down a
+column of blocks before they are weighted with dx, which is the same for all of them.
+"""
+
+import numpy as np
+
+from diff4splat.render.raster.blend import (
+    FIXED,
+    LANES,
+    ROW_SHIFT,
+    block_corner,
+    blocks_in_tile,
+    corner,
+    start_column,
+)
+from diff4splat.render.raster.footprint import LN2
+from diff4splat.render.raster.jit import device, kernel
+from diff4splat.render.raster.lanes import (
+    any_of,
+    exp2,
+    fill,
+    fma,
+    less_product,
+    minimum,
+    select,
+    total,
+)
+from diff4splat.render.raster.memory import (
+    aligned_floats,
+    block_columns,
+    load,
+    load_block,
+    prefetch,
+    store,
+)
+from diff4splat.render.raster.tables import (
+    CENTER_X,
+    CENTER_Y,
+    LOG2_OPACITY,
+    SHAPE_COLUMNS,
+    SHEAR,
+    WHITEN_X,
+    WHITEN_Y,
+)
+
+_AHEAD = 8
+_LIGHT, _STOP, _BEHIND, _GRADIENT = range(4)
+"""Planes of a tile's state; one gradient plane per channel from the last on."""
+
+
+@kernel
+def blend_backward(tiles, grid, lists, prints, values, rules, light, stops, grads, slots):
+    """Fill the slot (6 of the shape, then channels) of every pair of ``tiles``.
+
+    ``grads`` holds the gradients of the planes, then that of the light ((c + 1) · pixels).
+    """
+    size, channels = grid.edge * grid.edge, values.shape[1]
+    state = aligned_floats((_GRADIENT + channels) * size)
+    sums = aligned_floats(channels * LANES)
+    for tile in tiles:
+        first, last = lists.starts[tile], lists.starts[tile + 1]
+        if first == last:
+            continue
+        seen = _begin(state, tile, grid, light, stops, grads)
+        for position in range(last - 1, first - 1, -1):
+            ahead = lists.members[max(position - _AHEAD, first)]
+            prefetch(prints, ahead)
+            prefetch(values, ahead)
+            index, slot, rank = lists.members[position], lists.slots[position], position - first
+            if rank < seen:
+                _subtract(state, sums, tile, grid, prints, values, index, rules, rank, slots, slot)
+            else:
+                for column in range(slots.shape[1]):
+                    slots[slot, column] = 0
+
+
+@device
+def _begin(state, tile, grid, light, stops, grads):
+    """Load the end state of a tile; returns how many entries of its list any pixel looked at."""
+    size, pitch = grid.edge * grid.edge, grid.columns << grid.shift
+    left, top = corner(tile, grid)
+    channels = len(grads) // len(light) - 1
+    for block in range(size // LANES):
+        x, y = block_corner(block, grid)
+        at, place = (top + y) * pitch + left + x, block * LANES
+        remaining = load_block(light, at, pitch)
+        store(state, _LIGHT * size + place, remaining)
+        store(state, _STOP * size + place, load_block(stops, at, pitch))
+        store(
+            state,
+            _BEHIND * size + place,
+            remaining * load_block(grads, channels * len(light) + at, pitch),
+        )
+        for channel in range(channels):
+            gradient = load_block(grads, channel * len(light) + at, pitch)
+            store(state, (_GRADIENT + channel) * size + place, gradient)
+    seen = 0.0
+    for pixel in range(size):
+        # The padding has no light, and must not keep a tile going.
+        if state[_LIGHT * size + pixel] > 0:
+            seen = max(seen, np.float64(state[_STOP * size + pixel]))
+    return seen
+
+
+@device
+def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, slot):
+    """Take one Gaussian out of the blocks its box touches, and write its gradient."""
+    left, top = corner(tile, grid)
+    x0, y0, x1, y1 = blocks_in_tile(prints, i, left, top, grid)
+    red, green, blue = fill(values[i, 0]), fill(values[i, 1]), fill(values[i, 2])
+    size = grid.edge * grid.edge
+    step = fill(2 * prints[i, WHITEN_Y])
+    none = fill(0.0)
+    e, ex, exx, ev, evx, evv = none, none, none, none, none, none
+    to_red, to_green, to_blue = none, none, none
+    for channel in range(FIXED, values.shape[1]):
+        store(sums, channel * LANES, none)
+    for column in range(x0, x1 + 1):
+        exponent_at_v0, v, dx = start_column(prints, i, left, top, column, y0)
+        moment0, moment1, moment2 = none, none, none
+        for block_row in range(y0, y1 + 1):
+            place = (column * (grid.edge >> ROW_SHIFT) + block_row) * LANES
+            looked = load(state, _STOP * size + place) > np.float32(rank)
+            if any_of(looked):
+                exponent = less_product(exponent_at_v0, v, v)
+                on = (exponent >= rules.log2_cutoff) & looked
+                response = exp2(exponent)
+                free = on & (response <= rules.alpha_max)
+                alpha = select(on, minimum(response, rules.alpha_max), 0.0)
+                inverse = fill(1.0) / (fill(1.0) - alpha)
+                light = load(state, _LIGHT * size + place) * inverse
+                behind = load(state, _BEHIND * size + place)
+                weight = alpha * light
+                at = _GRADIENT * size + place
+                g_red, g_green = load(state, at), load(state, at + size)
+                g_blue = load(state, at + 2 * size)
+                worth = fma(red, g_red, fma(green, g_green, blue * g_blue))
+                for channel in range(FIXED, values.shape[1]):
+                    gradient = load(state, (_GRADIENT + channel) * size + place)
+                    worth = fma(gradient, values[i, channel], worth)
+                    at = channel * LANES
+                    store(sums, at, fma(weight, gradient, load(sums, at)))
+                to_red = fma(weight, g_red, to_red)
+                to_green = fma(weight, g_green, to_green)
+                to_blue = fma(weight, g_blue, to_blue)
+                to_alpha = less_product(light * worth, behind, inverse)
+                store(state, _LIGHT * size + place, light)
+                store(state, _BEHIND * size + place, fma(weight, worth, behind))
+                to_log = select(free, to_alpha * alpha, 0.0)
+                moment0 = moment0 + to_log
+                moment1 = fma(to_log, v, moment1)
+                moment2 = fma(to_log * v, v, moment2)
+            v = v + step
+        x = block_columns() + fill(dx)
+        e, ev, evv = e + moment0, ev + moment1, evv + moment2
+        ex, exx, evx = (
+            fma(moment0, x, ex),
+            fma(moment0 * x, x, exx),
+            fma(moment1, x, evx),
+        )
+    _write_shape(slots, slot, prints, i, (e, ex, exx, ev, evx, evv))
+    store(sums, 0, to_red)
+    store(sums, LANES, to_green)
+    store(sums, 2 * LANES, to_blue)
+    for channel in range(values.shape[1]):
+        slots[slot, SHAPE_COLUMNS + channel] = total(load(sums, channel * LANES))
+
+
+@device
+def _write_shape(slots, slot, prints, i, sums):
+    """From lanes of ∂/∂ln α times (1, dx, dx², v, v dx, v²) to the six of the shape."""
+    a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
+    e, ex, exx = total(sums[0]), total(sums[1]), total(sums[2])
+    ev, evx, evv = total(sums[3]), total(sums[4]), total(sums[5])
+    slots[slot, CENTER_X] = 2 * LN2 * (a * a * ex - k * ev)
+    slots[slot, CENTER_Y] = 2 * LN2 * b * ev
+    slots[slot, WHITEN_X] = -2 * LN2 * a * exx
+    slots[slot, SHEAR] = 2 * LN2 * evx
+    slots[slot, WHITEN_Y] = -2 * LN2 * (evv + k * evx) / b
+    slots[slot, LOG2_OPACITY] = LN2 * e
+
+
+@kernel
+def sum_slots(first, last, order, first_slots, slots, shape_grads, value_grads):
+    """Add the slots of every Gaussian of ranks ``first`` to ``last``, in the order of its tiles."""
+    channels = value_grads.shape[1]
+    for rank in range(first, last):
+        index = order[rank]
+        for slot in range(first_slots[rank], first_slots[rank + 1]):
+            for column in range(SHAPE_COLUMNS):
+                shape_grads[index, column] += slots[slot, column]
+            for channel in range(channels):
+                value_grads[index, channel] += slots[slot, SHAPE_COLUMNS + channel]

@@ -1,0 +1,184 @@
+"""The way forward: project → sort by depth → colours → lists of tiles → blend.
+
+Every stage is spread over threads in parts whose results do not depend on which thread does them.
+A picture with more pairs (tile, Gaussian) than may be kept is cut into regions of tiles that are
+done one after another.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from diff4splat.render.raster.blend import FIXED, blend
+from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.render.raster.harmonics import colors
+from diff4splat.render.raster.order import nearest_first
+from diff4splat.render.raster.plan import Plan
+from diff4splat.render.raster.project import SH, project
+from diff4splat.render.raster.tables import Cloud, Doubles, Floats, Grid, Integers, Lists, View
+from diff4splat.render.raster.threads import ranges, spread
+from diff4splat.render.raster.tiles import count_pairs, fill_lists, place_lists
+
+GAUSSIANS_PER_PART = 4096
+_TILES_PER_PART = 4
+_PIECES = 8
+"""Pieces of the depth order at most; each needs its own count per tile."""
+
+Region = tuple[int, int, int, int]
+"""Rows of tiles from the first to before the second, then columns."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Footprints:
+    """What projection leaves; rows are valid for the Gaussians in ``order`` only."""
+
+    prints: Doubles
+    depth: Floats
+    order: Integers
+    """Visible ones, nearest first."""
+    unusable: NDArray[np.int64]
+    """Gaussians left out, by the first parameter that is not finite."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binned:
+    """How many pairs every tile has, and the regions to do one after another."""
+
+    counts: Integers
+    """pieces × tiles."""
+    regions: list[Region]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filled:
+    """The lists of the tiles in a region."""
+
+    region: Region
+    lists: Lists
+    first_slots: NDArray[np.int64]
+    """First slot of every rank, and one more: how many slots there are."""
+
+
+def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
+    """Project all Gaussians and sort the visible ones."""
+    count = len(cloud.means)
+    prints, depth = empty(count, 8, dtype=torch.float64), empty(count)
+    visible, parts = empty(count, dtype=torch.int32), ranges(count, GAUSSIANS_PER_PART)
+    found, unusable = [0] * len(parts), np.zeros((len(parts), SH + 1), np.int64)
+    numbers = sh.reshape(count, sh.shape[1] * 3)
+
+    def work(part: int, first: int, last: int) -> None:
+        found[part] = project(
+            first, last, cloud, numbers, view, plan.rules, prints, depth, visible, unusable[part]
+        )
+
+    spread(work, numbered(parts))
+    kept = [visible[first : first + size] for (first, _), size in zip(parts, found, strict=True)]
+    order = nearest_first(np.concatenate([visible[:0], *kept]), depth)
+    return Footprints(prints=prints, depth=depth, order=order, unusable=unusable.sum(0))
+
+
+def channel_table(
+    plan: Plan, cloud: Cloud, sh: Floats, extras: Floats, view: View, order: Integers
+) -> Floats:
+    """Per Gaussian: RGB if it is asked for, the extra channels, zeros up to the fixed number."""
+    start = 3 if plan.colors else 0
+    stop = start + extras.shape[1]
+    values = empty(len(sh), max(stop, FIXED))
+    values[:, start:stop] = extras
+    values[:, stop:] = 0
+    if plan.colors:
+
+        def work(first: int, last: int) -> None:
+            colors(first, last, order, cloud.means, sh, view.position, values)
+
+        spread(work, ranges(len(order), GAUSSIANS_PER_PART))
+    return values
+
+
+def bin_footprints(found: Footprints, plan: Plan) -> Binned:
+    """Count pairs, and cut the picture into regions of few enough of them or one tile."""
+    grid, pieces = plan.grid, _pieces(found.order)
+    counts = np.zeros((len(pieces), grid.rows * grid.columns), np.int32)
+
+    def work(piece: int, first: int, last: int) -> None:
+        count_pairs(first, last, found.order, found.prints, grid, counts[piece])
+
+    spread(work, numbered(pieces))
+    per_tile = counts.sum(0, dtype=np.int64).reshape(grid.rows, grid.columns)
+    regions = _split((0, grid.rows, 0, grid.columns), per_tile, plan.pair_limit)
+    return Binned(counts=counts, regions=list(regions))
+
+
+def fill(found: Footprints, grid: Grid, binned: Binned, region: Region) -> Filled:
+    """The lists of the tiles in ``region``."""
+    top, bottom, left, right = region
+    cursors = np.zeros((len(binned.counts), grid.rows, grid.columns), np.int64)
+    counts = binned.counts.reshape(cursors.shape)
+    cursors[:, top:bottom, left:right] = counts[:, top:bottom, left:right]
+    cursors = cursors.reshape(len(cursors), grid.rows * grid.columns)
+    first_slot = np.concatenate([[0], cursors.sum(1).cumsum()])
+    starts = np.empty(grid.rows * grid.columns + 1, np.int64)
+    place_lists(cursors, starts)
+    pairs = int(starts[-1])
+    lists = Lists(starts, empty(pairs, dtype=torch.int32), empty(pairs, dtype=torch.int32))
+    first_slots = np.empty(len(found.order) + 1, np.int64)
+    first_slots[-1] = pairs
+
+    def work(piece: int, first: int, last: int) -> None:
+        fill_lists(
+            first, last, found.order, found.prints, grid, np.array(region), cursors[piece],
+            first_slot[piece], first_slots, lists,
+        )  # fmt: skip
+
+    spread(work, numbered(_pieces(found.order)))
+    return Filled(region=region, lists=lists, first_slots=first_slots)
+
+
+def blend_region(
+    plan: Plan, filled: Filled, found: Footprints, values: Floats, canvas: Canvas
+) -> None:
+    """Blend the tiles of a region into ``canvas``."""
+
+    def work(tiles: NDArray[np.int64]) -> None:
+        blend(
+            tiles, plan.grid, filled.lists, found.prints, values, plan.rules, canvas.planes,
+            canvas.light, canvas.stops, canvas.medians,
+        )  # fmt: skip
+
+    spread(work, tiles_of(filled.region, plan.grid))
+
+
+def tiles_of(region: Region, grid: Grid) -> list[tuple[NDArray[np.int64]]]:
+    """Numbers of the tiles of a region, in parts."""
+    rows, columns = np.mgrid[region[0] : region[1], region[2] : region[3]]
+    tiles = (rows * grid.columns + columns).reshape(-1)
+    return [(tiles[first:last],) for first, last in ranges(len(tiles), _TILES_PER_PART)]
+
+
+def numbered(parts: list[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
+    """(number, first, last) of every part."""
+    return ((number, *part) for number, part in enumerate(parts))
+
+
+def _pieces(order: Integers) -> list[tuple[int, int]]:
+    return ranges(len(order), max(GAUSSIANS_PER_PART, -(-len(order) // _PIECES)))
+
+
+def _split(region: Region, per_tile: NDArray[np.int64], limit: int) -> Iterator[Region]:
+    """Halve the longer side of ``region`` until it is small enough."""
+    top, bottom, left, right = region
+    height, width = bottom - top, right - left
+    if per_tile[top:bottom, left:right].sum() <= limit or height == width == 1:
+        yield region
+    elif height >= width:
+        middle = (top + bottom) // 2
+        yield from _split((top, middle, left, right), per_tile, limit)
+        yield from _split((middle, bottom, left, right), per_tile, limit)
+    else:
+        middle = (left + right) // 2
+        yield from _split((top, bottom, left, middle), per_tile, limit)
+        yield from _split((top, bottom, middle, right), per_tile, limit)

@@ -1,0 +1,108 @@
+"""Rasterisation as one differentiable operation on float32 CPU tensors.
+
+Axes: ``n`` Gaussians, ``k`` harmonics, ``e`` extra channels, ``c`` all channels, ``h w`` pixels.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int32
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from diff4splat.geometry.camera import Camera
+from diff4splat.render.raster import forward as stages
+from diff4splat.render.raster.backward import Drawn, gradients
+from diff4splat.render.raster.canvas import Canvas
+from diff4splat.render.raster.plan import Plan, make_view
+from diff4splat.render.raster.tables import Cloud
+from diff4splat.scene.gaussians import Gaussians
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Raster:
+    """The planes of a picture, before the background."""
+
+    planes: Float[Tensor, "c h w"]
+    light: Float[Tensor, "h w"]
+    """How much of what lies behind is seen."""
+    medians: Int32[Tensor, "m h w"]
+    """Which Gaussian halves the light, or -1; m is 0 unless asked for."""
+    unusable: tuple[int, ...]
+    """Gaussians left out because of means, quats, scales, opacities, sh."""
+
+
+def rasterize(
+    plan: Plan, gaussians: Gaussians, extras: Float[Tensor, "n e"], camera: Camera
+) -> Raster:
+    """Blend colours and ``extras`` of Gaussians; gradients reach all tensors."""
+    unusable: list[int] = []
+    planes, light, medians = _Rasterize.apply(
+        plan,
+        unusable,
+        gaussians.means,
+        gaussians.quats,
+        gaussians.scales,
+        gaussians.opacities,
+        gaussians.sh,
+        extras,
+        camera.world_from_camera,
+        camera.focal_px,
+        camera.center_px,
+    )
+    return Raster(planes=planes, light=light, medians=medians, unusable=tuple(unusable))
+
+
+class _Rasterize(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, plan: Plan, unusable: list[int], *tensors: Tensor) -> tuple[Tensor, ...]:
+        cloud, sh, extras, pose, focal_px, center_px = _unpack(tensors)
+        view = make_view(plan.grid, pose, focal_px, center_px)
+        found = stages.footprints(cloud, sh, view, plan)
+        unusable.extend(found.unusable.tolist())
+        values = stages.channel_table(plan, cloud, sh, extras, view, found.order)
+        canvas = Canvas(plan.grid, values.shape[1], plan.medians)
+        binned = stages.bin_footprints(found, plan)
+        for region in binned.regions:
+            filled = stages.fill(found, plan.grid, binned, region)
+            stages.blend_region(plan, filled, found, values, canvas)
+        if any(ctx.needs_input_grad):
+            ctx.save_for_backward(*tensors)
+            kept = filled if len(binned.regions) == 1 else None
+            ctx.drawn = Drawn(
+                plan=plan, view=view, found=found, values=values, canvas=canvas, binned=binned,
+                filled=kept,
+            )  # fmt: skip
+        medians = canvas.pictures(canvas.medians)
+        ctx.mark_non_differentiable(medians)
+        used = (3 if plan.colors else 0) + extras.shape[1]
+        return canvas.pictures(canvas.planes)[:used], canvas.pictures(canvas.light)[0], medians
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, planes: Tensor, light: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:
+        cloud, sh, extras, pose, *_ = _unpack(ctx.saved_tensors)
+        made = gradients(ctx.drawn, cloud, sh, ctx.drawn.canvas.padded(planes, light))
+        start = 3 if ctx.drawn.plan.colors else 0
+        camera = torch.from_numpy(made.camera).to(pose)
+        to_pose = torch.zeros_like(pose)
+        to_pose[:3, :3], to_pose[:3, 3] = camera[:9].view(3, 3), camera[9:12]
+        return (
+            None,
+            None,
+            *map(torch.from_numpy, made.cloud),
+            torch.from_numpy(made.sh),
+            torch.from_numpy(made.values[:, start : start + extras.shape[1]].copy()),
+            to_pose,
+            camera[12:14],
+            camera[14:],
+        )
+
+
+def _unpack(tensors: tuple[Tensor, ...]) -> tuple[Any, ...]:
+    """(cloud, sh, extras) as arrays, and the camera's tensors."""
+    plain = [tensor.detach().contiguous() for tensor in tensors]
+    arrays: list[np.ndarray] = [tensor.numpy() for tensor in plain[:6]]
+    return Cloud(*arrays[:4]), *arrays[4:], *plain[6:]

@@ -1,0 +1,50 @@
+"""Parts of a kernel's work on as many threads as PyTorch uses.
+
+Kernels release Python's lock, so plain threads do. Each takes the next part when it is free; the
+parts never depend on the number of threads, so neither does any result.
+"""
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from threading import Lock
+
+import torch
+
+
+def spread(work: Callable[..., None], parts: Iterable[tuple]) -> None:
+    """Call ``work(*part)`` for every part; returns when all are done.
+
+    Raises:
+        Exception: what any of the calls raised.
+    """
+    waiting, lock = iter(parts), Lock()
+
+    def take() -> None:
+        while True:
+            with lock:
+                part = next(waiting, None)
+            if part is None:
+                return
+            work(*part)
+
+    helpers = torch.get_num_threads() - 1
+    running = [_pool(helpers, os.getpid()).submit(take) for _ in range(helpers)]
+    try:
+        take()
+    finally:
+        for helper in running:
+            helper.result()
+
+
+@cache
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """Threads that live as long as the process; a forked one starts its own."""
+    del process
+    return ThreadPoolExecutor(threads, thread_name_prefix="diff4splat-raster")
+
+
+def ranges(count: int, size: int) -> list[tuple[int, int]]:
+    """(first, one past last) of pieces of at most ``size``."""
+    return [(first, min(first + size, count)) for first in range(0, count, size)]

@@ -1,0 +1,84 @@
+"""Compilation ahead of use: visible, once per machine.
+
+Kernels compile when they are first called and are then loaded from disk. A tiny scene, drawn
+forwards and backwards with everything that can be asked for, calls each of them once.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import torch
+from numba.core import event
+
+from diff4splat.geometry.camera import pinhole
+from diff4splat.render.raster import jit
+from diff4splat.render.raster.function import rasterize
+from diff4splat.render.raster.plan import make_plan
+from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.gaussians import Gaussians
+
+
+def is_ready() -> bool:
+    """Whether every kernel was compiled before, in this process or on this machine."""
+    return all(map(jit.is_ready, jit.KERNELS))
+
+
+def kernel_count() -> int:
+    """How many kernels `warm` goes through."""
+    return len(jit.KERNELS)
+
+
+def warm(advance: Callable[[str], None] = lambda name: None) -> float:
+    """Load or compile every kernel; ``advance`` gets the name of each one. Returns the seconds."""
+    began = time.perf_counter()
+    with event.install_listener("numba:compile", _Names(advance)):
+        _draw_tiny_scene()
+    return time.perf_counter() - began
+
+
+@cache
+def ensure_compiled() -> None:
+    """Before the first picture of a process: say so if kernels must be compiled, and do it."""
+    if is_ready():
+        return
+    sys.stderr.write("diff4splat: compiling the CPU renderer, once for this machine:")
+    seconds = warm(_show)
+    sys.stderr.write(f"\ndiff4splat: ready after {seconds:.0f} s; later runs load it from disk\n")
+
+
+def _show(name: str) -> None:
+    sys.stderr.write(f" {name}")
+    sys.stderr.flush()
+
+
+class _Names(event.Listener):
+    """Reports kernels as their compilation ends, and not the functions inside them."""
+
+    def __init__(self, advance: Callable[[str], None]) -> None:
+        self._advance = advance
+
+    def on_start(self, event: Any) -> None:
+        """Nothing to say yet."""
+
+    def on_end(self, event: Any) -> None:
+        """One more is ready."""
+        dispatcher = event.data["dispatcher"]
+        if any(dispatcher is kernel for kernel in jit.KERNELS):
+            self._advance(dispatcher.py_func.__name__)
+
+
+def _draw_tiny_scene() -> None:
+    gaussians = Gaussians(
+        means=torch.tensor([[0.0, 0.0, 1.0]]),
+        quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]]),
+        scales=torch.full((1, 3), 0.1),
+        opacities=torch.full((1,), 0.5, requires_grad=True),
+        sh=torch.zeros(1, 1, 3),
+    )
+    camera = pinhole(8.0, (8, 8))
+    plan = make_plan(camera, RenderSettings(), colors=True, medians=True)
+    with torch.enable_grad():
+        rasterize(plan, gaussians, torch.zeros(1, 0), camera).light.sum().backward()

@@ -1,0 +1,211 @@
+"""A worker that misbehaves costs its own cell and nothing else."""
+
+import math
+import os
+import time
+from pathlib import Path
+
+import memory
+import pytest
+import rounds
+import torch
+from loading import BUILT_IN, Peer
+from machine import Disturbance
+from process import Limits, Worker, WorkerFailure, explain
+from records import timing
+from rounds import Effort, Turn
+from scenes import TINY
+from station import Station, TruthDesk
+
+LIMITS = Limits(threads=1, memory_bytes=4 << 30, answer_s=60.0)
+EFFORT = Effort(seconds=0.05, patience_s=10.0, memory_bytes=4 << 30, window_s=0.001)
+UNRULY = """
+import os
+import sys
+import time
+
+import torch
+
+NAME = "unruly"
+CALLS = []
+
+
+class Prepared:
+    def forward(self):
+        CALLS.append(0)
+        if len(CALLS) == 2:
+            return torch.zeros(1 << 50)
+        if len(CALLS) == 3:
+            raise ValueError("first line\\nsecond line")
+        if len(CALLS) == 4:
+            print("the last words")
+            sys.stdout.flush()
+            os.abort()
+        return torch.zeros(32, 32, 3)
+
+    def forward_backward(self, grad_rgb):
+        return None
+
+
+def unavailable():
+    return None
+
+
+def prepare(gaussians, camera):
+    return Prepared()
+"""
+
+
+def test_failures_become_reasons_and_the_worker_lives_until_it_dies(tmp_path: Path) -> None:
+    file = tmp_path / "unruly.py"
+    file.write_text(UNRULY)
+    with Worker(Station, LIMITS) as worker:
+        assert worker.ask("load", file) == ("", True)
+        # The warm-up is the first call.
+        assert worker.ask("prepare", TINY[0]) is None
+        assert worker.ask("first", "both") is None
+        with pytest.raises(WorkerFailure, match=r"out of memory \(limit 4.0 GiB\)"):
+            worker.ask("first", "forward")
+        with pytest.raises(WorkerFailure, match="ValueError: first line second line"):
+            worker.ask("first", "forward")
+        with pytest.raises(WorkerFailure, match=r"died \(SIGABRT\).*the last words"):
+            worker.ask("first", "forward")
+        with pytest.raises(WorkerFailure):
+            worker.ask("first", "forward")
+
+
+def test_a_worker_that_does_not_answer_is_stopped() -> None:
+    limits = Limits(threads=1, memory_bytes=4 << 30, answer_s=0.01)
+    with Worker(TruthDesk, limits) as worker, pytest.raises(WorkerFailure, match="no answer"):
+        worker.ask("find", TINY[0], Path("unused"), False)
+
+
+def test_one_renderer_is_measured_and_checked(tmp_path: Path) -> None:
+    peer = Peer(name="tile-loop", file=BUILT_IN / "tile_loop.py")
+    said = []
+    subject = rounds.find_subject(TINY[0], tmp_path, EFFORT)
+    (cell,) = rounds.measure(subject, [peer], 1, EFFORT, said.append)
+    assert (cell.reason, cell.peer, cell.threads) == ("", "tile-loop", 1)
+    assert cell.forward.windows > 1
+    assert cell.forward.best_s <= cell.forward.median_s
+    assert cell.image.psnr_db > 60
+    assert len(cell.gradients) == 5
+    assert subject.work.blended_pairs > 0
+    assert said[:2] == ["tiny: tile-loop", "tiny: tile-loop, round 1"]
+
+
+def test_a_truth_that_fails_is_said_and_not_compared(tmp_path: Path) -> None:
+    effort = Effort(seconds=1.0, patience_s=1.0, memory_bytes=4 << 30, answer_s=0.01)
+    subject = rounds.find_subject(TINY[0], tmp_path, effort)
+    assert subject.truth_file is None
+    assert subject.work.reason.startswith("truth: stopped: no answer")
+
+
+def test_other_programs_are_told_from_our_own() -> None:
+    disturbance = Disturbance()
+    until = time.monotonic() + 0.3
+    while time.monotonic() < until:
+        pass
+    cores = disturbance.cores()
+    assert 0.0 <= cores <= (os.cpu_count() or 1)
+
+
+def test_explanations_are_one_short_line() -> None:
+    assert explain(MemoryError(), 1 << 30) == "out of memory (limit 1.0 GiB)"
+    assert "std::bad_alloc" not in explain(RuntimeError("std::bad_alloc"), 1 << 30)
+    long = explain(RuntimeError("x\n" * 500), 1)
+    assert "\n" not in long
+    assert len(long) <= 160
+
+
+def test_the_peak_can_be_set_back() -> None:
+    if not Path("/proc/self/clear_refs").exists():
+        pytest.skip("needs Linux")
+    before = memory.reset_peak()
+    torch.ones(16 << 20)
+    grown = memory.peak_bytes() - before
+    assert 60 << 20 < grown < 100 << 20
+    assert memory.peak_bytes() - memory.reset_peak() > 60 << 20
+    assert memory.available_bytes() > 0
+
+
+class Scripted:
+    """A worker that answers from a list of window seconds, and writes down what it was asked."""
+
+    def __init__(self, log: list, name: str, window_s: float = 0.01, fail_at: int = -1) -> None:
+        self.log, self.name, self.window_s, self.fail_at, self.asked = (
+            log,
+            name,
+            window_s,
+            fail_at,
+            0,
+        )
+
+    def ask(self, method: str, *arguments: object) -> object:
+        if method == "window":
+            self.asked += 1
+            if self.asked == self.fail_at:
+                raise WorkerFailure("died (SIGABRT)")
+            self.log.append((self.name, arguments[0]))
+            return self.window_s
+        return {"load": ("a note", False), "prepare": None, "first": (self.window_s, 5)}[method]
+
+    def close(self) -> None:
+        pass
+
+
+def scripted(monkeypatch: pytest.MonkeyPatch, workers: list) -> list[Turn]:
+    queue = iter(workers)
+    monkeypatch.setattr(rounds, "Worker", lambda *_: next(queue))
+    effort = Effort(seconds=0.1, patience_s=1.0, memory_bytes=1, window_s=0.02)
+    turns = [
+        Turn(peer=Peer(name=w.name, file=Path()), scene=TINY[0], threads=1, effort=effort)
+        for w in workers
+    ]
+    for turn in turns:
+        turn.begin(None)
+    while any(turn.unfinished for turn in turns):
+        for turn in turns:
+            if turn.unfinished:
+                turn.round()
+    return turns
+
+
+def test_windows_of_all_renderers_interleave(monkeypatch: pytest.MonkeyPatch) -> None:
+    log: list = []
+    turns = scripted(monkeypatch, [Scripted(log, "a"), Scripted(log, "b", window_s=0.2)])
+    assert log[:4] == [("a", "forward"), ("a", "both"), ("b", "forward"), ("b", "both")]
+    # Two windows of at least 0.02 s a round: three rounds until 0.1 s are used up.
+    assert [name for name, _ in log].count("a") == 6
+    assert [name for name, _ in log].count("b") == 2
+    cell = turns[0].cell(0.0)
+    assert (cell.note, cell.judged, cell.forward.windows, cell.forward.peak_bytes) == (
+        "a note",
+        False,
+        3,
+        5,
+    )
+
+
+def test_the_impatient_measure_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    log: list = []
+    (turn,) = scripted(monkeypatch, [Scripted(log, "slow", window_s=2.0)])
+    assert log == []
+    assert turn.cell(0.0).forward.best_s == 2.0
+    assert turn.cell(0.0).forward.windows == 1
+
+
+def test_a_death_in_the_rounds_keeps_what_was_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    log: list = []
+    (turn,) = scripted(monkeypatch, [Scripted(log, "mortal", fail_at=4)])
+    cell = turn.cell(0.0)
+    assert cell.reason == "backward: died (SIGABRT)"
+    assert cell.both.windows == 1
+    assert cell.forward.windows > 1
+
+
+def test_the_first_call_stands_in_for_missing_windows() -> None:
+    assert timing([], 3.0, 7).best_s == 3.0
+    found = timing([0.3, 0.1, 0.2], 3.0, 7)
+    assert (found.best_s, found.median_s, found.windows, found.first_s) == (0.1, 0.2, 3, 3.0)
+    assert math.isfinite(found.best_s)
