@@ -5,6 +5,7 @@ Axes: ``h w`` pixels, ``t`` frames. Times are seconds.
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import fields, replace
+from functools import partial
 
 import torch
 from jaxtyping import Float
@@ -127,26 +128,28 @@ def render_video(
         ConfigError: an unknown output.
     """
     wanted = require_outputs(outputs)
+    if "flow" not in wanted:
+        _require_sources(wanted, settings)
+    times_s, last = path.times_s.tolist(), len(path) - 1
+    to_next = "flow" in wanted and settings.flow_camera is None and settings.flow_time_s is None
     # A scene that stands still needs no state per frame.
     subject = scene.gaussians if isinstance(scene.motion, StaticMotion) else scene
-    times_s, last = path.times_s.tolist(), len(path) - 1
-    to_next = settings.flow_camera is None and settings.flow_time_s is None
+    first = partial(_job, subject, path.cameras[0], times_s[0], wanted, settings)
+    shared = None if "flow" in wanted or last == 0 else _shared(scene, first(), backend)
 
     def frame(index: int) -> RenderOutput:
-        following = min(index + 1, last)
-        own = settings
+        camera, own = path.cameras[index], settings
         if to_next:
+            following = min(index + 1, last)
             own = replace(
                 settings, flow_camera=path.cameras[following], flow_time_s=times_s[following]
             )
-        picture = render(
-            subject,
-            path.cameras[index],
-            times_s[index],
-            outputs=wanted,
-            settings=own,
-            backend=backend,
-        )
+        if shared is not None:
+            picture = shared(camera, times_s[index])
+        else:
+            picture = render(
+                subject, camera, times_s[index], outputs=wanted, settings=own, backend=backend
+            )
         advance()
         return picture
 
@@ -174,6 +177,17 @@ def _matching(settings: RenderSettings, gaussians: Gaussians) -> RenderSettings:
             f"settings.features: expected ({len(gaussians)}, channels), got {tuple(features.shape)}"
         )
     return replace(settings, features=features.to(gaussians.means))
+
+
+def _shared(
+    scene: Scene, first: RenderJob, backend: str
+) -> Callable[[Camera, float], RenderOutput] | None:
+    """What draws frames with shared work, if the back end of the first one has it."""
+    opener = getattr(choose(backend, first), "open_sequence", None)
+    draw = opener(scene, first) if opener else None
+    if draw is None:
+        return None
+    return lambda camera, time_s: draw(_usable(camera, first.gaussians), time_s)
 
 
 def _state(scene_or_gaussians: Scene | Gaussians, time_s: float) -> Gaussians:

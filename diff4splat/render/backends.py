@@ -10,6 +10,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.render.settings import RenderJob, RenderOutput
 
 BACKENDS = {
+    "gsplat": "diff4splat.render.gsplat_backend",
     "raster": "diff4splat.render.raster.backend",
     "reference": "diff4splat.render.reference",
 }
@@ -18,7 +19,11 @@ BACKENDS = {
 
 @runtime_checkable
 class Backend(Protocol):
-    """What the module of a back end offers."""
+    """What the module of a back end offers.
+
+    It may also have ``open_sequence(scene, first_job)``, which gives a function of camera and time
+    that draws frames of one scene with shared work, or None where it cannot.
+    """
 
     def refusal(self, job: RenderJob) -> str | None:
         """Why ``job`` cannot be done here ("expected X, got Y"), or None."""

@@ -3,20 +3,28 @@
 Axes: ``n`` Gaussians, ``h w`` pixels, ``c`` channels.
 """
 
+from collections.abc import Callable
 from dataclasses import fields
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 import torch
 from jaxtyping import Float, Int32
 from torch import Tensor
 
+from diff4splat.geometry.camera import Camera
 from diff4splat.render.channels import extra_channels, name_outputs
 from diff4splat.render.projection import camera_space, to_pixels
 from diff4splat.render.raster.plan import TILE_SIZES_PX, make_plan
 from diff4splat.render.settings import RenderJob, RenderOutput
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.scene import Scene
 
-LARGEST = torch.finfo(torch.float32).max ** 0.5
+if TYPE_CHECKING:
+    from diff4splat.render.raster.function import Raster
+
+_SHARED_OUTPUTS = {"rgb", "alpha", "depth", "median_depth"}
+_LARGEST = torch.finfo(torch.float32).max ** 0.5
 _MOST_GAUSSIANS = 1 << 24
 """Beyond it float32 cannot number the entries of a list."""
 
@@ -53,15 +61,58 @@ def render(job: RenderJob) -> RenderOutput:
         )
         made = rasterize(plan, job.gaussians, extras, job.camera)
         median_depth = _median_depth(depth, made.medians[0]) if medians else None
-        counts = zip((f.name for f in fields(Gaussians)), made.unusable, strict=True)
-        dropped = {name: count for name, count in counts if count}
-        return name_outputs(job, made.planes.permute(1, 2, 0), made.light, median_depth, dropped)
+        return _named(job, made, median_depth)
+
+
+def open_sequence(scene: Scene, job: RenderJob) -> Callable[[Camera, float], RenderOutput] | None:
+    """Pictures of ``scene`` that share work, or None where they must be made one by one.
+
+    ``job`` is the first of them. Flow and features are not shared, and gradients need each state.
+    """
+    if not job.outputs <= _SHARED_OUTPUTS or _wants_gradient(job):
+        return None
+    from diff4splat.render.raster.plan import make_view
+    from diff4splat.render.raster.sequence import Sequence
+    from diff4splat.render.raster.warm import ensure_compiled
+
+    ensure_compiled()
+    medians = "median_depth" in job.outputs
+    plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians)
+    sequence = Sequence(scene, plan, "depth" in job.outputs)
+
+    def draw(camera: Camera, time_s: float) -> RenderOutput:
+        view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
+        made = sequence.draw(view, time_s)
+        median_depth = _median_depth(sequence.depth, made.medians[0]) if medians else None
+        return _named(job, made, median_depth)
+
+    return draw
+
+
+def _wants_gradient(job: RenderJob) -> bool:
+    """Whether anything that goes into a picture needs a gradient; the state tells for a motion."""
+    camera = job.camera
+    tensors = [
+        *(getattr(job.gaussians, f.name) for f in fields(job.gaussians)),
+        *(camera.world_from_camera, camera.focal_px, camera.center_px),
+    ]
+    if isinstance(job.settings.background, Tensor):
+        tensors.append(job.settings.background)
+    return torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
+
+
+def _named(
+    job: RenderJob, made: "Raster", median_depth: Float[Tensor, "h w"] | None
+) -> RenderOutput:
+    counts = zip((f.name for f in fields(Gaussians)), made.unusable, strict=True)
+    dropped = {name: count for name, count in counts if count}
+    return name_outputs(job, made.planes.permute(1, 2, 0), made.light, median_depth, dropped)
 
 
 def _centers(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 2"]]:
     """Z and pixel of the means; 1 and the origin for those that nothing can see or square."""
     means = job.gaussians.means
-    local = camera_space(job.camera, torch.where(means.abs() < LARGEST, means, 0.0))
+    local = camera_space(job.camera, torch.where(means.abs() < _LARGEST, means, 0.0))
     seen = local[:, 2:] > job.settings.near_depth
     local = torch.where(seen, local, 1.0)
     return local[:, 2], to_pixels(job.camera, local)

@@ -12,6 +12,7 @@ from diff4splat.render.raster.blend_backward import blend_backward, sum_slots
 from diff4splat.render.raster.canvas import Canvas, empty
 from diff4splat.render.raster.forward import (
     GAUSSIANS_PER_PART,
+    TILES_PER_PART,
     Binned,
     Filled,
     Footprints,
@@ -85,14 +86,16 @@ def _blend_backward(
     order, canvas = drawn.found.order, drawn.canvas
     slots = empty(len(filled.lists.members), SHAPE_COLUMNS + drawn.values.shape[1])
 
-    def blend_tiles(tiles: np.ndarray) -> None:
+    tiles = tiles_of(filled.region, drawn.plan.grid)
+
+    def blend_tiles(first: int, last: int) -> None:
         blend_backward(
-            tiles, drawn.plan.grid, filled.lists, drawn.found.prints, drawn.values,
+            tiles[first:last], drawn.plan.grid, filled.lists, drawn.found.prints, drawn.values,
             drawn.plan.rules, canvas.light, canvas.stops, incoming, slots,
         )  # fmt: skip
 
     def add(first: int, last: int) -> None:
         sum_slots(first, last, order, filled.first_slots, slots, shape_grads, value_grads)
 
-    spread(blend_tiles, tiles_of(filled.region, drawn.plan.grid))
+    spread(blend_tiles, ranges(len(tiles), TILES_PER_PART))
     spread(add, ranges(len(order), GAUSSIANS_PER_PART))

@@ -5,7 +5,7 @@ A picture with more pairs (tile, Gaussian) than may be kept is cut into regions 
 done one after another.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.raster.tiles import count_pairs, fill_lists, place_lists
 
 GAUSSIANS_PER_PART = 4096
-_TILES_PER_PART = 4
+TILES_PER_PART = 4
 _PIECES = 8
 """Pieces of the depth order at most; each needs its own count per tile."""
 
@@ -66,19 +66,33 @@ def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
     """Project all Gaussians and sort the visible ones."""
     count = len(cloud.means)
     prints, depth = empty(count, 8, dtype=torch.float64), empty(count)
-    visible, parts = empty(count, dtype=torch.int32), ranges(count, GAUSSIANS_PER_PART)
-    found, unusable = [0] * len(parts), np.zeros((len(parts), SH + 1), np.int64)
-    numbers = sh.reshape(count, sh.shape[1] * 3)
+    everyone = np.arange(count, dtype=np.int32)
+    numbers, unusable = sh.reshape(count, sh.shape[1] * 3), np.zeros(SH + 1, np.int64)
 
-    def work(part: int, first: int, last: int) -> None:
-        found[part] = project(
-            first, last, cloud, numbers, view, plan.rules, prints, depth, visible, unusable[part]
+    def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
+        return project(
+            first, last, everyone, cloud, numbers, view, plan.rules, prints, depth, visible, faults
         )
 
-    spread(work, numbered(parts))
+    visible = list_visible(count, work, unusable)
+    order = nearest_first(visible, depth)
+    return Footprints(prints=prints, depth=depth, order=order, unusable=unusable)
+
+
+def list_visible(
+    count: int, work: Callable[[int, int, Integers, NDArray[np.int64]], int], unusable: np.ndarray
+) -> Integers:
+    """Those of ``count`` candidates that ``work`` lists, in their order; adds to ``unusable``."""
+    visible, parts = empty(count, dtype=torch.int32), ranges(count, GAUSSIANS_PER_PART)
+    found, faults = [0] * len(parts), np.zeros((len(parts), SH + 1), np.int64)
+
+    def part_work(part: int, first: int, last: int) -> None:
+        found[part] = work(first, last, visible, faults[part])
+
+    spread(part_work, numbered(parts))
+    unusable += faults.sum(0)
     kept = [visible[first : first + size] for (first, _), size in zip(parts, found, strict=True)]
-    order = nearest_first(np.concatenate([visible[:0], *kept]), depth)
-    return Footprints(prints=prints, depth=depth, order=order, unusable=unusable.sum(0))
+    return np.concatenate([visible[:0], *kept])
 
 
 def channel_table(
@@ -142,21 +156,33 @@ def blend_region(
     plan: Plan, filled: Filled, found: Footprints, values: Floats, canvas: Canvas
 ) -> None:
     """Blend the tiles of a region into ``canvas``."""
+    tiles = tiles_of(filled.region, plan.grid)
+    blend_tiles(plan, tiles, filled.lists, found.prints, values, canvas)
 
-    def work(tiles: NDArray[np.int64]) -> None:
+
+def blend_tiles(
+    plan: Plan,
+    tiles: NDArray[np.int64],
+    lists: Lists,
+    prints: Doubles,
+    values: Floats,
+    canvas: Canvas,
+) -> None:
+    """Blend some tiles into ``canvas``."""
+
+    def work(first: int, last: int) -> None:
         blend(
-            tiles, plan.grid, filled.lists, found.prints, values, plan.rules, canvas.planes,
+            tiles[first:last], plan.grid, lists, prints, values, plan.rules, canvas.planes,
             canvas.light, canvas.stops, canvas.medians,
         )  # fmt: skip
 
-    spread(work, tiles_of(filled.region, plan.grid))
+    spread(work, ranges(len(tiles), TILES_PER_PART))
 
 
-def tiles_of(region: Region, grid: Grid) -> list[tuple[NDArray[np.int64]]]:
-    """Numbers of the tiles of a region, in parts."""
+def tiles_of(region: Region, grid: Grid) -> NDArray[np.int64]:
+    """Numbers of the tiles of a region."""
     rows, columns = np.mgrid[region[0] : region[1], region[2] : region[3]]
-    tiles = (rows * grid.columns + columns).reshape(-1)
-    return [(tiles[first:last],) for first, last in ranges(len(tiles), _TILES_PER_PART)]
+    return (rows * grid.columns + columns).reshape(-1)
 
 
 def numbered(parts: list[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:

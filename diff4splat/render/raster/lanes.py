@@ -20,14 +20,15 @@ INDEX, FLOAT = ir.IntType(32), ir.FloatType()
 INDICES, FLOATS = ir.VectorType(INDEX, LANES), ir.VectorType(FLOAT, LANES)
 _BITS = ir.VectorType(ir.IntType(1), LANES)
 
-# 2 to the x on [-1/2, 1/2], highest power first: minimax in relative error, 7.5e-8 (Remez).
+# 2 to the x on [-1/2, 1/2], highest power first: minimax in relative error (9.1e-8) among those
+# that are exact at 0, where most of an opaque footprint's weight is.
 _EXP2 = (
-    0.0013276471992851953,
-    0.009675541334449414,
-    0.05550713273496898,
-    0.24022119723840105,
-    0.6931469670647613,
-    1.0000000716546849,
+    0.0013264727197302498,
+    0.009671512639646995,
+    0.05550733743251582,
+    0.240222420853751,
+    0.6931469775991637,
+    1.0,
 )
 
 

@@ -42,52 +42,63 @@ MEANS, QUATS, SCALES, OPACITIES, SH = range(5)
 
 
 @kernel
-def project(first, last, cloud, sh, view, rules, prints, depth, visible, unusable):
-    """Fill ``prints`` and ``depth`` of visible Gaussians and list them in ``visible[first:]``.
+def project(first, last, candidates, cloud, sh, view, rules, prints, depth, visible, unusable):
+    """Fill ``prints`` and ``depth`` of the ``candidates`` that can be seen.
 
-    ``unusable`` counts Gaussians by their first unusable parameter. Returns how many are listed.
+    They are listed in ``visible`` from ``first`` on. ``unusable`` counts Gaussians by their first
+    unusable parameter. Returns how many are listed.
     """
     found = 0
-    for i in range(first, last):
-        fault = _unusable_parameter(cloud, sh, i)
+    for place in range(first, last):
+        i = candidates[place]
+        mean, quat = triple(cloud.means, i), quadruple(cloud.quats, i)
+        state = (mean, quat, triple(cloud.scales, i), np.float64(cloud.opacities[i]))
+        fault = unusable_parameter(state, sh, i)
         if fault >= 0:
             unusable[fault] += 1
-        elif _print(i, cloud, view, rules, prints, depth):
+        elif leave_print(i, state, view, rules, prints, depth):
             visible[first + found] = i
             found += 1
     return found
 
 
 @device
-def _unusable_parameter(cloud, sh, i):
+def unusable_parameter(state, sh, i):
     """The first parameter that is not finite or overflows when squared, or -1."""
-    if not _usable(cloud.means, i):
+    mean, quat, scales, opacity = state
+    if not _usable(mean):
         return MEANS
-    if not _usable(cloud.quats, i):
+    if not _usable(quat):
         return QUATS
-    if not _usable(cloud.scales, i):
+    if not _usable(scales):
         return SCALES
-    if not abs(cloud.opacities[i]) < LARGEST:
+    if not abs(opacity) < LARGEST:
         return OPACITIES
-    return -1 if _usable(sh, i) else SH
+    fine = True
+    for column in range(sh.shape[1]):
+        fine = fine and abs(sh[i, column]) < LARGEST
+    return -1 if fine else SH
 
 
 @device
-def _usable(rows, i):
+def _usable(values):
     fine = True
-    for column in range(rows.shape[1]):
-        fine = fine and abs(rows[i, column]) < LARGEST
+    for value in values:
+        fine = fine and abs(value) < LARGEST
     return fine
 
 
 @device
-def _print(i, cloud, view, rules, prints, depth):
-    """Whether Gaussian ``i`` can be seen; writes its footprint if so."""
-    opacity = np.float64(cloud.opacities[i])
-    local = camera_space(view, triple(cloud.means, i))
+def leave_print(i, state, view, rules, prints, depth):
+    """Whether a Gaussian can be seen, by its mean, quaternion, scales and opacity.
+
+    If so, its footprint goes to row ``i``.
+    """
+    mean, quat, scales, opacity = state
+    local = camera_space(view, mean)
     if not (local.z > rules.near_depth and opacity > 0):
         return False
-    axes = principal_axes(unit(quadruple(cloud.quats, i)), triple(cloud.scales, i))
+    axes = principal_axes(unit(quat), scales)
     m = moments(linearize(view, local), axes, rules.dilation_px2)
     vx, vy = m.xx + rules.dilation_px2, m.yy + rules.dilation_px2
     if not m.det > _THINNEST_PX**2 * (vx + vy):

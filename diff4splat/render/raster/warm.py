@@ -11,14 +11,20 @@ from functools import cache
 from typing import Any
 
 import torch
+from jaxtyping import Int
 from numba.core import event
+from torch import Tensor
 
-from diff4splat.geometry.camera import pinhole
+from diff4splat.geometry.camera import Camera, pinhole
+from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.raster import jit
 from diff4splat.render.raster.function import rasterize
-from diff4splat.render.raster.plan import make_plan
+from diff4splat.render.raster.plan import make_plan, make_view
+from diff4splat.render.raster.sequence import Sequence
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.scene import Provenance, Scene
 
 
 def is_ready() -> bool:
@@ -71,14 +77,40 @@ class _Names(event.Listener):
 
 
 def _draw_tiny_scene() -> None:
-    gaussians = Gaussians(
+    """One picture with its gradients, then two of a sequence."""
+    gaussians = _gaussian()
+    camera = pinhole(8.0, (8, 8))
+    plan = make_plan(camera, RenderSettings(), colors=True, medians=True)
+    with torch.enable_grad():
+        rasterize(plan, gaussians, torch.zeros(1, 0), camera).light.sum().backward()
+    view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
+    for index in (torch.zeros(1, dtype=torch.long), torch.zeros(0, dtype=torch.long)):
+        sequence = Sequence(_scene(gaussians, index, camera), plan, depths=True)
+        sequence.draw(view, 0.0)
+        sequence.draw(view, 0.0)
+
+
+def _scene(gaussians: Gaussians, moving: Int[Tensor, " m"], camera: Camera) -> Scene:
+    keys = torch.zeros(1, len(moving), 4)
+    return Scene(
+        gaussians=gaussians,
+        motion=KeyframeMotion(
+            key_times_s=torch.zeros(1),
+            moving_index=moving,
+            offsets=keys[..., :3],
+            rotations=keys,
+            log_scale_offsets=keys[..., :3],
+        ),
+        path=CameraPath(cameras=camera.with_pose(torch.eye(4)[None]), times_s=torch.zeros(1)),
+        provenance=Provenance(generator="warm"),
+    )
+
+
+def _gaussian() -> Gaussians:
+    return Gaussians(
         means=torch.tensor([[0.0, 0.0, 1.0]]),
         quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]]),
         scales=torch.full((1, 3), 0.1),
         opacities=torch.full((1,), 0.5, requires_grad=True),
         sh=torch.zeros(1, 1, 3),
     )
-    camera = pinhole(8.0, (8, 8))
-    plan = make_plan(camera, RenderSettings(), colors=True, medians=True)
-    with torch.enable_grad():
-        rasterize(plan, gaussians, torch.zeros(1, 0), camera).light.sum().backward()

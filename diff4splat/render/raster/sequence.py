@@ -1,0 +1,199 @@
+"""Many pictures of one scene: what is still valid from the picture before is not made again.
+
+- What stands still is projected, sorted and binned once per camera.
+- What moves is projected straight from its motion; no state of the scene is stored.
+- While the camera stands, only tiles that something moving touches, or touched before, are blended.
+- The large arrays live as long as the sequence.
+
+Pictures are those of ``render``, without gradients.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from numpy.typing import NDArray
+from torch import Tensor
+
+from diff4splat.render.raster import forward as stages
+from diff4splat.render.raster.blend import FIXED
+from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.render.raster.forward import Footprints
+from diff4splat.render.raster.function import Raster
+from diff4splat.render.raster.harmonics import colors
+from diff4splat.render.raster.merge import merge_lists, merge_orders
+from diff4splat.render.raster.moving import Moving
+from diff4splat.render.raster.order import nearest_first
+from diff4splat.render.raster.plan import Plan
+from diff4splat.render.raster.project import SH, project
+from diff4splat.render.raster.tables import Integers, Lists, View
+from diff4splat.render.raster.threads import ranges, spread
+from diff4splat.scene.scene import Scene
+
+
+@dataclass(slots=True)
+class _Still:
+    """What the camera sees of the Gaussians that do not move."""
+
+    view: View
+    order: Integers
+    unusable: NDArray[np.int64]
+    lists: Lists | None = None
+    """Made when the camera is used again; None also while they would not fit."""
+
+
+class Sequence:
+    """A scene to be drawn many times, by one plan. ``extras`` are blended behind the colours."""
+
+    def __init__(self, scene: Scene, plan: Plan, depths: bool) -> None:
+        gaussians = scene.gaussians
+        self._plan, self._depths = plan, depths
+        self._moving = Moving(scene)
+        self._cloud = self._moving.cloud
+        self._sh = self._moving.sh
+        count = len(gaussians)
+        self._prints, self._depth = empty(count, 8, dtype=torch.float64), empty(count)
+        moves = np.zeros(count, bool)
+        moves[self._moving.index] = True
+        self._still_index = np.flatnonzero(~moves).astype(np.int32)
+        channels = (3 if plan.colors else 0) + (2 if depths else 0)
+        self._values = np.zeros((count, max(channels, FIXED)), np.float32)
+        self._used = channels
+        self._canvas = Canvas(plan.grid, self._values.shape[1], plan.medians)
+        self._still: _Still | None = None
+        # Plain colours look the same from everywhere.
+        self._colors_change = plan.colors and (self._moving.recolors or self._sh.shape[1] > 1)
+        if plan.colors:
+            self._color(np.arange(count, dtype=np.int32), (0.0, 0.0, 0.0))
+        self._stale = np.ones(plan.grid.rows * plan.grid.columns, bool)
+
+    @property
+    def depth(self) -> Float[Tensor, " n"]:
+        """Z of every Gaussian that the last picture could see; any number for the others."""
+        return torch.from_numpy(self._depth)
+
+    def draw(self, view: View, time_s: float, rows: tuple[int, int] | None = None) -> Raster:
+        """The picture at ``time_s``.
+
+        With pixel ``rows`` (first, one past last) only the tiles in these rows are brought up to
+        the time while the camera stands; the others keep what they showed, as under a rolling
+        shutter.
+        """
+        same_camera = self._still is not None and self._still.view == view
+        if not same_camera:
+            self._see_still(view)
+            self._stale[:] = True
+        order, unusable = self._see_moving(view, time_s)
+        if same_camera and self._bin_still():
+            self._draw_stale(order, rows)
+        else:
+            self._draw_all(order)
+        return self._picture(unusable + self._still.unusable)
+
+    def _see_still(self, view: View) -> None:
+        """Project, sort and colour what does not move."""
+        unusable, numbers = np.zeros(SH + 1, np.int64), self._sh.reshape(len(self._sh), -1)
+        index, rules = self._still_index, self._plan.rules
+
+        def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
+            return project(
+                first, last, index, self._cloud, numbers, view, rules, self._prints, self._depth,
+                visible, faults,
+            )  # fmt: skip
+
+        visible = stages.list_visible(len(index), work, unusable)
+        order = nearest_first(visible, self._depth)
+        self._still = _Still(view, order, unusable)
+        self._fill_values(view, order)
+
+    def _see_moving(self, view: View, time_s: float) -> tuple[Integers, NDArray[np.int64]]:
+        """Move, project, sort and colour the others."""
+        unusable = np.zeros(SH + 1, np.int64)
+        visible = self._moving.project(
+            self._plan, view, time_s, self._prints, self._depth, unusable
+        )
+        order = nearest_first(visible, self._depth)
+        self._fill_values(view, order)
+        return order, unusable
+
+    def _fill_values(self, view: View, order: Integers) -> None:
+        """Colours and depth channels of some Gaussians."""
+        if self._colors_change:
+            self._color(order, view.position)
+        if self._depths:
+            self._values[order, self._used - 2] = self._depth[order]
+            self._values[order, self._used - 1] = 1
+
+    def _color(self, order: Integers, position: tuple[float, ...]) -> None:
+        def work(first: int, last: int) -> None:
+            colors(first, last, order, self._cloud.means, self._sh, position, self._values)
+
+        spread(work, ranges(len(order), stages.GAUSSIANS_PER_PART))
+
+    def _bin_still(self) -> bool:
+        """Whether there are lists of what stands still; made when a camera is used again."""
+        if self._still.lists is None:
+            found = self._footprints(self._still.order)
+            binned = stages.bin_footprints(found, self._plan)
+            if len(binned.regions) == 1:
+                filled = stages.fill(found, self._plan.grid, binned, binned.regions[0])
+                self._still.lists = filled.lists
+        return self._still.lists is not None
+
+    def _draw_all(self, moving: Integers) -> None:
+        """Blend every tile."""
+        order = np.empty(len(self._still.order) + len(moving), np.int32)
+        merge_orders(self._still.order, moving, self._depth, order)
+        found = self._footprints(order)
+        binned = stages.bin_footprints(found, self._plan)
+        for region in binned.regions:
+            filled = stages.fill(found, self._plan.grid, binned, region)
+            stages.blend_region(self._plan, filled, found, self._values, self._canvas)
+
+    def _draw_stale(self, moving: Integers, rows: tuple[int, int] | None) -> None:
+        """Blend the tiles that show, or are to show, something that moves."""
+        found, grid = self._footprints(moving), self._plan.grid
+        whole = (0, grid.rows, 0, grid.columns)
+        lists = stages.fill(found, grid, stages.bin_footprints(found, self._plan), whole).lists
+        touched = np.diff(lists.starts) > 0
+        self._stale |= touched
+        drawn = self._stale & self._tiles_in(rows)
+        tiles = np.flatnonzero(drawn)
+        merged = self._merged_lists(lists, drawn, tiles)
+        stages.blend_tiles(self._plan, tiles, merged, self._prints, self._values, self._canvas)
+        self._stale[tiles] = touched[tiles]
+
+    def _merged_lists(self, moving: Lists, drawn: NDArray[np.bool_], tiles: np.ndarray) -> Lists:
+        still = self._still.lists
+        sizes = (np.diff(still.starts) + np.diff(moving.starts)) * drawn
+        starts = np.concatenate([[0], sizes.cumsum()])
+        members = empty(int(starts[-1]), dtype=torch.int32)
+        merged = Lists(starts, members, members[:0])
+
+        def work(first: int, last: int) -> None:
+            merge_lists(first, last, tiles, still, moving, self._depth, merged)
+
+        spread(work, ranges(len(tiles), stages.TILES_PER_PART))
+        return merged
+
+    def _tiles_in(self, rows: tuple[int, int] | None) -> NDArray[np.bool_]:
+        grid = self._plan.grid
+        if rows is None:
+            return np.ones(grid.rows * grid.columns, bool)
+        tile_row = np.arange(grid.rows).repeat(grid.columns)
+        return (tile_row >= rows[0] >> grid.shift) & (tile_row <= (rows[1] - 1) >> grid.shift)
+
+    def _footprints(self, order: Integers) -> Footprints:
+        nothing = np.zeros(SH + 1, np.int64)
+        return Footprints(prints=self._prints, depth=self._depth, order=order, unusable=nothing)
+
+    def _picture(self, unusable: NDArray[np.int64]) -> Raster:
+        """Copies: the canvas is drawn over."""
+        canvas = self._canvas
+        return Raster(
+            planes=canvas.pictures(canvas.planes)[: self._used].clone(),
+            light=canvas.pictures(canvas.light)[0].clone(),
+            medians=canvas.pictures(canvas.medians).clone(),
+            unusable=tuple(unusable.tolist()),
+        )
