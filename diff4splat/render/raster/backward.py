@@ -23,7 +23,7 @@ from diff4splat.render.raster.forward import (
 from diff4splat.render.raster.harmonics import colors_backward
 from diff4splat.render.raster.plan import Plan
 from diff4splat.render.raster.project_backward import CAMERA_COLUMNS, POSITION, project_backward
-from diff4splat.render.raster.tables import SHAPE_COLUMNS, Cloud, Doubles, Floats, View
+from diff4splat.render.raster.tables import MOMENTS, Cloud, Doubles, Floats, View
 from diff4splat.render.raster.threads import ranges, spread
 
 
@@ -54,24 +54,25 @@ class Gradients:
 
 def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradients:
     """From gradients of the padded planes and the light."""
-    shape_grads = np.zeros((len(sh), SHAPE_COLUMNS), np.float32)
+    moments = np.zeros((len(sh), MOMENTS), np.float32)
     value_grads = np.zeros(drawn.values.shape, np.float32)
     for region in drawn.binned.regions:
         filled = drawn.filled or fill(drawn.found, drawn.plan.grid, drawn.binned, region)
-        _blend_backward(drawn, filled, incoming, shape_grads, value_grads)
+        _blend_backward(drawn, filled, incoming, moments, value_grads)
     grads = Cloud(*(np.zeros(array.shape, np.float32) for array in cloud))
     sh_grads = np.zeros(sh.shape, np.float32)
-    parts, order = ranges(len(drawn.found.order), GAUSSIANS_PER_PART), drawn.found.order
+    visible, prints = drawn.found.visible, drawn.found.prints
+    parts = ranges(len(visible), GAUSSIANS_PER_PART)
     camera = np.zeros((len(parts), CAMERA_COLUMNS))
 
     def work(part: int, first: int, last: int) -> None:
         project_backward(
-            first, last, order, cloud, drawn.view, drawn.plan.rules, shape_grads, grads,
+            first, last, visible, cloud, drawn.view, drawn.plan.rules, prints, moments, grads,
             camera[part],
         )  # fmt: skip
         if drawn.plan.colors:
             colors_backward(
-                first, last, order, cloud.means, sh, drawn.view.position, value_grads, sh_grads,
+                first, last, visible, cloud.means, sh, drawn.view.position, value_grads, sh_grads,
                 grads.means, camera[part, POSITION:],
             )  # fmt: skip
 
@@ -80,11 +81,11 @@ def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradi
 
 
 def _blend_backward(
-    drawn: Drawn, filled: Filled, incoming: Floats, shape_grads: Floats, value_grads: Floats
+    drawn: Drawn, filled: Filled, incoming: Floats, moments: Floats, value_grads: Floats
 ) -> None:
     """Add the gradients of the tiles of a region."""
     order, canvas = drawn.found.order, drawn.canvas
-    slots = empty(len(filled.lists.members), SHAPE_COLUMNS + drawn.values.shape[1])
+    slots = empty(len(filled.lists.members), MOMENTS + drawn.values.shape[1])
 
     tiles = tiles_of(filled.region, drawn.plan.grid)
 
@@ -95,7 +96,7 @@ def _blend_backward(
         )  # fmt: skip
 
     def add(first: int, last: int) -> None:
-        sum_slots(first, last, order, filled.first_slots, slots, shape_grads, value_grads)
+        sum_slots(first, last, order, filled.first_slots, slots, moments, value_grads)
 
     spread(blend_tiles, ranges(len(tiles), TILES_PER_PART))
     spread(add, ranges(len(order), GAUSSIANS_PER_PART))

@@ -59,7 +59,7 @@ def blend(tiles, grid, lists, prints, values, rules, planes, light, stops, media
     ``median``, if not empty, gets the index of the Gaussian behind which at most half of the light
     is left, or -1.
     """
-    size = grid.edge * grid.edge
+    size = plane_stride(grid)
     state = aligned_floats((3 + values.shape[1]) * size)
     for tile in tiles:
         first, last = lists.starts[tile], lists.starts[tile + 1]
@@ -78,11 +78,21 @@ def blend(tiles, grid, lists, prints, values, rules, planes, light, stops, media
 
 
 @device
+def plane_stride(grid):
+    """From plane to plane of a tile's state: not a multiple of 4 KiB.
+
+    Addresses that agree in their last 12 bits look to a processor like the same one, and a load
+    waits for a store to the other.
+    """
+    return grid.edge * grid.edge + 5 * LANES
+
+
+@device
 def _begin(state, tile, grid, channels):
     """Full light inside the picture, none in the padding; returns the number of pixels."""
-    size, live = grid.edge * grid.edge, 0
+    size, live = plane_stride(grid), 0
     left, top = corner(tile, grid)
-    for block in range(size // LANES):
+    for block in range(grid.edge * grid.edge // LANES):
         x, y = block_corner(block, grid)
         inside = (block_columns() + np.float32(left + x) < np.float32(grid.width)) & (
             block_rows() + np.float32(top + y) < np.float32(grid.height)
@@ -103,7 +113,7 @@ def _add(state, tile, grid, prints, values, i, rules, rank, median):
     left, top = corner(tile, grid)
     x0, y0, x1, y1 = blocks_in_tile(prints, i, left, top, grid)
     red, green, blue = fill(values[i, 0]), fill(values[i, 1]), fill(values[i, 2])
-    size, stopped = grid.edge * grid.edge, 0
+    size, stopped = plane_stride(grid), 0
     step = fill(2 * prints[i, WHITEN_Y])
     for column in range(x0, x1 + 1):
         exponent_at_v0, v, _ = start_column(prints, i, left, top, column, y0)
@@ -159,9 +169,9 @@ def _note_median(state, place, before, after, rank):
 @device
 def _finish(state, tile, grid, planes, light, stops):
     """Write a tile to the picture."""
-    size, pitch = grid.edge * grid.edge, grid.columns << grid.shift
+    size, pitch = plane_stride(grid), grid.columns << grid.shift
     left, top = corner(tile, grid)
-    for block in range(size // LANES):
+    for block in range(grid.edge * grid.edge // LANES):
         x, y = block_corner(block, grid)
         to, place = (top + y) * pitch + left + x, block * LANES
         store_block(light, to, pitch, load(state, place))
@@ -174,9 +184,9 @@ def _finish(state, tile, grid, planes, light, stops):
 @device
 def _finish_median(state, tile, grid, members, first, median):
     """Positions in the list to indices of Gaussians."""
-    size, pitch = grid.edge * grid.edge, grid.columns << grid.shift
+    size, pitch = plane_stride(grid), grid.columns << grid.shift
     left, top = corner(tile, grid)
-    for pixel in range(size):
+    for pixel in range(grid.edge * grid.edge):
         x, y = block_corner(pixel // LANES, grid)
         lane = pixel % LANES
         to = (top + y + (lane >> COLUMN_SHIFT)) * pitch + left + x + (lane & 7)

@@ -20,9 +20,9 @@ from diff4splat.render.raster.blend import (
     block_corner,
     blocks_in_tile,
     corner,
+    plane_stride,
     start_column,
 )
-from diff4splat.render.raster.footprint import LN2
 from diff4splat.render.raster.jit import device, kernel
 from diff4splat.render.raster.lanes import (
     any_of,
@@ -33,6 +33,7 @@ from diff4splat.render.raster.lanes import (
     minimum,
     select,
     total,
+    totals,
 )
 from diff4splat.render.raster.memory import (
     aligned_floats,
@@ -41,16 +42,9 @@ from diff4splat.render.raster.memory import (
     load_block,
     prefetch,
     store,
+    store_eight,
 )
-from diff4splat.render.raster.tables import (
-    CENTER_X,
-    CENTER_Y,
-    LOG2_OPACITY,
-    SHAPE_COLUMNS,
-    SHEAR,
-    WHITEN_X,
-    WHITEN_Y,
-)
+from diff4splat.render.raster.tables import MOMENTS, WHITEN_Y
 
 _AHEAD = 8
 _LIGHT, _STOP, _BEHIND, _GRADIENT = range(4)
@@ -59,11 +53,11 @@ _LIGHT, _STOP, _BEHIND, _GRADIENT = range(4)
 
 @kernel
 def blend_backward(tiles, grid, lists, prints, values, rules, light, stops, grads, slots):
-    """Fill the slot (6 of the shape, then channels) of every pair of ``tiles``.
+    """Fill the slot (6 moments of ∂/∂ln α, then channels) of every pair of ``tiles``.
 
     ``grads`` holds the gradients of the planes, then that of the light ((c + 1) · pixels).
     """
-    size, channels = grid.edge * grid.edge, values.shape[1]
+    size, channels = plane_stride(grid), values.shape[1]
     state = aligned_floats((_GRADIENT + channels) * size)
     sums = aligned_floats(channels * LANES)
     for tile in tiles:
@@ -86,10 +80,10 @@ def blend_backward(tiles, grid, lists, prints, values, rules, light, stops, grad
 @device
 def _begin(state, tile, grid, light, stops, grads):
     """Load the end state of a tile; returns how many entries of its list any pixel looked at."""
-    size, pitch = grid.edge * grid.edge, grid.columns << grid.shift
+    size, pitch = plane_stride(grid), grid.columns << grid.shift
     left, top = corner(tile, grid)
     channels = len(grads) // len(light) - 1
-    for block in range(size // LANES):
+    for block in range(grid.edge * grid.edge // LANES):
         x, y = block_corner(block, grid)
         at, place = (top + y) * pitch + left + x, block * LANES
         remaining = load_block(light, at, pitch)
@@ -104,7 +98,7 @@ def _begin(state, tile, grid, light, stops, grads):
             gradient = load_block(grads, channel * len(light) + at, pitch)
             store(state, (_GRADIENT + channel) * size + place, gradient)
     seen = 0.0
-    for pixel in range(size):
+    for pixel in range(grid.edge * grid.edge):
         # The padding has no light, and must not keep a tile going.
         if state[_LIGHT * size + pixel] > 0:
             seen = max(seen, np.float64(state[_STOP * size + pixel]))
@@ -117,7 +111,7 @@ def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, sl
     left, top = corner(tile, grid)
     x0, y0, x1, y1 = blocks_in_tile(prints, i, left, top, grid)
     red, green, blue = fill(values[i, 0]), fill(values[i, 1]), fill(values[i, 2])
-    size = grid.edge * grid.edge
+    size = plane_stride(grid)
     step = fill(2 * prints[i, WHITEN_Y])
     none = fill(0.0)
     e, ex, exx, ev, evx, evv = none, none, none, none, none, none
@@ -167,36 +161,24 @@ def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, sl
             fma(moment0 * x, x, exx),
             fma(moment1, x, evx),
         )
-    _write_shape(slots, slot, prints, i, (e, ex, exx, ev, evx, evv))
-    store(sums, 0, to_red)
-    store(sums, LANES, to_green)
-    store(sums, 2 * LANES, to_blue)
-    for channel in range(values.shape[1]):
-        slots[slot, SHAPE_COLUMNS + channel] = total(load(sums, channel * LANES))
-
-
-@device
-def _write_shape(slots, slot, prints, i, sums):
-    """From lanes of ∂/∂ln α times (1, dx, dx², v, v dx, v²) to the six of the shape."""
-    a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
-    e, ex, exx = total(sums[0]), total(sums[1]), total(sums[2])
-    ev, evx, evv = total(sums[3]), total(sums[4]), total(sums[5])
-    slots[slot, CENTER_X] = 2 * LN2 * (a * a * ex - k * ev)
-    slots[slot, CENTER_Y] = 2 * LN2 * b * ev
-    slots[slot, WHITEN_X] = -2 * LN2 * a * exx
-    slots[slot, SHEAR] = 2 * LN2 * evx
-    slots[slot, WHITEN_Y] = -2 * LN2 * (evv + k * evx) / b
-    slots[slot, LOG2_OPACITY] = LN2 * e
+    moments = totals(e, ex, exx, ev, evx, evv, to_red, to_green)
+    store_eight(slots, slot * slots.shape[1], moments)
+    slots[slot, MOMENTS + 2] = total(to_blue)
+    for channel in range(FIXED, values.shape[1]):
+        slots[slot, MOMENTS + channel] = total(load(sums, channel * LANES))
 
 
 @kernel
-def sum_slots(first, last, order, first_slots, slots, shape_grads, value_grads):
+def sum_slots(first, last, order, first_slots, slots, moments, value_grads):
     """Add the slots of every Gaussian of ranks ``first`` to ``last``, in the order of its tiles."""
-    channels = value_grads.shape[1]
     for rank in range(first, last):
+        # Sums go to rows in any order; the next ones are fetched meanwhile.
+        ahead = order[min(rank + _AHEAD, last - 1)]
+        prefetch(moments, ahead)
+        prefetch(value_grads, ahead)
         index = order[rank]
         for slot in range(first_slots[rank], first_slots[rank + 1]):
-            for column in range(SHAPE_COLUMNS):
-                shape_grads[index, column] += slots[slot, column]
-            for channel in range(channels):
-                value_grads[index, channel] += slots[slot, SHAPE_COLUMNS + channel]
+            for column in range(MOMENTS):
+                moments[index, column] += slots[slot, column]
+            for channel in range(value_grads.shape[1]):
+                value_grads[index, channel] += slots[slot, MOMENTS + channel]

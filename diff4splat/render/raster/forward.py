@@ -37,8 +37,10 @@ class Footprints:
 
     prints: Doubles
     depth: Floats
+    visible: Integers
+    """In increasing order: work on every one of them reads memory in a line."""
     order: Integers
-    """Visible ones, nearest first."""
+    """The same, nearest first."""
     unusable: NDArray[np.int64]
     """Gaussians left out, by the first parameter that is not finite."""
 
@@ -76,7 +78,7 @@ def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
 
     visible = list_visible(count, work, unusable)
     order = nearest_first(visible, depth)
-    return Footprints(prints=prints, depth=depth, order=order, unusable=unusable)
+    return Footprints(prints=prints, depth=depth, visible=visible, order=order, unusable=unusable)
 
 
 def list_visible(
@@ -96,7 +98,7 @@ def list_visible(
 
 
 def channel_table(
-    plan: Plan, cloud: Cloud, sh: Floats, extras: Floats, view: View, order: Integers
+    plan: Plan, cloud: Cloud, sh: Floats, extras: Floats, view: View, visible: Integers
 ) -> Floats:
     """Per Gaussian: RGB if it is asked for, the extra channels, zeros up to the fixed number."""
     start = 3 if plan.colors else 0
@@ -107,9 +109,9 @@ def channel_table(
     if plan.colors:
 
         def work(first: int, last: int) -> None:
-            colors(first, last, order, cloud.means, sh, view.position, values)
+            colors(first, last, visible, cloud.means, sh, view.position, values)
 
-        spread(work, ranges(len(order), GAUSSIANS_PER_PART))
+        spread(work, ranges(len(visible), GAUSSIANS_PER_PART))
     return values
 
 

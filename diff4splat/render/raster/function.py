@@ -62,7 +62,7 @@ class _Rasterize(torch.autograd.Function):
         view = make_view(plan.grid, pose, focal_px, center_px)
         found = stages.footprints(cloud, sh, view, plan)
         unusable.extend(found.unusable.tolist())
-        values = stages.channel_table(plan, cloud, sh, extras, view, found.order)
+        values = stages.channel_table(plan, cloud, sh, extras, view, found.visible)
         canvas = Canvas(plan.grid, values.shape[1], plan.medians)
         binned = stages.bin_footprints(found, plan)
         for region in binned.regions:

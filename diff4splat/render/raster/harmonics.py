@@ -24,12 +24,12 @@ _C3 = (
 
 
 @kernel
-def colors(first, last, order, means, sh, position, values):
-    """RGB of the Gaussians of these ranks into the first three columns of ``values``."""
+def colors(first, last, listed, means, sh, position, values):
+    """RGB of the Gaussians in ``listed[first:last]`` into the first three columns of ``values``."""
     basis, slopes = np.empty(16), np.empty((16, 3))
     basis[0] = _C0
-    for rank in range(first, last):
-        i = order[rank]
+    for place in range(first, last):
+        i = listed[place]
         if sh.shape[1] > 1:
             _evaluate(triple(means, i), position, sh.shape[1], basis, slopes)
         for channel in range(3):
@@ -38,22 +38,23 @@ def colors(first, last, order, means, sh, position, values):
 
 @kernel
 def colors_backward(
-    first, last, order, means, sh, position, value_grads, sh_grads, mean_grads, camera
+    first, last, listed, means, sh, position, value_grads, sh_grads, mean_grads, camera
 ):
     """Gradients of coefficients, and through the direction of means and ``camera`` position (3)."""
     basis, slopes, turn = np.empty(16), np.empty((16, 3)), np.empty(3)
-    for rank in range(first, last):
-        i = order[rank]
+    for place in range(first, last):
+        i = listed[place]
         distance = _evaluate(triple(means, i), position, sh.shape[1], basis, slopes)
         turn[:] = 0
         for channel in range(3):
             if _color(basis, sh, i, channel) >= 0:
                 gradient = np.float64(value_grads[i, channel])
-                for k in range(sh.shape[1]):
+                sh_grads[i, 0, channel] = gradient * _C0
+                for k in range(1, sh.shape[1]):
                     sh_grads[i, k, channel] = gradient * basis[k]
                     for axis in range(3):
                         turn[axis] += gradient * sh[i, k, channel] * slopes[k, axis]
-        if distance > 0 and sh.shape[1] > 1:
+        if distance > 0:
             _turn_backward(triple(means, i), position, distance, turn, mean_grads, i, camera)
 
 
@@ -82,7 +83,6 @@ def _turn_backward(mean, position, distance, turn, mean_grads, i, camera):
 def _evaluate(mean, position, count, basis, slopes):
     """Basis functions and their gradients in the direction of a mean; returns the distance."""
     basis[0] = _C0
-    slopes[0] = 0
     if count == 1:
         return 0.0
     x, y, z = mean[0] - position[0], mean[1] - position[1], mean[2] - position[2]

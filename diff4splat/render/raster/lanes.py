@@ -213,6 +213,33 @@ def total(typing_context, x):
 
 
 @intrinsic
+def totals(typing_context, x0, x1, x2, x3, x4, x5, x6, x7):
+    """The totals of eight values, in the first eight lanes: a tree that halves all at once."""
+
+    def emit(context, builder, sig, args):
+        values, width = list(args), LANES
+        while width > LANES // 8:
+            half = width // 2
+            # Runs of `width` lanes belong to one total; keep the first and the second half of each.
+            low = [lane for lane in range(2 * LANES) if lane % width < half]
+            kinds = [ir.Constant(INDICES, [lane + shift for lane in low]) for shift in (0, half)]
+            pairs = zip(values[::2], values[1::2], strict=True)
+            values = [
+                builder.fadd(*(builder.shuffle_vector(x, y, kind) for kind in kinds))
+                for x, y in pairs
+            ]
+            width = half
+        even = ir.Constant(INDICES, [2 * (lane % 8) for lane in range(LANES)])
+        odd = ir.Constant(INDICES, [2 * (lane % 8) + 1 for lane in range(LANES)])
+        last = values[0]
+        return builder.fadd(
+            builder.shuffle_vector(last, last, even), builder.shuffle_vector(last, last, odd)
+        )
+
+    return lanes(x0, x1, x2, x3, x4, x5, x6, x7), emit
+
+
+@intrinsic
 def exp2(typing_context, x):
     """2 to the x, to 2e-7 relative for x between -126 and 127; elsewhere any number.
 

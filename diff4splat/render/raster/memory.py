@@ -49,6 +49,19 @@ def store(typing_context, array, offset, x):
 
 
 @intrinsic
+def store_eight(typing_context, array, offset, x):
+    """Write the first eight lanes to neighbours of a C-contiguous float32 array."""
+
+    def emit(context, builder, sig, args):
+        place = _place(context, builder, sig.args[0], *args[:2])
+        values = builder.shuffle_vector(args[2], args[2], ir.Constant(_ROW_INDEX, list(range(8))))
+        builder.store(values, builder.bitcast(place, _ROW.as_pointer()), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, types.int64, lanes), emit
+
+
+@intrinsic
 def load_block(typing_context, picture, offset, pitch):
     """A block of a flat float32 picture whose rows are ``pitch`` apart."""
 

@@ -35,22 +35,21 @@ POSE, POSITION, FOCAL, CENTER, CAMERA_COLUMNS = 0, 9, 12, 14, 16
 
 
 @kernel
-def project_backward(first, last, order, cloud, view, rules, shape_grads, grads, camera):
-    """Gradients of the Gaussians of these ranks into ``grads``; sums for the ``camera`` (16)."""
-    for rank in range(first, last):
-        index = order[rank]
-        _one(index, cloud, view, rules, shape_grads, grads, camera)
+def project_backward(first, last, listed, cloud, view, rules, prints, sums, grads, camera):
+    """Gradients of the Gaussians in ``listed[first:last]``; adds those of the ``camera`` (16)."""
+    for place in range(first, last):
+        _one(listed[place], cloud, view, rules, prints, sums, grads, camera)
 
 
 @device
-def _one(index, cloud, view, rules, shape_grads, grads, camera):
+def _one(index, cloud, view, rules, prints, sums, grads, camera):
     """The way back of one Gaussian."""
     turned, scales = unit(quadruple(cloud.quats, index)), triple(cloud.scales, index)
     mean = triple(cloud.means, index)
     local = camera_space(view, mean)
     slopes = linearize(view, local)
     turn, axes = principal_axes(turned, (1.0, 1.0, 1.0)), principal_axes(turned, scales)
-    grad = _shape_gradient(shape_grads, index)
+    grad = _shape_gradient(prints, sums, index)
     a, b = _moments_backward(moments(slopes, axes, rules.dilation_px2), grad, rules)
     to_axes = _axes_backward(slopes, a, b)
     _scales_backward(turn, to_axes, grads.scales, index)
@@ -63,14 +62,18 @@ def _one(index, cloud, view, rules, shape_grads, grads, camera):
 
 
 @device
-def _shape_gradient(rows, i):
+def _shape_gradient(prints, sums, i):
+    """Gradients of the first six columns of a footprint, from the moments of its pixels."""
+    a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
+    e, ex, exx = np.float64(sums[i, 0]), np.float64(sums[i, 1]), np.float64(sums[i, 2])
+    ev, evx, evv = np.float64(sums[i, 3]), np.float64(sums[i, 4]), np.float64(sums[i, 5])
     return (
-        np.float64(rows[i, 0]),
-        np.float64(rows[i, 1]),
-        np.float64(rows[i, 2]),
-        np.float64(rows[i, 3]),
-        np.float64(rows[i, 4]),
-        np.float64(rows[i, 5]),
+        2 * LN2 * (a * a * ex - k * ev),
+        2 * LN2 * b * ev,
+        -2 * LN2 * a * exx,
+        2 * LN2 * evx,
+        -2 * LN2 * (evv + k * evx) / b,
+        LN2 * e,
     )
 
 

@@ -103,9 +103,8 @@ class Sequence:
             )  # fmt: skip
 
         visible = stages.list_visible(len(index), work, unusable)
-        order = nearest_first(visible, self._depth)
-        self._still = _Still(view, order, unusable)
-        self._fill_values(view, order)
+        self._still = _Still(view, nearest_first(visible, self._depth), unusable)
+        self._fill_values(view, visible)
 
     def _see_moving(self, view: View, time_s: float) -> tuple[Integers, NDArray[np.int64]]:
         """Move, project, sort and colour the others."""
@@ -113,23 +112,22 @@ class Sequence:
         visible = self._moving.project(
             self._plan, view, time_s, self._prints, self._depth, unusable
         )
-        order = nearest_first(visible, self._depth)
-        self._fill_values(view, order)
-        return order, unusable
+        self._fill_values(view, visible)
+        return nearest_first(visible, self._depth), unusable
 
-    def _fill_values(self, view: View, order: Integers) -> None:
+    def _fill_values(self, view: View, visible: Integers) -> None:
         """Colours and depth channels of some Gaussians."""
         if self._colors_change:
-            self._color(order, view.position)
+            self._color(visible, view.position)
         if self._depths:
-            self._values[order, self._used - 2] = self._depth[order]
-            self._values[order, self._used - 1] = 1
+            self._values[visible, self._used - 2] = self._depth[visible]
+            self._values[visible, self._used - 1] = 1
 
-    def _color(self, order: Integers, position: tuple[float, ...]) -> None:
+    def _color(self, visible: Integers, position: tuple[float, ...]) -> None:
         def work(first: int, last: int) -> None:
-            colors(first, last, order, self._cloud.means, self._sh, position, self._values)
+            colors(first, last, visible, self._cloud.means, self._sh, position, self._values)
 
-        spread(work, ranges(len(order), stages.GAUSSIANS_PER_PART))
+        spread(work, ranges(len(visible), stages.GAUSSIANS_PER_PART))
 
     def _bin_still(self) -> bool:
         """Whether there are lists of what stands still; made when a camera is used again."""
@@ -186,7 +184,9 @@ class Sequence:
 
     def _footprints(self, order: Integers) -> Footprints:
         nothing = np.zeros(SH + 1, np.int64)
-        return Footprints(prints=self._prints, depth=self._depth, order=order, unusable=nothing)
+        return Footprints(
+            prints=self._prints, depth=self._depth, visible=order, order=order, unusable=nothing
+        )
 
     def _picture(self, unusable: NDArray[np.int64]) -> Raster:
         """Copies: the canvas is drawn over."""
