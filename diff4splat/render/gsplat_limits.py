@@ -6,13 +6,13 @@ Every function answers "expected X, got Y", or None where the job is within the 
 import torch
 
 from diff4splat.render.projection import camera_space
-from diff4splat.render.settings import RenderJob, RenderSettings
+from diff4splat.render.settings import RenderJob
 
 DEVICE_TYPE = "cuda"
 MADE = ("rgb", "depth", "alpha", "flow", "features")
 FIXED = {
     "alpha_cutoff": (1 / 255,),
-    "light_cutoff": (1e-4, RenderSettings().light_cutoff),
+    "light_cutoff": (1e-4, None),
     "tile_px": (16, None),
 }
 """What the kernels hold constant, and the defaults that leave it to them."""

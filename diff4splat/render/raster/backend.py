@@ -55,10 +55,7 @@ def render(job: RenderJob) -> RenderOutput:
     medians = "median_depth" in job.outputs
     plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians)
     with torch.autocast("cpu", enabled=False):
-        depth, center_px = _centers(job)
-        extras = extra_channels(
-            job, depth, center_px, job.flow_gaussians.means, job.settings.features
-        )
+        depth, extras = _depth_and_extras(job)
         made = rasterize(plan, job.gaussians, extras, job.camera)
         median_depth = _median_depth(depth, made.medians[0]) if medians else None
         return _named(job, made, median_depth)
@@ -107,6 +104,16 @@ def _named(
     counts = zip((f.name for f in fields(Gaussians)), made.unusable, strict=True)
     dropped = {name: count for name, count in counts if count}
     return name_outputs(job, made.planes.permute(1, 2, 0), made.light, median_depth, dropped)
+
+
+def _depth_and_extras(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor, "n c"]]:
+    """Depth of the means and the channels beside the colours; none where only those are wanted."""
+    means = job.gaussians.means
+    if job.outputs <= {"rgb", "alpha"}:
+        return means.new_zeros(len(means)), means.new_zeros(len(means), 0)
+    depth, center_px = _centers(job)
+    moved, features = job.flow_gaussians.means, job.settings.features
+    return depth, extra_channels(job, depth, center_px, moved, features)
 
 
 def _centers(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 2"]]:

@@ -12,6 +12,8 @@ from diff4splat.render.settings import RenderSettings
 
 TILE_SIZES_PX = (8, 16, 32, 64)
 DEFAULT_TILE_PX = 32
+DEFAULT_LIGHT_CUTOFF = 1e-6
+"""Divided by 1 - alpha_max it bounds what gradients lose: a thousandth."""
 _BYTES_PER_PAIR = 64
 
 
@@ -37,7 +39,7 @@ def make_plan(camera: Camera, settings: RenderSettings, colors: bool, medians: b
             antialias=settings.antialias,
             log2_cutoff=math.log2(settings.alpha_cutoff),
             alpha_max=settings.alpha_max,
-            light_cutoff=settings.light_cutoff,
+            light_cutoff=settings.light_cutoff or DEFAULT_LIGHT_CUTOFF,
             near_depth=settings.near_depth,
         ),
         colors=colors,
