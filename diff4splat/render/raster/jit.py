@@ -4,12 +4,15 @@ A ``kernel`` is called from Python, a ``device`` function from kernels. Products
 contracted to fused ones; nothing else is reordered, so equal inputs give equal bits.
 """
 
+import hashlib
 import inspect
+import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
 
@@ -20,12 +23,15 @@ KERNELS: list[Any] = []
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile ``function`` when it is first called, and keep it on disk where that is allowed."""
     # Test hooks wrap functions to check their annotations; kernels need the bare one.
-    bare = inspect.unwrap(function)
+    bare, before = inspect.unwrap(function), config.CACHE_DIR
     try:
+        config.CACHE_DIR = str(cache_folder())
         compiled = njit(cache=True, **_OPTIONS)(bare)
     except RuntimeError:
         # No folder to write to: every process compiles for itself.
         compiled = njit(**_OPTIONS)(bare)
+    finally:
+        config.CACHE_DIR = before
     KERNELS.append(compiled)
     return compiled
 
@@ -36,6 +42,21 @@ def device(function: Callable[..., Any]) -> Any:
     Always inlined: a call passes arrays by counted references, which costs more than most work.
     """
     return njit(forceinline=True, **_OPTIONS)(inspect.unwrap(function))
+
+
+@cache
+def cache_folder() -> Path:
+    """Where compiled kernels are kept: under ``NUMBA_CACHE_DIR``, or the user's cache.
+
+    Its name is a digest of all sources here. Numba by itself notices a change of the file that
+    holds a kernel, and not of the functions that the kernel takes from other files.
+    """
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    base = os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "diff4splat" / "kernels"
+    return Path(base) / digest.hexdigest()[:16]
 
 
 def is_ready(compiled: Any) -> bool:
