@@ -1,6 +1,6 @@
 """The harness is a folder, not a package: ``python benchmarks/renderers`` puts it on the path.
 
-Its shapes are checked here as those of the library are.
+Shapes are checked here as those of the library are.
 """
 
 import sys
@@ -10,4 +10,5 @@ import jaxtyping
 
 HARNESS = Path(__file__).parents[3] / "benchmarks" / "renderers"
 sys.path.insert(0, str(HARNESS))
-jaxtyping.install_import_hook([file.stem for file in HARNESS.glob("*.py")], "beartype.beartype")
+SHAPED = ("brute_force", "comparison", "sampling", "scenes", "torch_backward")
+jaxtyping.install_import_hook(SHAPED, "beartype.beartype")

@@ -100,6 +100,7 @@ def test_shares_are_work_over_time_over_limit() -> None:
     assert forward.bytes_share == pytest.approx(least / 1e-3 / 1e10)
     both = shares(made.cells[0], made.works[0], made.limits[0], backward=True)
     assert both.flops == pytest.approx(BOTH_FLOPS_PER_PAIR * 1e6 / 3e-3)
+    assert both.bytes_share == pytest.approx(2 * least / 3e-3 / 1e10)
     unknown = Work(scene="x", gaussians=1, pixels=1)
     assert shares(made.cells[0], unknown, made.limits[0], backward=False) is None
 

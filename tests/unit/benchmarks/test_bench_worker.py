@@ -95,10 +95,16 @@ def test_one_renderer_is_measured_and_checked(tmp_path: Path) -> None:
 
 
 def test_a_truth_that_fails_is_said_and_not_compared(tmp_path: Path) -> None:
-    effort = Effort(seconds=1.0, patience_s=1.0, memory_bytes=4 << 30, answer_s=0.01)
-    subject = rounds.find_subject(TINY[0], tmp_path, effort)
+    nowhere = tmp_path / "missing" / "folder"
+    subject = rounds.find_subject(TINY[0], nowhere, EFFORT)
     assert subject.truth_file is None
-    assert subject.work.reason.startswith("truth: stopped: no answer")
+    assert subject.work.reason.startswith("truth: RuntimeError: ")
+    assert "missing" in subject.work.reason
+
+
+def test_patience_bounds_an_answer() -> None:
+    assert EFFORT.limits(2).answer_s == 4 * EFFORT.patience_s
+    assert EFFORT.truth_limits().answer_s > EFFORT.limits(2).answer_s
 
 
 def test_other_programs_are_told_from_our_own() -> None:
@@ -202,6 +208,39 @@ def test_a_death_in_the_rounds_keeps_what_was_measured(monkeypatch: pytest.Monke
     assert cell.reason == "backward: died (SIGABRT)"
     assert cell.both.windows == 1
     assert cell.forward.windows > 1
+
+
+def test_the_first_reason_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Failing(Scripted):
+        def ask(self, method: str, *arguments: object) -> object:
+            if method == "first":
+                raise WorkerFailure(f"cannot do {arguments[0]}")
+            return super().ask(method, *arguments)
+
+    (turn,) = scripted(monkeypatch, [Failing([], "failing")])
+    assert turn.cell(0.0).reason == "forward: cannot do forward"
+    assert turn.cell(0.0).forward is turn.cell(0.0).both is None
+
+
+class Sleeping:
+    def forward(self) -> torch.Tensor:
+        time.sleep(0.01)
+        return torch.ones(16 << 20)
+
+    def forward_backward(self, grad_rgb: torch.Tensor) -> None:
+        return None
+
+
+def test_a_window_gives_seconds_per_call_and_a_first_call_its_growth() -> None:
+    station = Station()
+    station._prepared, station._grad_rgb = Sleeping(), torch.ones(1)
+    assert station.window("forward", 0.0) >= 0.01
+    calls = station.window("forward", 0.2)
+    assert 0.01 <= calls < 0.1
+    seconds, growth = station.first("forward")
+    assert seconds >= 0.01
+    assert 50 << 20 < growth < 100 << 20
+    assert station.first("both") is None
 
 
 def test_the_first_call_stands_in_for_missing_windows() -> None:

@@ -1,0 +1,105 @@
+"""How our cost grows with the work: time against blended pairs, over three decades.
+
+Two series at 512²: ``count`` adds Gaussians of one size, ``footprint`` enlarges a fixed number of
+them. Opacities are 0.01 to 0.03, so that light never runs out and every pair is blended. The slope
+is the least-squares fit of log time over log pairs; 1 is proportional.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from records import KINDS, Cell, Kind
+from rounds import Subject
+from scenes import Look, Scene, cloud
+
+_SIZE_PX, _OPACITY = (512, 512), (0.01, 0.03)
+COUNTS = (1_000, 3_200, 10_000, 32_000, 100_000, 320_000, 1_000_000)
+RADII_PX = (6.0, 11.0, 19.0, 34.0, 60.0, 107.0, 190.0)
+_FIXED_RADIUS_PX, _FIXED_COUNT = 10.0, 3_000
+STEEP = 1e6
+"""Pairs above which the fixed cost of a picture no longer shows."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """One scene of a series."""
+
+    series: str
+    pairs: float
+    gaussians: int
+    forward_s: float | None
+    both_s: float | None
+
+    def seconds(self, kind: Kind) -> float | None:
+        """Best window of one kind of call."""
+        return self.forward_s if kind == "forward" else self.both_s
+
+
+def _scene(name: str, count: int, radius_px: float) -> Scene:
+    look = Look(radius_px=(radius_px, radius_px), opacity=_OPACITY)
+    return Scene(name=name, count=count, size_px=_SIZE_PX, make=partial(cloud, look))
+
+
+SERIES = (
+    *(("count", _scene(f"count-{count}", count, _FIXED_RADIUS_PX)) for count in COUNTS),
+    *(("footprint", _scene(f"footprint-{r:g}px", _FIXED_COUNT, r)) for r in RADII_PX),
+)
+"""(series, scene), fewest pairs first."""
+
+
+def point(name: str, subject: Subject, cell: Cell) -> Point:
+    """One measured scene of a series."""
+    return Point(
+        series=name,
+        pairs=subject.work.blended_pairs,
+        gaussians=subject.work.gaussians,
+        forward_s=None if cell.forward is None else cell.forward.best_s,
+        both_s=None if cell.both is None else cell.both.best_s,
+    )
+
+
+def fit(pairs: Sequence[float], seconds: Sequence[float]) -> float:
+    """The least-squares slope of log seconds over log pairs; NaN with fewer than two points."""
+    if len(pairs) < 2:
+        return math.nan
+    x, y = [math.log(value) for value in pairs], [math.log(value) for value in seconds]
+    mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
+    spread = sum((value - mean_x) ** 2 for value in x)
+    return sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True)) / spread
+
+
+def slopes(points: Sequence[Point], least_pairs: float = 0.0) -> dict[str, float]:
+    """The slope of every series and kind, from ``least_pairs`` on."""
+    found = {}
+    for name in dict.fromkeys(point.series for point in points):
+        for kind in KINDS:
+            kept = [
+                (point.pairs, seconds)
+                for point in points
+                if point.series == name
+                and point.pairs >= least_pairs
+                and (seconds := point.seconds(kind)) is not None
+            ]
+            found[f"{name} {kind}"] = fit(*zip(*kept, strict=True)) if kept else math.nan
+    return found
+
+
+def to_markdown(points: Sequence[Point], peer: str) -> str:
+    """The points and the slopes."""
+    lines = [f"# Cost of {peer} against blended pairs", ""]
+    lines += ["| series | Gaussians | blended pairs | forward ms | fwd + bwd ms |"]
+    lines += ["| --- | ---: | ---: | ---: | ---: |"]
+    for point in points:
+        times = [
+            "–" if (seconds := point.seconds(kind)) is None else f"{1e3 * seconds:.2f}"
+            for kind in KINDS
+        ]
+        lines.append(
+            f"| {point.series} | {point.gaussians:,} | {point.pairs:.2e} | {' | '.join(times)} |"
+        )
+    upper = slopes(points, STEEP)
+    lines += ["", f"Slope over all points, and over those above {STEEP:.0e} pairs:", ""]
+    lines += [f"- {name}: {value:.2f}, {upper[name]:.2f}" for name, value in slopes(points).items()]
+    return "\n".join(lines) + "\n"
