@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 import tyro
 
 from diff4splat.cli.convert import Convert
+from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.paths import ListPaths, PreviewPath
@@ -25,6 +26,7 @@ Command = (
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]
+    | Annotated[Doctor, subcommand("doctor")]
 )
 BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 2, 130, 141
 

@@ -37,9 +37,10 @@ class Render:
     def run(self) -> None:
         """Load, choose cameras and times, render, write."""
         from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.cli.renderer import left_out, prepare_renderer
         from diff4splat.io.scene_file import load_scene
         from diff4splat.report.run_log import RunLog
-        from diff4splat.report.scene_folder import write_view
+        from diff4splat.report.scene_folder import VIEW_SUFFIXES, write_view
 
         if self.time is not None and not math.isfinite(self.time):
             raise ConfigError(f"--time: expected seconds, got {self.time:g}")
@@ -50,7 +51,12 @@ class Render:
         path = self.chosen_path(scene)
         if self.out.suffix.lower() == ".png":
             path = one_pose(path, self.frame)
-        write_view(scene, path, self.out, self.time, RunLog(phases=ConsolePhases()))
+        log = RunLog(phases=ConsolePhases())
+        if self.out.suffix.lower() in VIEW_SUFFIXES:  # others are refused, and at once
+            prepare_renderer(scene.gaussians, log.phases)
+        if dropped := left_out(scene, float(path.times_s[0]) if self.time is None else self.time):
+            note(dropped)
+        write_view(scene, path, self.out, self.time, log)
         note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
 
     def chosen_path(self, scene: "Scene") -> "CameraPath":

@@ -5,7 +5,6 @@ Axes: ``h w`` pixels, ``t`` frames. Times are seconds.
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import fields, replace
-from functools import partial
 
 import torch
 from jaxtyping import Float
@@ -22,6 +21,7 @@ from diff4splat.render.settings import (
     require_outputs,
     stack_outputs,
 )
+from diff4splat.render.support import usable_gaussians
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
@@ -52,7 +52,7 @@ def render(
             features without values.
         ShapeError: cameras with more than one batch axis, another number of times or features,
             half precision, or mixed dtypes or devices.
-        InputError: a camera with NaN, infinity or a focal length of 0 or less.
+        InputError: a camera with NaN, infinity or a focal length of 0 or less, or such features.
     """
     wanted = _require_sources(require_outputs(outputs), settings)
     if camera.batch_shape == () and not isinstance(time_s, Tensor):
@@ -121,8 +121,8 @@ def render_video(
 ) -> Iterator[RenderOutput]:
     """One ``RenderOutput`` per pose of ``path``, made when it is asked for; memory holds one frame.
 
-    ``advance`` is called after each frame. Unless the settings say where to, flow runs to the next
-    frame; the last one has none to run to, so its flow is 0.
+    ``advance`` is called when a frame is done. Unless the settings say where to, flow runs to the
+    next frame; the last one has none to run to, so its flow is 0.
 
     Raises:
         ConfigError: an unknown output.
@@ -130,14 +130,26 @@ def render_video(
     wanted = require_outputs(outputs)
     if "flow" not in wanted:
         _require_sources(wanted, settings)
+    return _frames(scene, path, wanted, settings, backend, advance)
+
+
+def _frames(
+    scene: Scene,
+    path: CameraPath,
+    outputs: frozenset[str],
+    settings: RenderSettings,
+    backend: str,
+    advance: Callable[[], None],
+) -> Iterator[RenderOutput]:
     times_s, last = path.times_s.tolist(), len(path) - 1
-    to_next = "flow" in wanted and settings.flow_camera is None and settings.flow_time_s is None
+    to_next = "flow" in outputs and settings.flow_camera is None and settings.flow_time_s is None
     # A scene that stands still needs no state per frame.
     subject = scene.gaussians if isinstance(scene.motion, StaticMotion) else scene
-    first = partial(_job, subject, path.cameras[0], times_s[0], wanted, settings)
-    shared = None if "flow" in wanted or last == 0 else _shared(scene, first(), backend)
-
-    def frame(index: int) -> RenderOutput:
+    shared = None
+    if last > 0 and "flow" not in outputs:
+        first = _job(subject, path.cameras[0], times_s[0], outputs, settings)
+        shared = _shared(scene, first, backend)
+    for index in range(last + 1):
         camera, own = path.cameras[index], settings
         if to_next:
             following = min(index + 1, last)
@@ -148,12 +160,10 @@ def render_video(
             picture = shared(camera, times_s[index])
         else:
             picture = render(
-                subject, camera, times_s[index], outputs=wanted, settings=own, backend=backend
+                subject, camera, times_s[index], outputs=outputs, settings=own, backend=backend
             )
         advance()
-        return picture
-
-    return map(frame, range(len(path)))
+        yield picture
 
 
 def _require_sources(outputs: frozenset[str], settings: RenderSettings) -> frozenset[str]:
@@ -176,6 +186,13 @@ def _matching(settings: RenderSettings, gaussians: Gaussians) -> RenderSettings:
         raise ShapeError(
             f"settings.features: expected ({len(gaussians)}, channels), got {tuple(features.shape)}"
         )
+    finite = torch.isfinite(features)
+    if not bool(finite.all()):
+        # Gaussians that are left out anyway may have any features.
+        usable, _ = usable_gaussians(gaussians)
+        if not bool(finite[usable].all()):
+            raise InputError("settings.features: expected finite numbers, got NaN or infinity")
+        features = torch.where(finite, features, 0.0)
     return replace(settings, features=features.to(gaussians.means))
 
 

@@ -3,6 +3,7 @@
 To add one, write the module and name it here; nothing is imported before it is asked for.
 """
 
+import warnings
 from importlib import import_module
 from typing import Protocol, cast, runtime_checkable
 
@@ -41,13 +42,27 @@ def choose(name: str, job: RenderJob) -> Backend:
         ConfigError: the name is unknown, or the back end refuses.
     """
     if name == "auto":
-        return next(found for found in map(_load, BACKENDS) if found.refusal(job) is None)
+        return _first(job)
     if name not in BACKENDS:
         raise ConfigError(f"backend: expected auto, {', '.join(BACKENDS)}, got {name!r}")
     found = _load(name)
     reason = found.refusal(job)
     if reason is not None:
         raise ConfigError(f"backend {name!r}: {reason}; use backend='auto'")
+    return found
+
+
+def _first(job: RenderJob) -> Backend:
+    """The preferred one of those that do not refuse; says why it is a slow one on a GPU."""
+    reasons = []
+    for name in BACKENDS:
+        found = _load(name)
+        reason = found.refusal(job)
+        if reason is None:
+            break
+        reasons.append(f"{name}: {reason}")
+    if job.gaussians.means.is_cuda and name == "reference" and reasons:
+        warnings.warn(f"rendering with the slow reference; {reasons[0]}", stacklevel=4)
     return found
 
 

@@ -38,12 +38,14 @@ def name_outputs(
     dropped: dict[str, int],
 ) -> RenderOutput:
     """The pictures asked for, with the background behind the colours."""
-    widths = {"rgb": 3, "depth": 2, "flow": 3, "features": blended.shape[-1]}
-    parts, start = dict.fromkeys(widths), 0
+    widths = {"rgb": 3, "depth": 2, "flow": 3}
+    parts, start = dict.fromkeys((*widths, "features")), 0
     for name, width in widths.items():
         if name in job.outputs:
             parts[name] = blended[..., start : start + width]
             start += width
+    if "features" in job.outputs:
+        parts["features"] = blended[..., start:]
     return RenderOutput(
         rgb=None if parts["rgb"] is None else _over_background(job, parts["rgb"], light),
         depth=None if parts["depth"] is None else _average(parts["depth"])[..., 0],

@@ -1,6 +1,6 @@
 """The knobs that come with the library; other packages register theirs beside them."""
 
-from diff4splat.report import flow_knobs, scene_knobs
+from diff4splat.report import flow_knobs, render_knobs, scene_knobs
 from diff4splat.report.knobs import Knob, KnobRegistry
 
 _BUILDERS = (
@@ -10,6 +10,11 @@ _BUILDERS = (
     flow_knobs.guidance_knob,
     scene_knobs.pruning_knob,
     scene_knobs.harmonics_knob,
+    render_knobs.tile_knob,
+    render_knobs.support_knob,
+    render_knobs.light_knob,
+    render_knobs.dilation_knob,
+    render_knobs.precision_knob,
 )
 
 

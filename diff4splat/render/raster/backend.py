@@ -1,4 +1,4 @@
-"""The back end ``raster``: float32 on CPUs, compiled on first use; about fifty times the reference.
+"""The back end ``raster``: float32 on CPUs, compiled on first use.
 
 Axes: ``n`` Gaussians, ``h w`` pixels, ``c`` channels.
 """
@@ -53,9 +53,9 @@ def render(job: RenderJob) -> RenderOutput:
 
     ensure_compiled()
     medians = "median_depth" in job.outputs
-    plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians)
     with torch.autocast("cpu", enabled=False):
         depth, extras = _depth_and_extras(job)
+        plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, extras.shape[1])
         made = rasterize(plan, job.gaussians, extras, job.camera)
         median_depth = _median_depth(depth, made.medians[0]) if medians else None
         return _named(job, made, median_depth)
@@ -74,8 +74,9 @@ def open_sequence(scene: Scene, job: RenderJob) -> Callable[[Camera, float], Ren
 
     ensure_compiled()
     medians = "median_depth" in job.outputs
-    plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians)
-    sequence = Sequence(scene, plan, "depth" in job.outputs)
+    depths = "depth" in job.outputs
+    plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, 2 if depths else 0)
+    sequence = Sequence(scene, plan, depths)
 
     def draw(camera: Camera, time_s: float) -> RenderOutput:
         view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
@@ -117,12 +118,12 @@ def _depth_and_extras(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor
 
 
 def _centers(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 2"]]:
-    """Z and pixel of the means; 1 and the origin for those that nothing can see or square."""
+    """Z and pixel of the means; any finite numbers for those that are not drawn."""
     means = job.gaussians.means
     local = camera_space(job.camera, torch.where(means.abs() < _LARGEST, means, 0.0))
-    seen = local[:, 2:] > job.settings.near_depth
-    local = torch.where(seen, local, 1.0)
-    return local[:, 2], to_pixels(job.camera, local)
+    # Who is near is decided in float64 by the kernel; here only the division shall be finite.
+    z = local[:, 2:].clamp_min(0.5 * job.settings.near_depth)
+    return z[:, 0], to_pixels(job.camera, torch.cat([local[:, :2], z], 1))
 
 
 def _median_depth(

@@ -16,7 +16,7 @@ from diff4splat.render.raster.forward import (
     Binned,
     Filled,
     Footprints,
-    fill,
+    fill_region,
     numbered,
     tiles_of,
 )
@@ -57,7 +57,7 @@ def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradi
     moments = np.zeros((len(sh), MOMENTS), np.float32)
     value_grads = np.zeros(drawn.values.shape, np.float32)
     for region in drawn.binned.regions:
-        filled = drawn.filled or fill(drawn.found, drawn.plan.grid, drawn.binned, region)
+        filled = drawn.filled or fill_region(drawn.found, drawn.plan.grid, drawn.binned, region)
         _blend_backward(drawn, filled, incoming, moments, value_grads)
     grads = Cloud(*(np.zeros(array.shape, np.float32) for array in cloud))
     sh_grads = np.zeros(sh.shape, np.float32)

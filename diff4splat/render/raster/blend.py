@@ -12,8 +12,9 @@ sixteen lanes), so that it stays in the first-level cache and every access is on
 
 import numpy as np
 
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.render.raster.jit import device, exact, kernel
 from diff4splat.render.raster.lanes import (
+    LANES,
     any_of,
     count,
     exp2,
@@ -24,6 +25,8 @@ from diff4splat.render.raster.lanes import (
     select,
 )
 from diff4splat.render.raster.memory import (
+    BLOCK_COLUMNS,
+    BLOCK_ROWS,
     aligned_floats,
     block_columns,
     block_rows,
@@ -42,9 +45,7 @@ from diff4splat.render.raster.tables import (
 )
 from diff4splat.render.raster.tiles import pixel_box
 
-LANES = 16
-COLUMN_SHIFT, ROW_SHIFT = 3, 1
-"""A block is 8 columns by 2 rows."""
+COLUMN_SHIFT, ROW_SHIFT = BLOCK_COLUMNS.bit_length() - 1, BLOCK_ROWS.bit_length() - 1
 FIXED = 3
 """Channels that are always there; any further ones are looped over."""
 _AHEAD = 8
@@ -116,7 +117,7 @@ def _add(state, tile, grid, prints, values, i, rules, rank, median):
     size, stopped = plane_stride(grid), 0
     step = fill(2 * prints[i, WHITEN_Y])
     for column in range(x0, x1 + 1):
-        exponent_at_v0, v, _ = start_column(prints, i, left, top, column, y0)
+        exponent_at_v0, _, v = start_column(prints, i, left, top, column, y0)
         for block_row in range(y0, y1 + 1):
             place = (column * (grid.edge >> ROW_SHIFT) + block_row) * LANES
             light = load(state, place)
@@ -146,9 +147,9 @@ def _add(state, tile, grid, prints, values, i, rules, rank, median):
     return stopped
 
 
-@device
+@exact
 def start_column(prints, i, left, top, column, block_row):
-    """log2 o - u² of a column of blocks, v of its block in ``block_row``, and dx of its first lane.
+    """log2 o - u² of a column of blocks, u, and v of its block in ``block_row``.
 
     Offsets are taken in float64: they may be a million pixels long.
     """
@@ -156,8 +157,8 @@ def start_column(prints, i, left, top, column, block_row):
     dy = top + (block_row << ROW_SHIFT) + 0.5 - prints[i, CENTER_Y]
     a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
     u = fma(block_columns(), a, fill(dx * a))
-    v = fma(block_rows(), b, fill(dy * b - dx * k)) - block_columns() * fill(k)
-    return less_product(prints[i, LOG2_OPACITY], u, u), v, dx
+    v = less_product(fma(block_rows(), b, fill(dy * b - dx * k)), block_columns(), k)
+    return less_product(prints[i, LOG2_OPACITY], u, u), u, v
 
 
 @device
@@ -189,7 +190,7 @@ def _finish_median(state, tile, grid, members, first, median):
     for pixel in range(grid.edge * grid.edge):
         x, y = block_corner(pixel // LANES, grid)
         lane = pixel % LANES
-        to = (top + y + (lane >> COLUMN_SHIFT)) * pitch + left + x + (lane & 7)
+        to = (top + y + (lane >> COLUMN_SHIFT)) * pitch + left + x + lane % BLOCK_COLUMNS
         rank = np.int64(state[2 * size + pixel])
         median[to] = members[first + rank] if rank >= 0 else -1
 

@@ -8,14 +8,13 @@ times its gradient:
 T is recovered by dividing by (1 - α), never below 1 - α_max. Every pair (tile, Gaussian) has its
 own slot, and slots of one Gaussian are neighbours, so the sums are taken in one order whatever the
 threads do. The exponent is e = log2 o - u² - v², and lanes collect ∂/∂ln α times 1, v and v² down a
-column of blocks before they are weighted with dx, which is the same for all of them.
+column of blocks before they are weighted with u, which is the same for all of them.
 """
 
 import numpy as np
 
 from diff4splat.render.raster.blend import (
     FIXED,
-    LANES,
     ROW_SHIFT,
     block_corner,
     blocks_in_tile,
@@ -25,6 +24,7 @@ from diff4splat.render.raster.blend import (
 )
 from diff4splat.render.raster.jit import device, kernel
 from diff4splat.render.raster.lanes import (
+    LANES,
     any_of,
     exp2,
     fill,
@@ -37,7 +37,6 @@ from diff4splat.render.raster.lanes import (
 )
 from diff4splat.render.raster.memory import (
     aligned_floats,
-    block_columns,
     load,
     load_block,
     prefetch,
@@ -114,12 +113,12 @@ def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, sl
     size = plane_stride(grid)
     step = fill(2 * prints[i, WHITEN_Y])
     none = fill(0.0)
-    e, ex, exx, ev, evx, evv = none, none, none, none, none, none
+    e, eu, euu, ev, euv, evv = none, none, none, none, none, none
     to_red, to_green, to_blue = none, none, none
     for channel in range(FIXED, values.shape[1]):
         store(sums, channel * LANES, none)
     for column in range(x0, x1 + 1):
-        exponent_at_v0, v, dx = start_column(prints, i, left, top, column, y0)
+        exponent_at_v0, u, v = start_column(prints, i, left, top, column, y0)
         moment0, moment1, moment2 = none, none, none
         for block_row in range(y0, y1 + 1):
             place = (column * (grid.edge >> ROW_SHIFT) + block_row) * LANES
@@ -154,14 +153,9 @@ def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, sl
                 moment1 = fma(to_log, v, moment1)
                 moment2 = fma(to_log * v, v, moment2)
             v = v + step
-        x = block_columns() + fill(dx)
         e, ev, evv = e + moment0, ev + moment1, evv + moment2
-        ex, exx, evx = (
-            fma(moment0, x, ex),
-            fma(moment0 * x, x, exx),
-            fma(moment1, x, evx),
-        )
-    moments = totals(e, ex, exx, ev, evx, evv, to_red, to_green)
+        eu, euu, euv = fma(moment0, u, eu), fma(moment0 * u, u, euu), fma(moment1, u, euv)
+    moments = totals(e, eu, euu, ev, euv, evv, to_red, to_green)
     store_eight(slots, slot * slots.shape[1], moments)
     slots[slot, MOMENTS + 2] = total(to_blue)
     for channel in range(FIXED, values.shape[1]):
@@ -176,9 +170,16 @@ def sum_slots(first, last, order, first_slots, slots, moments, value_grads):
         ahead = order[min(rank + _AHEAD, last - 1)]
         prefetch(moments, ahead)
         prefetch(value_grads, ahead)
-        index = order[rank]
-        for slot in range(first_slots[rank], first_slots[rank + 1]):
-            for column in range(MOMENTS):
-                moments[index, column] += slots[slot, column]
-            for channel in range(value_grads.shape[1]):
-                value_grads[index, channel] += slots[slot, MOMENTS + channel]
+        index, start, stop = order[rank], first_slots[rank], first_slots[rank + 1]
+        for column in range(MOMENTS):
+            moments[index, column] += _column_sum(slots, column, start, stop)
+        for channel in range(value_grads.shape[1]):
+            value_grads[index, channel] += _column_sum(slots, MOMENTS + channel, start, stop)
+
+
+@device
+def _column_sum(slots, column, start, stop):
+    total_so_far = 0.0
+    for slot in range(start, stop):
+        total_so_far += slots[slot, column]
+    return np.float32(total_so_far)

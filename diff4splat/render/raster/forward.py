@@ -129,7 +129,7 @@ def bin_footprints(found: Footprints, plan: Plan) -> Binned:
     return Binned(counts=counts, regions=list(regions))
 
 
-def fill(found: Footprints, grid: Grid, binned: Binned, region: Region) -> Filled:
+def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -> Filled:
     """The lists of the tiles in ``region``."""
     top, bottom, left, right = region
     cursors = np.zeros((len(binned.counts), grid.rows, grid.columns), np.int64)

@@ -10,7 +10,6 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int32
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from diff4splat.geometry.camera import Camera
 from diff4splat.render.raster import forward as stages
@@ -52,7 +51,13 @@ def rasterize(
         camera.focal_px,
         camera.center_px,
     )
-    return Raster(planes=planes, light=light, medians=medians, unusable=tuple(unusable))
+    grid, used = plan.grid, (3 if plan.colors else 0) + extras.shape[1]
+    return Raster(
+        planes=planes[:used, : grid.height, : grid.width],
+        light=light[0, : grid.height, : grid.width],
+        medians=medians[:, : grid.height, : grid.width],
+        unusable=tuple(unusable),
+    )
 
 
 class _Rasterize(torch.autograd.Function):
@@ -66,7 +71,7 @@ class _Rasterize(torch.autograd.Function):
         canvas = Canvas(plan.grid, values.shape[1], plan.medians)
         binned = stages.bin_footprints(found, plan)
         for region in binned.regions:
-            filled = stages.fill(found, plan.grid, binned, region)
+            filled = stages.fill_region(found, plan.grid, binned, region)
             stages.blend_region(plan, filled, found, values, canvas)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
@@ -75,16 +80,21 @@ class _Rasterize(torch.autograd.Function):
                 plan=plan, view=view, found=found, values=values, canvas=canvas, binned=binned,
                 filled=kept,
             )  # fmt: skip
-        medians = canvas.pictures(canvas.medians)
+        medians = canvas.whole(canvas.medians)
         ctx.mark_non_differentiable(medians)
-        used = (3 if plan.colors else 0) + extras.shape[1]
-        return canvas.pictures(canvas.planes)[:used], canvas.pictures(canvas.light)[0], medians
+        # Whole planes, because views of several results could not be changed in place.
+        return canvas.whole(canvas.planes), canvas.whole(canvas.light), medians
 
     @staticmethod
-    @once_differentiable
     def backward(ctx: Any, planes: Tensor, light: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:
+        if torch.is_grad_enabled():
+            raise RuntimeError(
+                "raster: expected create_graph=False, got True; use backend='reference' to "
+                "differentiate twice"
+            )
         cloud, sh, extras, pose, *_ = _unpack(ctx.saved_tensors)
-        made = gradients(ctx.drawn, cloud, sh, ctx.drawn.canvas.padded(planes, light))
+        incoming = torch.cat([planes.flatten(), light.flatten()]).numpy()
+        made = gradients(ctx.drawn, cloud, sh, incoming)
         start = 3 if ctx.drawn.plan.colors else 0
         camera = torch.from_numpy(made.camera).to(pose)
         to_pose = torch.zeros_like(pose)

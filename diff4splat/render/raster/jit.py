@@ -7,11 +7,14 @@ contracted to fused ones; nothing else is reordered, so equal inputs give equal 
 import hashlib
 import inspect
 import os
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
+import numba
 from numba import config, njit
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
@@ -27,7 +30,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     try:
         config.CACHE_DIR = str(cache_folder())
         compiled = njit(cache=True, **_OPTIONS)(bare)
-    except RuntimeError:
+    except (OSError, RuntimeError):
         # No folder to write to: every process compiles for itself.
         compiled = njit(**_OPTIONS)(bare)
     finally:
@@ -44,19 +47,34 @@ def device(function: Callable[..., Any]) -> Any:
     return njit(forceinline=True, **_OPTIONS)(inspect.unwrap(function))
 
 
+def exact(function: Callable[..., Any]) -> Any:
+    """As ``device``, without fused operations: kernels that must decide alike share it."""
+    options = {name: value for name, value in _OPTIONS.items() if name != "fastmath"}
+    return njit(forceinline=True, **options)(inspect.unwrap(function))
+
+
 @cache
 def cache_folder() -> Path:
     """Where compiled kernels are kept: under ``NUMBA_CACHE_DIR``, or the user's cache.
 
-    Its name is a digest of all sources here. Numba by itself notices a change of the file that
-    holds a kernel, and not of the functions that the kernel takes from other files.
+    Its name is a digest of all sources here, of Numba, Python and the processor. Numba by itself
+    notices a change of the file that holds a kernel, and not of the functions that the kernel takes
+    from other files.
+
+    Raises:
+        OSError: it cannot be made or written to.
     """
-    digest = hashlib.sha256()
+    machine = (numba.__version__, sys.version_info[:2], llvmlite.binding.get_host_cpu_name())
+    digest = hashlib.sha256(repr(machine).encode())
     for file in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(file.read_bytes())
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     base = os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "diff4splat" / "kernels"
-    return Path(base) / digest.hexdigest()[:16]
+    folder = Path(base) / digest.hexdigest()[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(f"{folder}: expected a folder to write to")
+    return folder
 
 
 def is_ready(compiled: Any) -> bool:

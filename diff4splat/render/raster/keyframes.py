@@ -45,9 +45,9 @@ def keys_of(motion: KeyframeMotion) -> Keys:
     """Arrays of a motion."""
     return Keys(
         motion.moving_index.detach().int().contiguous().numpy(),
-        motion.offsets.detach().contiguous().numpy(),
-        motion.rotations.detach().contiguous().numpy(),
-        motion.log_scale_offsets.detach().contiguous().numpy(),
+        motion.offsets.detach().float().contiguous().numpy(),
+        motion.rotations.detach().float().contiguous().numpy(),
+        motion.log_scale_offsets.detach().float().contiguous().numpy(),
     )
 
 

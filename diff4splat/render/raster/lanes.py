@@ -93,9 +93,9 @@ def _teach(symbol: Any, result: types.Type, emit: Callable[..., Any]) -> None:
     lower_builtin(symbol, types.Float, LanesType)(lower)
 
 
-_teach(operator.add, lanes, lambda b, x, y: b.fadd(x, y, flags=("contract",)))
-_teach(operator.sub, lanes, lambda b, x, y: b.fsub(x, y, flags=("contract",)))
-_teach(operator.mul, lanes, lambda b, x, y: b.fmul(x, y, flags=("contract",)))
+_teach(operator.add, lanes, lambda b, x, y: b.fadd(x, y))
+_teach(operator.sub, lanes, lambda b, x, y: b.fsub(x, y))
+_teach(operator.mul, lanes, lambda b, x, y: b.fmul(x, y))
 _teach(operator.truediv, lanes, lambda b, x, y: b.fdiv(x, y))
 _teach(operator.lt, mask, lambda b, x, y: b.fcmp_ordered("<", x, y))
 _teach(operator.le, mask, lambda b, x, y: b.fcmp_ordered("<=", x, y))

@@ -14,7 +14,12 @@ TILE_SIZES_PX = (8, 16, 32, 64)
 DEFAULT_TILE_PX = 32
 DEFAULT_LIGHT_CUTOFF = 1e-6
 """Divided by 1 - alpha_max it bounds what gradients lose: a thousandth."""
-_BYTES_PER_PAIR = 64
+_BYTES_PER_PAIR, _BYTES_PER_CHANNEL = 64, 4
+_MOST_PAIRS = (1 << 31) - 1
+_LEAST_EXPONENT = -125.0
+"""Smaller powers of 2 are no normal numbers in float32."""
+_LARGEST_ALPHA = 1 - 2.0**-24
+"""In float32; light is divided by 1 - alpha on the way back."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,21 +35,25 @@ class Plan:
     """How many pairs (tile, Gaussian) may be kept at once."""
 
 
-def make_plan(camera: Camera, settings: RenderSettings, colors: bool, medians: bool) -> Plan:
-    """The plan of a picture of ``camera``'s size."""
+def make_plan(
+    camera: Camera, settings: RenderSettings, colors: bool, medians: bool, extras: int = 0
+) -> Plan:
+    """The plan of a picture of ``camera``'s size, with ``extras`` channels beside the colours."""
+    bytes_per_pair = _BYTES_PER_PAIR + _BYTES_PER_CHANNEL * extras
     return Plan(
         grid=_grid(camera.size_px, settings.tile_px or DEFAULT_TILE_PX),
+        # Whole numbers would compile every kernel again.
         rules=Rules(
-            dilation_px2=settings.dilation_px2,
-            antialias=settings.antialias,
-            log2_cutoff=math.log2(settings.alpha_cutoff),
-            alpha_max=settings.alpha_max,
-            light_cutoff=settings.light_cutoff or DEFAULT_LIGHT_CUTOFF,
-            near_depth=settings.near_depth,
+            dilation_px2=float(settings.dilation_px2),
+            antialias=bool(settings.antialias),
+            log2_cutoff=max(math.log2(settings.alpha_cutoff), _LEAST_EXPONENT),
+            alpha_max=min(float(settings.alpha_max), _LARGEST_ALPHA),
+            light_cutoff=float(settings.light_cutoff or DEFAULT_LIGHT_CUTOFF),
+            near_depth=float(settings.near_depth),
         ),
         colors=colors,
         medians=medians,
-        pair_limit=settings.memory_bytes // _BYTES_PER_PAIR,
+        pair_limit=min(settings.memory_bytes // bytes_per_pair, _MOST_PAIRS),
     )
 
 

@@ -65,14 +65,14 @@ def _one(index, cloud, view, rules, prints, sums, grads, camera):
 def _shape_gradient(prints, sums, i):
     """Gradients of the first six columns of a footprint, from the moments of its pixels."""
     a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
-    e, ex, exx = np.float64(sums[i, 0]), np.float64(sums[i, 1]), np.float64(sums[i, 2])
-    ev, evx, evv = np.float64(sums[i, 3]), np.float64(sums[i, 4]), np.float64(sums[i, 5])
+    e, eu, euu = np.float64(sums[i, 0]), np.float64(sums[i, 1]), np.float64(sums[i, 2])
+    ev, euv, evv = np.float64(sums[i, 3]), np.float64(sums[i, 4]), np.float64(sums[i, 5])
     return (
-        2 * LN2 * (a * a * ex - k * ev),
+        2 * LN2 * (a * eu - k * ev),
         2 * LN2 * b * ev,
-        -2 * LN2 * a * exx,
-        2 * LN2 * evx,
-        -2 * LN2 * (evv + k * evx) / b,
+        -2 * LN2 * euu / a,
+        2 * LN2 * euv / a,
+        -2 * LN2 * (evv + k * euv / a) / b,
         LN2 * e,
     )
 

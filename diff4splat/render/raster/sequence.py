@@ -5,7 +5,7 @@
 - While the camera stands, only tiles that something moving touches, or touched before, are blended.
 - The large arrays live as long as the sequence.
 
-Pictures are those of ``render``, without gradients.
+Pictures are those of ``render`` without gradients, up to the rounding of states to float32.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,8 @@ class _Still:
     order: Integers
     unusable: NDArray[np.int64]
     lists: Lists | None = None
-    """Made when the camera is used again; None also while they would not fit."""
+    """Made when the camera is used again; None while they are not made or do not fit."""
+    too_large: bool = False
 
 
 class Sequence:
@@ -85,15 +86,17 @@ class Sequence:
             self._see_still(view)
             self._stale[:] = True
         order, unusable = self._see_moving(view, time_s)
-        if same_camera and self._bin_still():
-            self._draw_stale(order, rows)
-        else:
-            self._draw_all(order)
+        tiles_in_rows = self._tiles_in(rows if same_camera else None)
+        if not (same_camera and self._bin_still() and self._draw_stale(order, tiles_in_rows)):
+            self._draw_all(order, tiles_in_rows)
         return self._picture(unusable + self._still.unusable)
 
     def _see_still(self, view: View) -> None:
         """Project, sort and colour what does not move."""
-        unusable, numbers = np.zeros(SH + 1, np.int64), self._sh.reshape(len(self._sh), -1)
+        unusable, numbers = (
+            np.zeros(SH + 1, np.int64),
+            self._sh.reshape(len(self._sh), self._sh.shape[1] * 3),
+        )
         index, rules = self._still_index, self._plan.rules
 
         def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
@@ -131,41 +134,56 @@ class Sequence:
 
     def _bin_still(self) -> bool:
         """Whether there are lists of what stands still; made when a camera is used again."""
-        if self._still.lists is None:
-            found = self._footprints(self._still.order)
+        still = self._still
+        if still.lists is None and not still.too_large:
+            found = self._footprints(still.order)
             binned = stages.bin_footprints(found, self._plan)
-            if len(binned.regions) == 1:
-                filled = stages.fill(found, self._plan.grid, binned, binned.regions[0])
-                self._still.lists = filled.lists
-        return self._still.lists is not None
+            still.too_large = len(binned.regions) > 1
+            if not still.too_large:
+                region = binned.regions[0]
+                still.lists = stages.fill_region(found, self._plan.grid, binned, region).lists
+        return not still.too_large
 
-    def _draw_all(self, moving: Integers) -> None:
-        """Blend every tile."""
+    def _draw_all(self, moving: Integers, wanted: NDArray[np.bool_]) -> None:
+        """Blend every tile that is ``wanted``, from lists of everything, region by region."""
         order = np.empty(len(self._still.order) + len(moving), np.int32)
         merge_orders(self._still.order, moving, self._depth, order)
         found = self._footprints(order)
         binned = stages.bin_footprints(found, self._plan)
         for region in binned.regions:
-            filled = stages.fill(found, self._plan.grid, binned, region)
-            stages.blend_region(self._plan, filled, found, self._values, self._canvas)
+            lists = stages.fill_region(found, self._plan.grid, binned, region).lists
+            tiles = stages.tiles_of(region, self._plan.grid)
+            tiles = tiles[wanted[tiles]]
+            stages.blend_tiles(self._plan, tiles, lists, self._prints, self._values, self._canvas)
 
-    def _draw_stale(self, moving: Integers, rows: tuple[int, int] | None) -> None:
-        """Blend the tiles that show, or are to show, something that moves."""
+    def _draw_stale(self, moving: Integers, wanted: NDArray[np.bool_]) -> bool:
+        """Blend the ``wanted`` tiles that show, or are to show, something that moves.
+
+        False, and nothing done, where their lists would not fit.
+        """
         found, grid = self._footprints(moving), self._plan.grid
-        whole = (0, grid.rows, 0, grid.columns)
-        lists = stages.fill(found, grid, stages.bin_footprints(found, self._plan), whole).lists
+        binned = stages.bin_footprints(found, self._plan)
+        if len(binned.regions) > 1:
+            return False
+        lists = stages.fill_region(found, grid, binned, binned.regions[0]).lists
         touched = np.diff(lists.starts) > 0
         self._stale |= touched
-        drawn = self._stale & self._tiles_in(rows)
-        tiles = np.flatnonzero(drawn)
-        merged = self._merged_lists(lists, drawn, tiles)
+        tiles = np.flatnonzero(self._stale & wanted)
+        merged = self._merged_lists(lists, tiles)
+        if merged is None:
+            return False
         stages.blend_tiles(self._plan, tiles, merged, self._prints, self._values, self._canvas)
         self._stale[tiles] = touched[tiles]
+        return True
 
-    def _merged_lists(self, moving: Lists, drawn: NDArray[np.bool_], tiles: np.ndarray) -> Lists:
+    def _merged_lists(self, moving: Lists, tiles: NDArray[np.int64]) -> Lists | None:
+        """Lists of some tiles, or None where they are more than may be kept."""
         still = self._still.lists
-        sizes = (np.diff(still.starts) + np.diff(moving.starts)) * drawn
+        sizes = np.zeros(len(still.starts) - 1, np.int64)
+        sizes[tiles] = (np.diff(still.starts) + np.diff(moving.starts))[tiles]
         starts = np.concatenate([[0], sizes.cumsum()])
+        if starts[-1] > self._plan.pair_limit:
+            return None
         members = empty(int(starts[-1]), dtype=torch.int32)
         merged = Lists(starts, members, members[:0])
 

@@ -19,8 +19,8 @@ Integers = NDArray[np.int32]
 CENTER_X, CENTER_Y, WHITEN_X, SHEAR, WHITEN_Y, LOG2_OPACITY, EXTENT_X, EXTENT_Y = range(8)
 """Columns of a footprint; the extents are half the size, in pixels, of the box around it."""
 MOMENTS = 6
-"""Sums over pixels of ∂/∂ln α times (1, dx, dx², v, v dx, v²): what the gradients of the first six
-columns of a footprint are made of."""
+"""Sums over pixels of ∂/∂ln α times (1, u, u², v, u v, v²): what the gradients of the first six
+columns of a footprint are made of. Unlike dx, u stays small however far the centre is."""
 
 
 class Cloud(NamedTuple):

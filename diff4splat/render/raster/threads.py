@@ -6,7 +6,7 @@ parts never depend on the number of threads, so neither does any result.
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from threading import Lock
 
@@ -14,28 +14,35 @@ import torch
 
 
 def spread(work: Callable[..., None], parts: Iterable[tuple]) -> None:
-    """Call ``work(*part)`` for every part; returns when all are done.
+    """Call ``work(*part)`` for every part; returns when no thread works any more.
+
+    ``work`` must not call it again: all threads might wait for each other.
 
     Raises:
-        Exception: what any of the calls raised.
+        Exception: what any of the calls raised; parts that nobody has begun are left out then.
     """
-    waiting, lock = iter(parts), Lock()
+    waiting, lock = list(parts)[::-1], Lock()
 
     def take() -> None:
         while True:
             with lock:
-                part = next(waiting, None)
-            if part is None:
-                return
+                if not waiting:
+                    return
+                part = waiting.pop()
             work(*part)
 
-    helpers = torch.get_num_threads() - 1
+    helpers = min(torch.get_num_threads(), len(waiting)) - 1
     running = [_pool(helpers, os.getpid()).submit(take) for _ in range(helpers)]
     try:
         take()
     finally:
-        for helper in running:
-            helper.result()
+        with lock:
+            waiting.clear()
+        # Those that are queued behind another picture have nothing left to do.
+        started = [helper for helper in running if not helper.cancel()]
+        wait(started)
+    for helper in started:
+        helper.result()
 
 
 @cache

@@ -7,7 +7,9 @@ forwards and backwards with everything that can be asked for, calls each of them
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
+from threading import Lock
 from typing import Any
 
 import torch
@@ -26,6 +28,8 @@ from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.scene import Provenance, Scene
 
+_ONE_AT_A_TIME = Lock()
+
 
 def is_ready() -> bool:
     """Whether every kernel was compiled before, in this process or on this machine."""
@@ -40,24 +44,35 @@ def kernel_count() -> int:
 def warm(advance: Callable[[str], None] = lambda name: None) -> float:
     """Load or compile every kernel; ``advance`` gets the name of each one. Returns the seconds."""
     began = time.perf_counter()
-    with event.install_listener("numba:compile", _Names(advance)):
+    with (
+        event.install_listener("numba:compile", _Names(advance)),
+        torch.inference_mode(False),
+        torch.enable_grad(),
+    ):
         _draw_tiny_scene()
     return time.perf_counter() - began
 
 
-@cache
 def ensure_compiled() -> None:
     """Before the first picture of a process: say so if kernels must be compiled, and do it."""
+    with _ONE_AT_A_TIME:
+        _compile_once()
+
+
+@cache
+def _compile_once() -> None:
     if is_ready():
         return
-    sys.stderr.write("diff4splat: compiling the CPU renderer, once for this machine:")
-    seconds = warm(_show)
-    sys.stderr.write(f"\ndiff4splat: ready after {seconds:.0f} s; later runs load it from disk\n")
+    _show("diff4splat: compiling the CPU renderer, once for this machine:")
+    seconds = warm(lambda name: _show(f" {name}"))
+    _show(f"\ndiff4splat: ready after {seconds:.0f} s; later runs load it from disk\n")
 
 
-def _show(name: str) -> None:
-    sys.stderr.write(f" {name}")
-    sys.stderr.flush()
+def _show(text: str) -> None:
+    # A program without a console has no error stream.
+    if sys.stderr is not None:
+        sys.stderr.write(text)
+        sys.stderr.flush()
 
 
 class _Names(event.Listener):
@@ -81,8 +96,7 @@ def _draw_tiny_scene() -> None:
     gaussians = _gaussian()
     camera = pinhole(8.0, (8, 8))
     plan = make_plan(camera, RenderSettings(), colors=True, medians=True)
-    with torch.enable_grad():
-        rasterize(plan, gaussians, torch.zeros(1, 0), camera).light.sum().backward()
+    rasterize(plan, gaussians, gaussians.means.new_zeros(1, 0), camera).light.sum().backward()
     view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
     for index in (torch.zeros(1, dtype=torch.long), torch.zeros(0, dtype=torch.long)):
         sequence = Sequence(_scene(gaussians, index, camera), plan, depths=True)
@@ -91,7 +105,7 @@ def _draw_tiny_scene() -> None:
 
 
 def _scene(gaussians: Gaussians, moving: Int[Tensor, " m"], camera: Camera) -> Scene:
-    keys = torch.zeros(1, len(moving), 4)
+    keys = gaussians.means.new_zeros(1, len(moving), 4)
     return Scene(
         gaussians=gaussians,
         motion=KeyframeMotion(
@@ -107,10 +121,11 @@ def _scene(gaussians: Gaussians, moving: Int[Tensor, " m"], camera: Camera) -> S
 
 
 def _gaussian() -> Gaussians:
-    return Gaussians(
-        means=torch.tensor([[0.0, 0.0, 1.0]]),
-        quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]]),
-        scales=torch.full((1, 3), 0.1),
-        opacities=torch.full((1,), 0.5, requires_grad=True),
-        sh=torch.zeros(1, 1, 3),
-    )
+    one = Gaussians(
+        means=torch.tensor([[0.0, 0.0, 1.0]], device="cpu"),
+        quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]], device="cpu"),
+        scales=torch.full((1, 3), 0.1, device="cpu"),
+        opacities=torch.full((1,), 0.5, device="cpu"),
+        sh=torch.zeros(1, 1, 3, device="cpu"),
+    ).to(torch.float32)
+    return replace(one, opacities=one.opacities.requires_grad_())

@@ -147,6 +147,30 @@ def test_features_that_do_not_fit_are_refused() -> None:
         render(random_gaussians(COUNT), CAMERA, outputs=("features",), settings=settings)
 
 
+def test_features_that_are_not_finite_are_refused() -> None:
+    features = torch.zeros(COUNT, 2)
+    features[3, 1] = float("nan")
+    with pytest.raises(InputError, match=r"settings\.features: expected finite numbers"):
+        settings = RenderSettings(features=features)
+        render(random_gaussians(COUNT), CAMERA, outputs=("features",), settings=settings)
+
+
+def test_depth_at_the_near_plane_is_that_of_what_is_drawn() -> None:
+    camera = small_camera((6, 7), torch.float32)
+    gaussians = random_gaussians(COUNT, dtype=torch.float32)
+    pose = camera.world_from_camera
+    aside = torch.linspace(50.0, 150.0, COUNT)
+    local = torch.stack([aside, torch.zeros(COUNT), torch.full((COUNT,), 0.0100002)], -1)
+    near = replace(
+        gaussians,
+        means=local @ pose[:3, :3].mT + pose[:3, 3],
+        scales=torch.full((COUNT, 3), 60.0),
+    )
+    made = render(near, camera, outputs=("depth", "alpha"))
+    assert bool((made.alpha > 0).any())
+    assert float(made.depth.max()) < 0.02
+
+
 @pytest.mark.parametrize("backend", ["raster", "reference"])
 def test_a_background_can_be_learnt(backend: str) -> None:
     background = torch.tensor([0.1, 0.2, 0.3], requires_grad=True)

@@ -175,6 +175,47 @@ def test_rows_that_are_left_out_keep_their_time() -> None:
     torch.testing.assert_close(drawn.draw(view, 0.6).planes, whole)
 
 
+def test_rows_do_not_depend_on_the_memory() -> None:
+    scene = scene_with(keyed(torch.arange(COUNT)))
+    wide = replace(scene.gaussians, scales=scene.gaussians.scales + 3.0)
+    many = replace(scene, gaussians=wide.select(torch.arange(COUNT).repeat(60)))
+    pictures = []
+    for memory_bytes in (1 << 20, 256 << 20):
+        settings = RenderSettings(tile_px=8, memory_bytes=memory_bytes)
+        plan = make_plan(CAMERA, settings, colors=True, medians=False)
+        view = make_view(plan.grid, CAMERA.world_from_camera, CAMERA.focal_px, CAMERA.center_px)
+        drawn = Sequence(many, plan, depths=False)
+        for time_s in (0.0, 0.0):
+            drawn.draw(view, time_s)
+        pictures.append(drawn.draw(view, 0.6, rows=(16, 32)).planes)
+    assert torch.equal(*pictures)
+
+
+def test_an_empty_scene() -> None:
+    scene = scene_with(StaticMotion())
+    empty = replace(scene, gaussians=scene.gaussians.select(torch.zeros(0, dtype=torch.long)))
+    frames = list(render_video(empty, empty.path, outputs=OUTPUTS))
+    assert len(frames) == FRAMES
+    assert not any(frame.alpha.any() for frame in frames)
+
+
+def test_gradients_are_a_matter_of_when_a_frame_is_made() -> None:
+    scene = scene_with(keyed(torch.arange(0, COUNT, 3)))
+    scene.motion.offsets.requires_grad_()
+    with torch.no_grad():
+        frames = render_video(scene, scene.path)
+    assert next(frames).rgb.requires_grad
+
+
+def test_keys_in_half_precision() -> None:
+    motion = keyed(torch.arange(0, COUNT, 3))
+    rough = replace(motion, log_scale_offsets=motion.log_scale_offsets.bfloat16())
+    frames = list(render_video(scene_with(rough), scene_with(rough).path))
+    exact = list(render_video(scene_with(motion), scene_with(motion).path))
+    for got, want in zip(frames, exact, strict=True):
+        torch.testing.assert_close(got.rgb, want.rgb, rtol=0, atol=0.1)
+
+
 def test_a_zero_quaternion_is_turned_by_the_motion() -> None:
     scene = scene_with(keyed(torch.arange(COUNT)))
     flat = replace(

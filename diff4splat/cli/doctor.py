@@ -1,0 +1,128 @@
+"""``diff4splat doctor``: what this installation has, whether it works, and what could be added.
+
+The table goes to standard output line by line, so that it tells something however far it gets.
+"""
+
+import os
+import platform
+import re
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from diff4splat.cli import installation
+from diff4splat.errors import Diff4SplatError
+
+EXTRAS = (
+    ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),
+    ("gsplat", "pictures on a GPU", "pip install 'diff4splat[cuda]'"),
+)
+"""(package, what it is for, how to add it)."""
+_WIDTH = 20
+
+Rows = Iterable[tuple[str, str]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check the installation: versions, back ends, extras, and that a picture comes out right."""
+
+    warm: bool = False
+    """Only compile the CPU renderer, which otherwise happens before the first picture."""
+
+    def run(self) -> None:
+        """Print the table, or compile."""
+        if self.warm:
+            warm_up()
+            return
+        print_rows(machine_rows())
+        installation.require_packages()
+        installation.load_libraries()
+        print_rows(torch_rows())
+        print_rows(backend_rows())
+        print_rows(extra_rows())
+        print_rows([("self-test", installation.self_test())])
+
+
+def warm_up() -> None:
+    """Compile the CPU renderer and say how long it took and where the result lies.
+
+    Raises:
+        Diff4SplatError: it cannot run here.
+    """
+    from diff4splat.cli.console import ConsolePhases, note
+    from diff4splat.cli.renderer import COMPILED, compile_renderer
+
+    reason = installation.refusal(COMPILED, "cpu")
+    if reason is not None:
+        raise Diff4SplatError(f"renderer {COMPILED}: {reason}")
+    phases = ConsolePhases()
+    compiled = compile_renderer(phases)
+    from diff4splat.render.raster.jit import KERNELS
+
+    folder = KERNELS[0].stats.cache_path
+    place = f"kept in {folder}" if folder else "not kept, because no folder can be written to"
+    did = f"compiled {len(compiled)} kernels" if compiled else "was already compiled; loaded"
+    note(f"{did} in {phases.seconds['compile']:.1f} s; {place}")
+
+
+def print_rows(rows: Rows) -> None:
+    """One aligned line each, as soon as it is known."""
+    for name, value in rows:
+        print(f"{name:<{_WIDTH}}{value}", flush=True)
+
+
+def machine_rows() -> Rows:
+    """What can be told without any library."""
+    from diff4splat import __version__
+
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    yield "diff4splat", f"{__version__} in {Path(__file__).parents[1]}"
+    yield "python", f"{platform.python_version()} in {sys.prefix}"
+    yield "platform", f"{platform.system()} {platform.release()} {platform.machine()}"
+    yield "cpu", f"{cpu_name()}, {usable} cores"
+    yield "memory", f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.1f} GiB"
+
+
+def cpu_name() -> str:
+    """As people know it where the system tells, else the architecture."""
+    try:
+        found = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    except OSError:
+        found = None
+    return found[1] if found else platform.processor() or platform.machine()
+
+
+def torch_rows() -> Rows:
+    """PyTorch and what it computes on."""
+    import torch
+
+    threads = torch.get_num_threads()
+    yield "torch", f"{torch.__version__}, {threads} thread{'s' if threads > 1 else ''}"
+    if torch.cuda.is_available():
+        yield "cuda", f"{torch.version.cuda} on {torch.cuda.get_device_name()}"
+    elif torch.version.cuda is None:
+        yield "cuda", "not available: this torch is built without it"
+    else:
+        yield "cuda", f"not available: no GPU found (torch is built for {torch.version.cuda})"
+
+
+def backend_rows() -> Rows:
+    """What every back end says to a picture on the CPU, and on the GPU if there is one."""
+    import torch
+
+    from diff4splat.render.backends import BACKENDS
+
+    devices = ("cpu", "cuda") if torch.cuda.is_available() else ("cpu",)
+    for name in BACKENDS:
+        for device in devices:
+            reason = installation.refusal(name, device)
+            state = installation.readiness(name) if reason is None else f"refuses: {reason}"
+            yield f"renderer {name}", state if len(devices) == 1 else f"{device}: {state}"
+
+
+def extra_rows() -> Rows:
+    """Optional packages: the version, or how to add one."""
+    for package, purpose, command in EXTRAS:
+        yield package, installation.version(package) or f"not installed; for {purpose}: {command}"

@@ -1,0 +1,121 @@
+"""Whether this installation is whole: packages, libraries, back ends, and a picture."""
+
+import re
+from importlib import import_module, metadata
+from typing import TYPE_CHECKING
+
+from diff4splat.errors import Diff4SplatError
+
+if TYPE_CHECKING:
+    from diff4splat.scene.gaussians import Gaussians
+
+COMPILE_S = 20
+"""Seconds that compiling the CPU renderer takes on a laptop."""
+LIBRARIES = (
+    "diff4splat.models.pipeline",
+    "diff4splat.report.scene_folder",
+    "diff4splat.render.raster.warm",
+)
+"""Modules that load every library a command needs."""
+TOLERANCE = 1e-4
+"""How far RGB may be from that of the reference back end in float64."""
+
+
+def require_packages() -> None:
+    """Refuse an installation without a package that diff4splat needs.
+
+    Raises:
+        Diff4SplatError: naming what is missing.
+    """
+    if version("diff4splat") is None:
+        raise Diff4SplatError(
+            "installation: expected diff4splat to be installed, got a bare folder; pip install -e ."
+        )
+    needed = [line for line in metadata.requires("diff4splat") or [] if "extra ==" not in line]
+    missing = [line for line in needed if version(re.split(r"[^\w.-]", line)[0]) is None]
+    if missing:
+        lines = " ".join(f"'{line}'" for line in missing)
+        raise Diff4SplatError(
+            f"installation: expected {', '.join(missing)}, got none; pip install {lines}"
+        )
+
+
+def version(package: str) -> str | None:
+    """Of an installed package."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def load_libraries() -> None:
+    """Import what commands import.
+
+    Raises:
+        Diff4SplatError: a library is there but cannot be loaded.
+    """
+    try:
+        for module in LIBRARIES:
+            import_module(module)
+    except (ImportError, OSError) as error:
+        raise Diff4SplatError(
+            f"installation: expected every library to load, got {error}; install it again"
+        ) from error
+
+
+def refusal(backend: str, device: str) -> str | None:
+    """Why a back end does not draw float32 on a device."""
+    from diff4splat.cli.renderer import picture_job
+    from diff4splat.render.backends import BACKENDS
+
+    return import_module(BACKENDS[backend]).refusal(picture_job(speck(device)))
+
+
+def readiness(backend: str) -> str:
+    """Whether a picture can be had at once."""
+    from diff4splat.cli.renderer import COMPILED, is_compiled
+
+    if backend == COMPILED and not is_compiled():
+        return f"will compile on first use (about {COMPILE_S} s); now: diff4splat doctor --warm"
+    return "ready"
+
+
+def self_test() -> str:
+    """Draw with the preferred back end, or with the reference while that one is not compiled.
+
+    Raises:
+        Diff4SplatError: the picture is not the one that float64 gives.
+    """
+    import torch
+
+    from diff4splat.cli.renderer import COMPILED, is_compiled, picture_job
+    from diff4splat.render.api import render
+
+    ready = refusal(COMPILED, "cpu") is None and is_compiled()
+    backend = COMPILED if ready else "reference"
+    scene = speck("cpu")
+    camera = picture_job(scene).camera
+    made = render(scene, camera, backend=backend).rgb
+    exact = render(scene.to(torch.float64), camera, backend="reference").rgb
+    error = float((made - exact).abs().max())
+    if not error < TOLERANCE or not bool(exact.any()):
+        raise Diff4SplatError(
+            f"renderer {backend}: expected the picture of float64 within {TOLERANCE:g}, "
+            f"got {error:g} off; install numba and torch again"
+        )
+    return f"renderer {backend} agrees with float64 to {error:.0e}"
+
+
+def speck(device: str) -> "Gaussians":
+    """One Gaussian before the camera."""
+    import torch
+
+    from diff4splat.scene.gaussians import Gaussians
+
+    return Gaussians(
+        means=torch.tensor([[0.1, 0.0, 1.0]]),
+        quats=torch.tensor([[1.0, 0.2, 0.0, 0.0]]),
+        scales=torch.tensor([[0.2, 0.1, 0.1]]),
+        opacities=torch.tensor([0.8]),
+        sh=torch.tensor([[[0.5, 0.2, -0.3]]]),
+    ).to(torch.device(device))

@@ -1,0 +1,268 @@
+"""``diff4splat doctor``, and how other commands get their renderer ready."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+import torch
+from PIL import Image
+
+from diff4splat.cli import doctor, installation
+from diff4splat.cli.main import run
+from diff4splat.geometry.camera import pinhole
+from diff4splat.io.scene_file import save_scene
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.render.backends import BACKENDS
+from diff4splat.render.raster import backend, warm
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.static import StaticMotion
+from diff4splat.scene.scene import Provenance, Scene
+
+KERNELS = ("project", "blend")
+ALL_ROWS = {"diff4splat", "python", "platform", "cpu", "memory", "torch", "cuda", "self-test"}
+
+
+@pytest.fixture(autouse=True)
+def _without_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+
+
+@pytest.fixture
+def cold(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """A renderer that says it is not compiled; the list fills when somebody compiles it."""
+    compiled: list[str] = []
+
+    def compile_all(advance: Callable[[str], None]) -> float:
+        for name in KERNELS:
+            advance(name)
+        compiled.extend(KERNELS)
+        return 0.5
+
+    monkeypatch.setattr(warm, "is_ready", lambda: bool(compiled))
+    monkeypatch.setattr(warm, "kernel_count", lambda: len(KERNELS))
+    monkeypatch.setattr(warm, "warm", compile_all)
+    monkeypatch.setattr(warm, "ensure_compiled", lambda: None)
+    return compiled
+
+
+def scene_file(folder: Path, dtype: torch.dtype = torch.float32, bad: int = 0) -> Path:
+    """Five Gaussians before one camera, the first ``bad`` of them too large to be squared."""
+    scales = torch.full((5, 3), 0.1)
+    scales[:bad] = 1e30
+    gaussians = Gaussians(
+        means=torch.tensor([[0.0, 0.0, 2.0]]).repeat(5, 1),
+        quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]]).repeat(5, 1),
+        scales=scales,
+        opacities=torch.full((5,), 0.5),
+        sh=torch.zeros(5, 1, 3),
+    ).to(dtype)
+    path = CameraPath(
+        cameras=pinhole(16.0, (16, 16)).with_pose(torch.eye(4).repeat(2, 1, 1)),
+        times_s=torch.tensor([0.0, 0.5]),
+    )
+    scene = Scene(
+        gaussians=gaussians,
+        motion=StaticMotion(),
+        path=path,
+        provenance=Provenance(generator="test"),
+    )
+    save_scene(scene, folder / "scene.safetensors")
+    return folder / "scene.safetensors"
+
+
+def rows(shown: str) -> dict[str, str]:
+    return {line[:20].strip(): line[20:] for line in shown.splitlines()}
+
+
+def test_a_healthy_installation(capsys: pytest.CaptureFixture) -> None:
+    assert run(["doctor"]) == 0
+    table = rows(capsys.readouterr().out)
+    assert ALL_ROWS | {f"renderer {name}" for name in BACKENDS} <= set(table)
+    assert table["python"].startswith(".".join(map(str, sys.version_info[:3])))
+    assert table["torch"].startswith(torch.__version__)
+    assert table["renderer reference"] == "ready"
+    assert table["matplotlib"] == metadata.version("matplotlib")
+    assert "agrees with float64" in table["self-test"]
+    assert all(value.strip() for value in table.values())
+
+
+def test_what_is_not_compiled_is_said_and_not_compiled(
+    cold: list[str], capsys: pytest.CaptureFixture
+) -> None:
+    assert run(["doctor"]) == 0
+    table = rows(capsys.readouterr().out)
+    assert (
+        f"will compile on first use (about {installation.COMPILE_S} s)" in table["renderer raster"]
+    )
+    assert "doctor --warm" in table["renderer raster"]
+    assert table["self-test"].startswith("renderer reference")
+    assert cold == []
+
+
+def test_a_back_end_that_refuses_says_why(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(backend, "refusal", lambda job: "expected a fast CPU, got a slow one")
+    assert run(["doctor"]) == 0
+    table = rows(capsys.readouterr().out)
+    assert table["renderer raster"] == "refuses: expected a fast CPU, got a slow one"
+    assert run(["doctor", "--warm"]) == 2
+    assert "renderer raster: expected a fast CPU" in capsys.readouterr().err
+
+
+def test_with_a_gpu_every_back_end_is_asked_twice(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "a fast one")
+    refusals = {"cpu": None, "cuda": "expected CPU tensors, got cuda"}
+    monkeypatch.setattr(installation, "refusal", lambda name, device: refusals[device])
+    monkeypatch.setattr(installation, "self_test", lambda: "fine")
+    assert run(["doctor"]) == 0
+    shown = capsys.readouterr().out
+    assert "a fast one" in rows(shown)["cuda"]
+    assert "renderer reference  cpu: ready\n" in shown
+    assert "renderer reference  cuda: refuses: expected CPU tensors, got cuda\n" in shown
+
+
+def test_an_extra_that_is_missing_comes_with_its_pip_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    extra = ("no-such-package", "singing", "pip install 'diff4splat[song]'")
+    monkeypatch.setattr(doctor, "EXTRAS", (extra,))
+    assert run(["doctor"]) == 0
+    shown = rows(capsys.readouterr().out)["no-such-package"]
+    assert shown == "not installed; for singing: pip install 'diff4splat[song]'"
+
+
+@pytest.mark.parametrize(
+    ("what", "value", "message"),
+    [
+        (
+            "LIBRARIES",
+            ("diff4splat.no_such_module",),
+            "expected every library to load, got No module named 'diff4splat.no_such_module'",
+        ),
+        ("TOLERANCE", 0.0, "expected the picture of float64 within 0"),
+    ],
+)
+def test_what_is_broken_ends_in_one_line(
+    what: str,
+    value: object,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    monkeypatch.setattr(installation, what, value)
+    assert run(["doctor"]) == 2
+    shown = capsys.readouterr()
+    assert message in shown.err
+    assert len(shown.err.splitlines()) == 1
+    assert {"python", "cpu"} <= set(rows(shown.out))
+
+
+def test_a_package_that_is_missing_comes_with_its_pip_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    asked = ["torch>=2.6", "no-such-package>=3,<4", 'other-package; extra == "dev"']
+    monkeypatch.setattr(metadata, "requires", lambda name: asked)
+    assert run(["doctor"]) == 2
+    shown = capsys.readouterr().err
+    assert "expected no-such-package>=3,<4, got none" in shown
+    assert "pip install 'no-such-package>=3,<4'" in shown
+    assert "other-package" not in shown
+    assert "torch" not in shown
+
+
+def test_warm_compiles_once(cold: list[str], capsys: pytest.CaptureFixture) -> None:
+    assert run(["doctor", "--warm"]) == 0
+    shown = capsys.readouterr()
+    assert "compiled 2 kernels in" in shown.err
+    assert shown.out == ""
+    assert cold == list(KERNELS)
+
+
+def test_warm_says_when_there_was_nothing_to_do(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(warm, "warm", lambda advance: 0.1)
+    assert run(["doctor", "--warm"]) == 0
+    assert "was already compiled; loaded in" in capsys.readouterr().err
+
+
+def test_render_compiles_ahead_in_its_own_phase(
+    cold: list[str], tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    arguments = ["render", str(scene_file(tmp_path)), "--out", str(tmp_path / "a.png")]
+    assert run(arguments) == 0
+    assert cold == list(KERNELS)
+    assert "compile   " in capsys.readouterr().err
+    assert run(arguments) == 0
+    assert cold == list(KERNELS)
+    assert "compile   " not in capsys.readouterr().err
+
+
+def test_generate_counts_the_seconds_of_compilation(cold: list[str], tmp_path: Path) -> None:
+    Image.radial_gradient("L").convert("RGB").resize((48, 32)).save(tmp_path / "photo.png")
+    arguments = ["generate", str(tmp_path / "photo.png"), "--model", "test", "--steps", "1"]
+    assert run([*arguments, "--frames", "2", "--out", str(tmp_path / "out")]) == 0
+    assert cold == list(KERNELS)
+    assert "compile" in json.loads((tmp_path / "out" / "card.json").read_text())["seconds"]
+
+
+def test_double_precision_compiles_nothing(cold: list[str], tmp_path: Path) -> None:
+    file = scene_file(tmp_path, torch.float64)
+    assert run(["render", str(file), "--out", str(tmp_path / "a.png")]) == 0
+    assert cold == []
+
+
+def test_a_wrong_output_is_refused_before_anything_compiles(
+    cold: list[str], tmp_path: Path
+) -> None:
+    assert run(["render", str(scene_file(tmp_path)), "--out", str(tmp_path / "a.bmp")]) == 2
+    assert cold == []
+
+
+def test_gaussians_that_cannot_be_drawn_are_counted_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    file = scene_file(tmp_path, bad=2)
+    assert run(["render", str(file), "--out", str(tmp_path / "a.mp4")]) == 0
+    shown = capsys.readouterr().err
+    note = "2 Gaussians left out of the first frame: 2 with scales that are not finite or too large"
+    assert shown.count(note) == 1
+    assert run(["render", str(scene_file(tmp_path)), "--out", str(tmp_path / "a.mp4")]) == 0
+    assert "left out" not in capsys.readouterr().err
+
+
+def test_commands_that_draw_nothing_load_no_compiler(tmp_path: Path) -> None:
+    scene, ply = str(scene_file(tmp_path)), str(tmp_path / "a.ply")
+    code = (
+        "import sys\nfrom diff4splat.cli.main import run\n"
+        f"assert run(['inspect', {scene!r}]) == 0\n"
+        f"assert run(['convert', {scene!r}, '--out', {ply!r}]) == 0\n"
+        "assert run(['paths', 'list']) == 0\n"
+        "assert run(['report', 'knobs']) == 0\n"
+        "assert 'numba' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_a_fresh_machine_compiles_for_good(tmp_path: Path) -> None:
+    def doctor_says() -> str:
+        command = [sys.executable, "-m", "diff4splat.cli.main", "doctor", "--warm"]
+        surroundings = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+        done = subprocess.run(command, capture_output=True, text=True, check=True, env=surroundings)
+        return done.stderr
+
+    first = doctor_says()
+    assert f"compiled {warm.kernel_count()} kernels in" in first
+    assert str(tmp_path) in first
+    assert "was already compiled; loaded in" in doctor_says()

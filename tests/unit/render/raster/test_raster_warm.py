@@ -1,0 +1,106 @@
+"""Compilation is announced, happens once, and leaves files behind."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import torch
+from oracles_raster import cloud, leaves, lens_leaves, render_raster, wide_camera
+
+from diff4splat.render.raster import jit
+from diff4splat.render.raster.warm import is_ready, kernel_count, warm
+from diff4splat.render.settings import OUTPUTS
+
+SUPPORT = Path(__file__).parents[3] / "support"
+
+
+def compiled() -> dict[str, int]:
+    return {kernel.py_func.__name__: len(kernel.signatures) for kernel in jit.KERNELS}
+
+
+def test_warming_up_compiles_everything_that_pictures_need() -> None:
+    warm()
+    before = compiled()
+    assert is_ready()
+    assert kernel_count() == len(before)
+    assert set(before.values()) == {1}
+    camera = lens_leaves(wide_camera((30, 40)), torch.float32)
+    for bands in (1, 16):
+        for changes in ({}, {"antialias": True, "tile_px": 8, "dilation_px2": 0.0}):
+            own = leaves(cloud(40, bands=bands))
+            features = torch.rand(40, 5, requires_grad=True)
+            made = render_raster(
+                own, camera, *OUTPUTS, features=features, flow_camera=camera, **changes
+            )
+            sum(getattr(made, name).sum() for name in OUTPUTS).backward()
+    nobody = cloud(1).select(torch.zeros(0, dtype=torch.long))
+    render_raster(leaves(nobody), camera, "rgb").rgb.sum().backward()
+    assert compiled() == before
+
+
+def test_what_is_compiled_has_nothing_to_report() -> None:
+    warm()
+    heard = []
+    assert warm(heard.append) >= 0
+    assert heard == []
+
+
+PICTURE = """
+from oracles_raster import cloud, render_raster, wide_camera
+from diff4splat.render.raster.warm import is_ready
+print(is_ready())
+render_raster(cloud(3), wide_camera((8, 8)), "rgb")
+print(is_ready())
+render_raster(cloud(3), wide_camera((8, 8)), "rgb")
+"""
+
+
+def draw(folder: Path) -> tuple[list[str], str]:
+    """What a fresh interpreter says whose kernels lie in ``folder``."""
+    header = f"import sys; sys.path.insert(0, {str(SUPPORT)!r})\n"
+    done = subprocess.run(
+        [sys.executable, "-c", header + PICTURE],
+        capture_output=True, text=True, timeout=500, check=True,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(folder)},
+    )  # fmt: skip
+    return done.stdout.split(), done.stderr
+
+
+@pytest.mark.slow
+def test_the_first_picture_on_a_machine_says_what_takes_so_long(tmp_path: Path) -> None:
+    said, heard = draw(tmp_path)
+    assert said == ["False", "True"]
+    first, last = heard.strip().splitlines()
+    assert first.startswith("diff4splat: compiling the CPU renderer, once for this machine: ")
+    assert set(first.partition("machine: ")[2].split()) == set(compiled())
+    assert last.startswith("diff4splat: ready after ")
+    assert draw(tmp_path) == (["True", "True"], "")
+
+
+def test_a_kernel_on_disk_is_ready_while_its_source_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jit, "KERNELS", [])
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "kernels")
+    source = tmp_path / "twice.py"
+    source.write_text("def twice(x):\n    return 2 * x\n")
+    first = jit.kernel(loaded(source))
+    assert not jit.is_ready(first)
+    assert first(21.0) == 42.0
+    assert jit.is_ready(first)
+    assert jit.is_ready(jit.kernel(loaded(source)))
+    # Installed again: Numba looks at the date, and compiles again.
+    os.utime(source, (0, 0))
+    assert not jit.is_ready(jit.kernel(loaded(source)))
+
+
+def loaded(source: Path) -> Callable[[float], float]:
+    """The function ``twice`` of a module that was read anew."""
+    spec = importlib.util.spec_from_file_location("twice", source)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.twice
