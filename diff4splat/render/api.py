@@ -45,7 +45,8 @@ def render(
     """Pictures named in ``outputs``; the others are not computed.
 
     One camera gives one picture of each. A batch of cameras, at one time or one each, gives
-    pictures with a leading axis. Cameras take the dtype and device of the Gaussians.
+    pictures with a leading axis. Times move scenes, not bare Gaussians, and have no gradient.
+    Cameras take the dtype and device of the Gaussians.
 
     Raises:
         ConfigError: an unknown output or back end, a flow without a place or time to flow to, or
