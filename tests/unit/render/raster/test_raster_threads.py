@@ -49,6 +49,60 @@ def test_an_error_comes_back_when_nobody_works_any_more() -> None:
     assert len(begun) < 10, "the parts that nobody had begun are left out"
 
 
+def test_an_error_of_a_helper_ends_the_work_of_the_caller_too() -> None:
+    caller, begun = threading.current_thread(), []
+
+    def work(number: int) -> None:
+        begun.append(number)
+        time.sleep(0.01)
+        if threading.current_thread() is not caller or torch.get_num_threads() == 1:
+            raise ValueError("a helper")
+
+    with pytest.raises(ValueError, match="a helper"):
+        spread(work, ((number,) for number in range(100)))
+    assert len(begun) < 20
+    done = []
+    spread(done.append, ((number,) for number in range(20)))
+    assert sorted(done) == list(range(20))
+
+
+def test_the_caller_works_and_all_threads_help() -> None:
+    count = torch.get_num_threads()
+    meeting, seen = threading.Barrier(count, timeout=20), set()
+
+    def work(_: int) -> None:
+        meeting.wait()
+        seen.add(threading.current_thread())
+
+    spread(work, ((number,) for number in range(count)))
+    assert len(seen) == count
+    assert threading.current_thread() in seen
+
+
+def test_two_callers_at_once() -> None:
+    done = [[], []]
+
+    def call(own: list[int]) -> None:
+        for _ in range(20):
+            spread(own.append, ((number,) for number in range(10)))
+
+    callers = [threading.Thread(target=call, args=(own,)) for own in done]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join(timeout=30)
+        assert not caller.is_alive()
+    assert all(sorted(own) == sorted(list(range(10)) * 20) for own in done)
+
+
+def test_no_more_threads_are_started_than_are_allowed() -> None:
+    torch.set_num_threads(7)
+    before = threading.active_count()
+    for count in range(2, 20):
+        spread(lambda _: time.sleep(1e-3), ((number,) for number in range(count)))
+    assert threading.active_count() - before <= 6
+
+
 def test_ranges_cover_everything_once() -> None:
     assert ranges(10, 4) == [(0, 4), (4, 8), (8, 10)]
     assert ranges(0, 4) == []
