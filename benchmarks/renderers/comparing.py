@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rounds import Effort, Say, find_subject, measure
 from scenes import SCENES, choose
-from slope import SERIES, STEEP, point, slopes
+from slope import SERIES, point, slopes
 from slope import to_markdown as slope_to_markdown
 from tables import OURS, Results, to_markdown
 
@@ -88,10 +88,10 @@ def find_slope(options: Options) -> str:
     if options.out is not None:
         record = {"format": FORMAT, "peer": peer.name, "machine": plain(this_machine())}
         record |= {"points": plain(points), "slopes": plain(slopes(points))}
-        record["slopes above"] = {"pairs": STEEP, **plain(slopes(points, STEEP))}
+        record["slopes beyond one Gaussian"] = plain(slopes(points, beyond_fixed=True))
         write_text(options.out / "slope.json", json.dumps(record, indent=1, allow_nan=False))
         write_text(options.out / "slope.md", report)
-        draw_slope(points, slopes(points, STEEP), options.out / "slope.png")
+        draw_slope(points, slopes(points, beyond_fixed=True), options.out / "slope.png")
     return report
 
 

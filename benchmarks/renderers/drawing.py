@@ -80,7 +80,8 @@ def draw_slope(points: Sequence[Point], slopes: dict[str, float], file: Path) ->
     figure = _figure(9.0, 4.2)
     panels = figure.subplots(1, 2, sharey=True)
     for panel, kind in zip(panels, KINDS, strict=True):
-        for number, series in enumerate(dict.fromkeys(point.series for point in points)):
+        drawn = [point for point in points if f"{point.series} {kind}" in slopes]
+        for number, series in enumerate(dict.fromkeys(point.series for point in drawn)):
             own = [point for point in points if point.series == series]
             kept = [(p.pairs, 1e3 * s) for p in own if (s := p.seconds(kind)) is not None]
             slope = slopes.get(f"{series} {kind}")

@@ -2,7 +2,8 @@
 
 Two series at 512²: ``count`` adds Gaussians of one size, ``footprint`` enlarges a fixed number of
 them. Opacities are 0.01 to 0.03, so that light never runs out and every pair is blended. The slope
-is the least-squares fit of log time over log pairs; 1 is proportional.
+is the least-squares fit of log time over log pairs; 1 is proportional. A picture of one Gaussian
+tells what a picture costs whatever is in it; the second slope is that of the time beyond it.
 """
 
 import math
@@ -18,8 +19,8 @@ _SIZE_PX, _OPACITY = (512, 512), (0.01, 0.03)
 COUNTS = (1_000, 3_200, 10_000, 32_000, 100_000, 320_000, 1_000_000)
 RADII_PX = (6.0, 11.0, 19.0, 34.0, 60.0, 107.0, 190.0)
 _FIXED_RADIUS_PX, _FIXED_COUNT = 10.0, 3_000
-STEEP = 1e6
-"""Pairs above which the fixed cost of a picture no longer shows."""
+FIXED = "one Gaussian"
+"""The series of a single scene whose time is that of the picture itself."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +44,7 @@ def _scene(name: str, count: int, radius_px: float) -> Scene:
 
 
 SERIES = (
+    (FIXED, _scene("one", 1, _FIXED_RADIUS_PX)),
     *(("count", _scene(f"count-{count}", count, _FIXED_RADIUS_PX)) for count in COUNTS),
     *(("footprint", _scene(f"footprint-{r:g}px", _FIXED_COUNT, r)) for r in RADII_PX),
 )
@@ -70,20 +72,26 @@ def fit(pairs: Sequence[float], seconds: Sequence[float]) -> float:
     return sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True)) / spread
 
 
-def slopes(points: Sequence[Point], least_pairs: float = 0.0) -> dict[str, float]:
-    """The slope of every series and kind, from ``least_pairs`` on."""
+def slopes(points: Sequence[Point], beyond_fixed: bool = False) -> dict[str, float]:
+    """The slope of every series and kind, of all time or of that beyond the picture's own."""
     found = {}
-    for name in dict.fromkeys(point.series for point in points):
-        for kind in KINDS:
+    for kind in KINDS:
+        fixed = _fixed_s(points, kind) if beyond_fixed else 0.0
+        for name in dict.fromkeys(point.series for point in points if point.series != FIXED):
             kept = [
-                (point.pairs, seconds)
+                (point.pairs, seconds - fixed)
                 for point in points
                 if point.series == name
-                and point.pairs >= least_pairs
                 and (seconds := point.seconds(kind)) is not None
+                and seconds > fixed
             ]
             found[f"{name} {kind}"] = fit(*zip(*kept, strict=True)) if kept else math.nan
     return found
+
+
+def _fixed_s(points: Sequence[Point], kind: Kind) -> float:
+    """Seconds of a picture of one Gaussian; 0 where that was not measured."""
+    return next((p.seconds(kind) or 0.0 for p in points if p.series == FIXED), 0.0)
 
 
 def to_markdown(points: Sequence[Point], peer: str) -> str:
@@ -99,7 +107,13 @@ def to_markdown(points: Sequence[Point], peer: str) -> str:
         lines.append(
             f"| {point.series} | {point.gaussians:,} | {point.pairs:.2e} | {' | '.join(times)} |"
         )
-    upper = slopes(points, STEEP)
-    lines += ["", f"Slope over all points, and over those above {STEEP:.0e} pairs:", ""]
-    lines += [f"- {name}: {value:.2f}, {upper[name]:.2f}" for name, value in slopes(points).items()]
+    beyond = slopes(points, beyond_fixed=True)
+    lines += [
+        "",
+        "Slope of all time, and of the time beyond that of a picture of one Gaussian:",
+        "",
+    ]
+    lines += [
+        f"- {name}: {value:.2f}, {beyond[name]:.2f}" for name, value in slopes(points).items()
+    ]
     return "\n".join(lines) + "\n"

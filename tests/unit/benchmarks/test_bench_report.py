@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from limits import BOTH_FLOPS_PER_PAIR, FORWARD_FLOPS_PER_PAIR, MachineLimits, s
 from machine import this_machine
 from options import Options
 from records import Cell, ImageError, Work, plain, timing
-from slope import SERIES, Point, fit, slopes
+from slope import FIXED, SERIES, Point, fit, slopes
 from slope import to_markdown as slope_to_markdown
 from tables import Results, baseline, markdown_table, milliseconds, to_markdown
 
@@ -151,7 +152,11 @@ def test_slopes_are_per_series_and_kind(tmp_path: Path) -> None:
     assert found["count forward"] == pytest.approx(1.0)
     assert found["footprint forward"] == pytest.approx(0.5)
     assert math.isnan(found["count both"])
-    assert math.isnan(slopes(points, 1e7)["count forward"])
+    picture = Point(series=FIXED, pairs=0.0, gaussians=1, forward_s=1e-3, both_s=None)
+    dearer = [replace(point, forward_s=point.forward_s + 1e-3) for point in points]
+    beyond = slopes([picture, *dearer], beyond_fixed=True)
+    assert beyond == pytest.approx(found, nan_ok=True)
+    assert slopes([picture, *dearer])["count forward"] < 0.9
     assert "- count forward: 1.00, 1.00" in slope_to_markdown(points, "raster")
     draw_slope(points, found, tmp_path / "slope.png")
     assert (tmp_path / "slope.png").stat().st_size > 5_000
