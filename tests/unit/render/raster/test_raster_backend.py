@@ -17,6 +17,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.render.api import render
 from diff4splat.render.raster import backend, function, jit
 from diff4splat.render.raster.backward import Drawn
+from diff4splat.render.raster.warm import ensure_compiled
 from diff4splat.render.settings import RenderJob, RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
@@ -150,6 +151,7 @@ class Watched(Drawn):
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     """How many sets of buffers are still alive."""
+    ensure_compiled()
     references = []
 
     def make(**parts: object) -> Watched:
