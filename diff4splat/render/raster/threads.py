@@ -24,25 +24,31 @@ def spread(work: Callable[..., None], parts: Iterable[tuple]) -> None:
     waiting, lock = list(parts)[::-1], Lock()
 
     def take() -> None:
-        while True:
+        try:
+            while part := _next(waiting, lock):
+                work(*part)
+        finally:
+            # Nothing is left but after an error: then nobody begins another part.
             with lock:
-                if not waiting:
-                    return
-                part = waiting.pop()
-            work(*part)
+                waiting.clear()
 
-    helpers = min(torch.get_num_threads(), len(waiting)) - 1
-    running = [_pool(helpers, os.getpid()).submit(take) for _ in range(helpers)]
+    allowed = torch.get_num_threads() - 1
+    helpers = min(allowed, len(waiting) - 1)
+    running = [_pool(allowed, os.getpid()).submit(take) for _ in range(helpers)]
     try:
         take()
     finally:
-        with lock:
-            waiting.clear()
         # Those that are queued behind another picture have nothing left to do.
         started = [helper for helper in running if not helper.cancel()]
         wait(started)
     for helper in started:
         helper.result()
+
+
+def _next(waiting: list[tuple], lock: Lock) -> tuple:
+    """The next part, or an empty one."""
+    with lock:
+        return waiting.pop() if waiting else ()
 
 
 @cache
