@@ -12,7 +12,7 @@ import numpy as np
 
 from diff4splat.render.raster.footprint import quadruple, triple, unit
 from diff4splat.render.raster.jit import device, kernel
-from diff4splat.render.raster.project import leave_print, unusable_parameter
+from diff4splat.render.raster.project import is_seen
 from diff4splat.render.raster.tables import Doubles, Floats, Integers
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 
@@ -93,10 +93,7 @@ def project_keyframed(
         quat = _turned(quadruple(cloud.quats, i), place, keys, moment)
         scales = _stretched(triple(cloud.scales, i), place, keys, moment)
         state = (mean, quat, scales, np.float64(cloud.opacities[i]))
-        fault = unusable_parameter(state, sh, i)
-        if fault >= 0:
-            unusable[fault] += 1
-        elif leave_print(i, state, view, rules, prints, depth):
+        if is_seen(i, state, sh, view, rules, prints, depth, unusable):
             visible[first + found] = i
             found += 1
     return found

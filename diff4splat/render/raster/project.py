@@ -53,17 +53,24 @@ def project(first, last, candidates, cloud, sh, view, rules, prints, depth, visi
         i = candidates[place]
         mean, quat = triple(cloud.means, i), quadruple(cloud.quats, i)
         state = (mean, quat, triple(cloud.scales, i), np.float64(cloud.opacities[i]))
-        fault = unusable_parameter(state, sh, i)
-        if fault >= 0:
-            unusable[fault] += 1
-        elif leave_print(i, state, view, rules, prints, depth):
+        if is_seen(i, state, sh, view, rules, prints, depth, unusable):
             visible[first + found] = i
             found += 1
     return found
 
 
 @device
-def unusable_parameter(state, sh, i):
+def is_seen(i, state, sh, view, rules, prints, depth, unusable):
+    """Whether a Gaussian leaves a footprint; counts it where a parameter cannot be used."""
+    fault = _unusable_parameter(state, sh, i)
+    if fault >= 0:
+        unusable[fault] += 1
+        return False
+    return _leave_print(i, state, view, rules, prints, depth)
+
+
+@device
+def _unusable_parameter(state, sh, i):
     """The first parameter that is not finite or overflows when squared, or -1."""
     mean, quat, scales, opacity = state
     if not _usable(mean):
@@ -89,7 +96,7 @@ def _usable(values):
 
 
 @device
-def leave_print(i, state, view, rules, prints, depth):
+def _leave_print(i, state, view, rules, prints, depth):
     """Whether a Gaussian can be seen, by its mean, quaternion, scales and opacity.
 
     If so, its footprint goes to row ``i``.

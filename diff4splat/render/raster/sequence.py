@@ -45,7 +45,7 @@ class _Still:
 
 
 class Sequence:
-    """A scene to be drawn many times, by one plan. ``extras`` are blended behind the colours."""
+    """A scene to be drawn many times, by one plan; ``depths`` blends z and 1 behind the colours."""
 
     def __init__(self, scene: Scene, plan: Plan, depths: bool) -> None:
         gaussians = scene.gaussians
@@ -84,11 +84,12 @@ class Sequence:
         same_camera = self._still is not None and self._still.view == view
         if not same_camera:
             self._see_still(view)
-            self._stale[:] = True
         order, unusable = self._see_moving(view, time_s)
         tiles_in_rows = self._tiles_in(rows if same_camera else None)
         if not (same_camera and self._bin_still() and self._draw_stale(order, tiles_in_rows)):
             self._draw_all(order, tiles_in_rows)
+            # Any of them may show something that moves; nobody kept which.
+            self._stale[:] = True
         return self._picture(unusable + self._still.unusable)
 
     def _see_still(self, view: View) -> None:

@@ -42,7 +42,10 @@ def kernel_count() -> int:
 
 
 def warm(advance: Callable[[str], None] = lambda name: None) -> float:
-    """Load or compile every kernel; ``advance`` gets the name of each one. Returns the seconds."""
+    """Load or compile every kernel; ``advance`` hears the names of compiled ones.
+
+    Returns the seconds.
+    """
     began = time.perf_counter()
     with (
         event.install_listener("numba:compile", _Names(advance)),

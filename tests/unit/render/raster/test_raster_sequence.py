@@ -191,6 +191,19 @@ def test_rows_do_not_depend_on_the_memory() -> None:
     assert torch.equal(*pictures)
 
 
+def test_nothing_is_left_behind_where_lists_did_not_fit_for_a_while() -> None:
+    motion = keyed(torch.arange(COUNT))
+    grown = torch.tensor([-1.0, 2.0, 2.0, -1.0])[:, None, None].expand(4, COUNT, 3)
+    scene = scene_with(replace(motion, log_scale_offsets=grown))
+    plan = make_plan(CAMERA, RenderSettings(tile_px=8), colors=True, medians=False)
+    plan = replace(plan, pair_limit=1500)
+    view = make_view(plan.grid, CAMERA.world_from_camera, CAMERA.focal_px, CAMERA.center_px)
+    drawn = Sequence(scene, plan, depths=False)
+    for time_s in (0.0, 0.0, 0.0, 0.5, 1.0):
+        last = drawn.draw(view, time_s).planes
+    assert torch.equal(last, Sequence(scene, plan, depths=False).draw(view, 1.0).planes)
+
+
 def test_an_empty_scene() -> None:
     scene = scene_with(StaticMotion())
     empty = replace(scene, gaussians=scene.gaussians.select(torch.zeros(0, dtype=torch.long)))
