@@ -1,0 +1,1 @@
+"""Procedural worlds: dynamic multi-view clips with exact truth, without end."""

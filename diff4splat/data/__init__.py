@@ -1,0 +1,1 @@
+"""Clips: the contract between what prepares training data and what reads it."""

@@ -1,0 +1,103 @@
+"""A clip: one dynamic scene seen by several cameras at the same times, with its truth.
+
+Axes: ``t`` frames, ``h w`` pixels, ``n`` tracked points; views share ``t`` and the times. The world
+frame is the first camera of the first view. Lengths are scene units (metres where ``metric`` says
+so), depth is z with 0 for "nothing there" (sky, or no truth), flow and ``uv`` are in pixels with
+centres at +0.5. Cameras are float64 on disk and here: training casts, geometry checks do not.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from jaxtyping import Bool, Float, Int, UInt8
+from torch import Tensor
+
+from diff4splat.geometry.camera import Camera
+
+Metric = Literal["exact", "pseudo", "aligned", "none"]
+"""How lengths relate to metres: true, by an assumed base line, fitted, or not at all."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flow:
+    """Where what is seen at each pixel centre goes in the next frame."""
+
+    to_next: Float[Tensor, "s h w 2"]
+    """(x, y) in pixels; ``s`` = t − 1. Meaningless where ``known`` is False."""
+    known: Bool[Tensor, "s h w"]
+    visible: Bool[Tensor, "s h w"]
+    """Still seen in the next frame: inside the picture and not hidden."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """What one camera saw."""
+
+    rgb: UInt8[Tensor, "t h w 3"]
+    depth: Float[Tensor, "t h w"]
+    cameras: Camera
+    """A batch of shape (t,), float64."""
+    instances: UInt8[Tensor, "t h w"] | None = None
+    """Which object is seen at the pixel centre; 0 is sky or unknown."""
+    flow: Flow | None = None
+    track_uv: Float[Tensor, "t n 2"] | None = None
+    track_visible: Bool[Tensor, "t n"] | None = None
+    """In front of the camera, inside the picture and not hidden."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracks:
+    """Points that stick to surfaces."""
+
+    positions: Float[Tensor, "t n 3"]
+    """World space."""
+    instances: UInt8[Tensor, " n"]
+    found_at: Int[Tensor, "n 2"]
+    """(view, frame) in which the point was chosen at a pixel centre: there it is visible, and its
+    depth is that of the depth map. (−1, −1) where the source does not say."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectNote:
+    """What a caption may say about one instance."""
+
+    instance: int
+    name: str
+    """Family, such as ``torus``."""
+    color: str
+    motion: str
+    """Such as ``rolls to the left``; ``""`` stands still."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClipNote:
+    """Where a clip comes from and what it shows; JSON beside the arrays."""
+
+    identifier: str
+    source: str
+    """Data set or generator with its version."""
+    license: str
+    caption: str = ""
+    metric: Metric = "none"
+    is_static: bool = False
+    objects: tuple[ObjectNote, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clip:
+    """Everything known about one scene over ``t`` frames; ``views[0]`` is the input view."""
+
+    note: ClipNote
+    times_s: Float[Tensor, " t"]
+    views: tuple[View, ...]
+    tracks: Tracks | None = None
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of every view."""
+        return len(self.times_s)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """(height, width) of every view."""
+        return self.views[0].cameras.size_px
