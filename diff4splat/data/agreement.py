@@ -1,0 +1,123 @@
+"""Do the contents of a clip agree with each other? Figures that find nearly every wrong reader.
+
+Poses must be rotations; depth of one frame, carried into another, must be the depth seen there; on
+what stands still, depth and cameras alone give the flow; tracks must lie where cameras, depth and
+flow say, and be visible only where depth lets them. A mirrored axis, a transposed rotation, ray
+length for z, half a pixel or one frame too much: each shows in at least one figure.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from diff4splat.data.clip import Clip
+from diff4splat.data.comparing.pixels import across_views, flow_errors, over_time, rotation_errors
+from diff4splat.data.comparing.spread import Share, Spread, share_of, spread_of
+from diff4splat.data.comparing.tracks import compare_found, compare_seen
+from diff4splat.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """Errors by what was compared; None where there was nothing to compare."""
+
+    rotation: Spread | None
+    """Largest entry of RᵀR − I or of det R − 1, per pose."""
+    reprojection: Spread | None
+    """Relative depth error between frames of one view, on what stands still."""
+    flow_px: Spread | None
+    """From stored flow to that of depth and cameras, on what stands still."""
+    found_pixel_px: Spread | None
+    """From a track to the nearest pixel centre, where it was found."""
+    found_depth: Spread | None
+    """Relative, from a track's z to the depth map, where it was found."""
+    found_flow_px: Spread | None
+    """From flow to the step of a track, where it was found."""
+    projection_px: Spread | None
+    """From projected positions to ``uv``, wherever visible."""
+    found_visible: Share | None
+    """Tracks that are visible where they were found."""
+    across_views: Share | None
+    """Points of one view that are not before what another view sees there at the same time."""
+    visible_depth: Share | None
+    """Visible tracks whose z is that of the depth map, within 3 %."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """The largest errors and the smallest shares that pass."""
+
+    rotation: float = 1e-5
+    pixels: float = 1e-3
+    depth: float = 1e-4
+    """Relative, of tracks where they were found."""
+    reprojection: float = 0.02
+    """Relative, of the median: edges and hidden surfaces differ by far more, whatever the data."""
+    share: float = 0.98
+    judge: Literal["max", "median"] = "max"
+    """What of pixels and depth is compared."""
+
+
+EXACT = Tolerances()
+"""For synthetic data."""
+MEASURED = Tolerances(pixels=1.0, depth=0.03, share=0.8, judge="median")
+"""For data whose depth or tracks were measured or estimated."""
+
+
+def agreement(clip: Clip) -> Agreement:
+    """Compare everything in ``clip`` that says something of something else."""
+    views = clip.views
+    found = [made for number in range(len(views)) if (made := compare_found(clip, number))]
+    seen = [made for view in views if (made := compare_seen(clip, view))]
+    return Agreement(
+        rotation=spread_of(rotation_errors(view.cameras) for view in views),
+        reprojection=spread_of(each for view in views for each in over_time(clip, view)),
+        flow_px=spread_of(each for view in views for each in flow_errors(clip, view)),
+        found_pixel_px=spread_of(each.pixel_px for each in found),
+        found_depth=spread_of(each.depth for each in found),
+        found_flow_px=spread_of(each.flow_px for each in found),
+        projection_px=spread_of(each.projection_px for each in seen),
+        found_visible=share_of(each.visible for each in found),
+        across_views=share_of(across_views(clip)),
+        visible_depth=share_of(each.at_depth for each in seen),
+    )
+
+
+def require_agreement(clip: Clip, tolerances: Tolerances = EXACT) -> Agreement:
+    """Return the figures of ``clip`` when all of them pass.
+
+    Raises:
+        InputError: one does not; says which, by how much, and what usually causes it.
+    """
+    figures = agreement(clip)
+    for name, limit, hint in _checks(tolerances):
+        figure = getattr(figures, name)
+        if figure is None:
+            continue
+        always = {"rotation": "max", "reprojection": "median"}.get(name, tolerances.judge)
+        low = isinstance(figure, Share)
+        value = figure.share if low else getattr(figure, always)
+        if value < limit if low else value > limit:
+            raise InputError(
+                f"clip '{clip.note.identifier}': {name}: expected at "
+                f"{'least' if low else 'most'} {limit:.3g}, got {value:.3g} over "
+                f"{figure.count} comparisons; {hint}"
+            )
+    return figures
+
+
+def _checks(tolerances: Tolerances) -> tuple[tuple[str, float, str], ...]:
+    """Figures in an order in which the first failure is nearest to the cause."""
+    cameras = "look for a mirrored axis, a transposed rotation or camera_from_world"
+    pixels = "look for pixel centres half a pixel away or a frame too early or late"
+    return (
+        ("rotation", tolerances.rotation, cameras),
+        ("found_pixel_px", tolerances.pixels, pixels),
+        ("found_visible", tolerances.share, pixels),
+        ("projection_px", tolerances.pixels, f"{cameras}, or {pixels.removeprefix('look for ')}"),
+        ("found_depth", tolerances.depth, "look for ray length in place of z, or another unit"),
+        ("found_flow_px", tolerances.pixels, "look for flow of another frame or backwards"),
+        ("flow_px", tolerances.pixels, f"{cameras}, or flow of another frame"),
+        ("reprojection", tolerances.reprojection, f"{cameras}, or ray length in place of z"),
+        ("across_views", tolerances.share, f"{cameras}, or views in different world frames"),
+        ("visible_depth", tolerances.share, "look for hidden tracks called visible"),
+    )

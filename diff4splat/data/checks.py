@@ -1,0 +1,161 @@
+"""Does a clip keep its contract? Shapes, types and ranges; ``agreement`` compares the contents.
+
+Axes as in ``clip``. Every message names clip, view and field.
+"""
+
+import torch
+from torch import Tensor
+
+from diff4splat.data.clip import Clip, Flow, Tracks, View
+from diff4splat.data.json_fields import IDENTIFIER, MAX_FRAMES, MAX_SIDE_PX, MAX_VIEWS
+from diff4splat.errors import InputError
+from diff4splat.geometry import rigid
+
+_RIGID_TOLERANCE = 1e-5
+_HOME_TOLERANCE = 1e-6
+"""Of the first camera, which should be the identity."""
+
+
+def require_usable(clip: Clip, least_depth_share: float = 0.0) -> None:
+    """Refuse a clip that contradicts itself; ``least_depth_share`` of all pixels must have depth.
+
+    Raises:
+        InputError: one line that names clip and field, what was expected and what was got.
+    """
+    try:
+        _require_note(clip)
+        _require_times(clip)
+        for number, view in enumerate(clip.views):
+            _require_view(clip, view, f"view {number}")
+        _require_tracks(clip)
+        _require_depth_share(clip, least_depth_share)
+    except InputError as error:
+        raise InputError(f"clip '{clip.note.identifier[:80]}', {error}") from error
+
+
+def require_first_camera(clip: Clip) -> None:
+    """Refuse a clip whose world frame is not the first camera of its first view.
+
+    Raises:
+        InputError: says by how much it differs.
+    """
+    pose = clip.views[0].cameras.world_from_camera[0]
+    off = float((pose - torch.eye(4, dtype=pose.dtype)).abs().max())
+    if off > _HOME_TOLERANCE:
+        raise InputError(
+            f"clip '{clip.note.identifier}', view 0: expected the identity as its first pose, "
+            f"got a difference of {off:.2g}; express poses and tracks in the first camera's axes"
+        )
+
+
+def _require_note(clip: Clip) -> None:
+    note = clip.note
+    if not IDENTIFIER.fullmatch(note.identifier):
+        raise InputError("identifier: expected up to 80 letters, digits, '_' and '-'")
+    if not note.license or not note.source:
+        raise InputError("note: expected a source and a license, got an empty one; fill it in")
+    numbers = [each.instance for each in note.objects]
+    if len(set(numbers)) != len(numbers) or not all(1 <= number <= 255 for number in numbers):
+        raise InputError(f"objects: expected different instances from 1 to 255, got {numbers}")
+
+
+def _require_times(clip: Clip) -> None:
+    times = clip.times_s
+    _require(times, "times_s", torch.float64, (clip.frames,))
+    if not 1 <= clip.frames <= MAX_FRAMES:
+        raise InputError(f"times_s: expected 1 to {MAX_FRAMES} frames, got {clip.frames}")
+    if not bool(torch.isfinite(times).all() and (times.diff() > 0).all()):
+        raise InputError("times_s: expected finite times that increase from frame to frame")
+    if not 1 <= len(clip.views) <= MAX_VIEWS:
+        raise InputError(f"views: expected 1 to {MAX_VIEWS}, got {len(clip.views)}")
+    if max(clip.size_px) > MAX_SIDE_PX:
+        raise InputError(f"size: expected at most {MAX_SIDE_PX} per side, got {clip.size_px}")
+
+
+def _require_view(clip: Clip, view: View, where: str) -> None:
+    if view.cameras.size_px != clip.size_px:
+        raise InputError(
+            f"{where}: expected pictures of (height, width) {clip.size_px} like view 0, "
+            f"got {view.cameras.size_px}"
+        )
+    shape = (clip.frames, *clip.size_px)
+    _require(view.rgb, f"{where}, rgb", torch.uint8, (*shape, 3))
+    _require(view.depth, f"{where}, depth", torch.float32, shape)
+    if not bool(torch.isfinite(view.depth).all() and (view.depth >= 0).all()):
+        raise InputError(f"{where}, depth: expected finite depth, 0 for none, got other values")
+    _require_cameras(clip, view, f"{where}, cameras")
+    if view.instances is not None:
+        _require(view.instances, f"{where}, instances", torch.uint8, shape)
+    if view.flow is not None:
+        _require_flow(view.flow, f"{where}, flow", (clip.frames - 1, *clip.size_px))
+    _require_seen_tracks(clip, view, where)
+
+
+def _require_cameras(clip: Clip, view: View, where: str) -> None:
+    camera, count = view.cameras, clip.frames
+    _require(camera.world_from_camera, where, torch.float64, (count, 4, 4))
+    _require(camera.focal_px, f"{where}, focal_px", torch.float64, (count, 2))
+    _require(camera.center_px, f"{where}, center_px", torch.float64, (count, 2))
+    rigid.require_rigid(camera.world_from_camera, where, _RIGID_TOLERANCE)
+    if not bool((camera.world_from_camera[:, 3] == torch.eye(4)[3]).all()):
+        raise InputError(f"{where}: expected 0 0 0 1 as the last row of every pose")
+    intrinsics = torch.cat([camera.focal_px, camera.center_px], -1)
+    if not bool(torch.isfinite(intrinsics).all() and (camera.focal_px > 0).all()):
+        raise InputError(f"{where}: expected finite intrinsics and focal lengths above 0")
+
+
+def _require_flow(flow: Flow, where: str, shape: tuple[int, ...]) -> None:
+    _require(flow.to_next, where, torch.float32, (*shape, 2))
+    _require(flow.known, f"{where}.known", torch.bool, shape)
+    _require(flow.visible, f"{where}.visible", torch.bool, shape)
+    if bool((~torch.isfinite(flow.to_next).all(-1) & flow.known).any()):
+        raise InputError(f"{where}: expected finite flow where it is known, got NaN or infinity")
+    if bool((flow.visible & ~flow.known).any()):
+        raise InputError(f"{where}: expected known flow where it is visible, got unknown flow")
+
+
+def _require_seen_tracks(clip: Clip, view: View, where: str) -> None:
+    uv, visible = view.track_uv, view.track_visible
+    if uv is None and visible is None:
+        return
+    if uv is None or visible is None or clip.tracks is None:
+        raise InputError(f"{where}: expected tracks with both uv and visible, or none of them")
+    count = len(clip.tracks.instances)
+    _require(uv, f"{where}, track_uv", torch.float32, (clip.frames, count, 2))
+    _require(visible, f"{where}, track_visible", torch.bool, (clip.frames, count))
+    if not bool(torch.isfinite(uv).all()):
+        raise InputError(f"{where}, track_uv: expected finite numbers, got NaN or infinity")
+
+
+def _require_tracks(clip: Clip) -> None:
+    tracks: Tracks | None = clip.tracks
+    if tracks is None:
+        return
+    count = len(tracks.instances)
+    _require(tracks.instances, "tracks, instances", torch.uint8, (count,))
+    _require(tracks.positions, "tracks, positions", torch.float32, (clip.frames, count, 3))
+    _require(tracks.found_at, "tracks, found_at", torch.int64, (count, 2))
+    if not bool(torch.isfinite(tracks.positions).all()):
+        raise InputError("tracks, positions: expected finite numbers, got NaN or infinity")
+    limits = torch.tensor([len(clip.views), clip.frames])
+    inside = ((tracks.found_at >= 0) & (tracks.found_at < limits)).all(-1)
+    unknown = (tracks.found_at == -1).all(-1)
+    if not bool((inside | unknown).all()):
+        raise InputError("tracks, found_at: expected (view, frame) of this clip or (-1, -1)")
+
+
+def _require_depth_share(clip: Clip, least: float) -> None:
+    known = sum(int((view.depth > 0).sum()) for view in clip.views)
+    share = known / sum(view.depth.numel() for view in clip.views)
+    if share < least:
+        raise InputError(
+            f"depth: expected some in {least:.0%} of all pixels or more, got {share:.1%}"
+        )
+
+
+def _require(value: Tensor, where: str, dtype: torch.dtype, shape: tuple[int, ...]) -> None:
+    if value.dtype != dtype or tuple(value.shape) != shape:
+        want, got = str(dtype).removeprefix("torch."), str(value.dtype).removeprefix("torch.")
+        raise InputError(
+            f"{where}: expected {want} of shape {shape}, got {got} of shape {tuple(value.shape)}"
+        )
