@@ -1,0 +1,119 @@
+"""LPIPS weights from the files in circulation, safetensors or torch; nothing in them is executed.
+
+Two layouts, told apart by their names:
+
+    the lpips package's state    net.slice2.5.weight …  lin0.model.1.weight …  scaling_layer.shift
+    torchvision's network        features.5.weight …  (classifier.… is not needed)
+    beside lpips' heads file     lin0.model.1.weight …
+
+Newer versions of the package hold every head twice, as ``lin0`` and as ``lins.0``.
+"""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+from safetensors.torch import load_file
+from torch import Tensor
+
+from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.metrics.features.lpips import SCALE, SHIFT
+from diff4splat.metrics.features.trunks import Trunk
+
+SCALING = {"scaling_layer.shift": SHIFT, "scaling_layer.scale": SCALE}
+SHOWN = 4
+"""Names listed in an error message before "and so on"."""
+
+
+def read_lpips_weights(files: Sequence[Path], trunk: Trunk) -> dict[str, Tensor]:
+    """All weights of one or two files, float32, by the names of the lpips package.
+
+    Raises:
+        CheckpointError: a file is absent, or names or shapes are not those of the trunk.
+        FileFormatError: a file is damaged or holds something other than tensors.
+    """
+    found: dict[str, Tensor] = {}
+    for file in files:
+        named = _by_package_names(_read(file), trunk)
+        _refuse(sorted(named.keys() & found.keys()), f"{file}: given by the other file too")
+        found |= named
+    wanted = expected_shapes(trunk)
+    what = f"LPIPS-{trunk.name} weights"
+    _refuse([key for key in wanted if key not in found], f"{what}: missing")
+    _refuse([key for key in found if key not in wanted], f"{what}: unexpected")
+    _refuse(
+        [
+            f"{key} {tuple(found[key].shape)} instead of {shape}"
+            for key, shape in wanted.items()
+            if tuple(found[key].shape) != shape
+        ],
+        f"{what}: wrong shape of",
+    )
+    weights = {key: found[key].float() for key in wanted}
+    _refuse([key for key in wanted if not weights[key].isfinite().all()], f"{what}: not finite in")
+    return weights
+
+
+def expected_shapes(trunk: Trunk) -> dict[str, tuple[int, ...]]:
+    """Name and shape of every weight that LPIPS with this trunk has."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    for name, layer in trunk.convolutions().items():
+        shapes[f"{name}.weight"] = (layer.outputs, layer.inputs, layer.kernel, layer.kernel)
+        shapes[f"{name}.bias"] = (layer.outputs,)
+    for number, channels in enumerate(trunk.channels):
+        shapes[f"lin{number}.model.1.weight"] = (1, channels, 1, 1)
+    return shapes
+
+
+def _by_package_names(tensors: dict[str, Tensor], trunk: Trunk) -> dict[str, Tensor]:
+    slices = {layer.index: name for name, layer in trunk.convolutions().items()}
+    named: dict[str, Tensor] = {}
+    for key, value in tensors.items():
+        if key in SCALING:
+            _require_scaling(key, value)
+        elif match := re.fullmatch(r"features\.(\d+)\.(weight|bias)", key):
+            # A layer that this trunk lacks keeps its name and is refused under it.
+            prefix = slices.get(int(match[1]), f"features.{match[1]}")
+            named[f"{prefix}.{match[2]}"] = value
+        elif match := re.fullmatch(r"lins\.(\d+)\.(.+)", key):
+            named.setdefault(f"lin{match[1]}.{match[2]}", value)
+        elif not key.startswith("classifier."):
+            named[key] = value
+    return named
+
+
+def _require_scaling(key: str, value: Tensor) -> None:
+    """The package stores its input scaling; another one would be another metric."""
+    expected, got = torch.tensor(SCALING[key]), value.float().flatten()
+    # Loose enough for weights stored in half precision.
+    if got.shape != expected.shape or not torch.allclose(got, expected, atol=2e-3):
+        raise CheckpointError(
+            f"LPIPS weights: expected {key} of version 0.1, {SCALING[key]}, got {got.tolist()}; "
+            "use weights of version 0.1"
+        )
+
+
+def _read(file: Path) -> dict[str, Tensor]:
+    if not file.is_file():
+        raise CheckpointError(f"{file}: expected a weight file, got none; check the path")
+    try:
+        if file.suffix == ".safetensors":
+            return load_file(file)
+        tensors = torch.load(file, map_location="cpu", weights_only=True)
+    except Exception as error:  # what damaged bytes make the two readers raise is not documented
+        raise FileFormatError(
+            f"{file}: expected safetensors or a torch file of tensors, got something else; "
+            "fetch the weights again"
+        ) from error
+    if not isinstance(tensors, dict) or not all(isinstance(v, Tensor) for v in tensors.values()):
+        raise FileFormatError(
+            f"{file}: expected tensors by name, got {type(tensors).__name__}; save a state_dict"
+        )
+    return tensors
+
+
+def _refuse(found: list[str], what: str) -> None:
+    if found:
+        listed = ", ".join(found[:SHOWN]) + (", …" if len(found) > SHOWN else "")
+        raise CheckpointError(f"{what} {len(found)} ({listed}); choose files of that network")

@@ -1,0 +1,19 @@
+"""Sums over the part of a map that is known.
+
+Axes: ``*b`` batch, ``p`` places (pixels, points). What stands in hidden places may be NaN: it is
+replaced *before* anything is computed with it, because NaN times a zero gradient is NaN.
+"""
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+
+def hidden_as_zero(values: Float[Tensor, "*d"], keep: Bool[Tensor, "*#d"]) -> Float[Tensor, "*d"]:
+    """The values where ``keep``, and 0 elsewhere."""
+    return torch.where(keep, values, torch.zeros((), dtype=values.dtype, device=values.device))
+
+
+def masked_mean(values: Float[Tensor, "*b p"], keep: Bool[Tensor, "*b p"]) -> Float[Tensor, "*b"]:
+    """Mean over kept places; 0 with zero gradient where none is kept."""
+    return hidden_as_zero(values, keep).sum(-1) / keep.sum(-1).clamp(min=1)
