@@ -54,20 +54,21 @@ def exact(function: Callable[..., Any]) -> Any:
 
 
 @cache
-def cache_folder() -> Path:
+def cache_folder(*others: Path) -> Path:
     """Where compiled kernels are kept: under ``NUMBA_CACHE_DIR``, or the user's cache.
 
-    Its name is a digest of all sources here, of Numba, Python and the processor. Numba by itself
-    notices a change of the file that holds a kernel, and not of the functions that the kernel takes
-    from other files.
+    Its name is a digest of all sources here and in ``others`` (folders of other kernels), of Numba,
+    Python and the processor. Numba by itself notices a change of the file that holds a kernel, and
+    not of the functions that the kernel takes from other files.
 
     Raises:
         OSError: it cannot be made or written to.
     """
     machine = (numba.__version__, sys.version_info[:2], llvmlite.binding.get_host_cpu_name())
     digest = hashlib.sha256(repr(machine).encode())
-    for file in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(file.read_bytes())
+    for sources in (Path(__file__).parent, *others):
+        for file in sorted(sources.glob("*.py")):
+            digest.update(file.read_bytes())
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     base = os.environ.get("NUMBA_CACHE_DIR") or Path(home) / "diff4splat" / "kernels"
     folder = Path(base) / digest.hexdigest()[:16]

@@ -1,0 +1,43 @@
+"""A contact sheet of clips: the first and the last input frame of each, side by side.
+
+Axes: ``h w`` pixels of one frame.
+"""
+
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.data.clip import Clip
+from diff4splat.data.clip_folder import ClipFolder
+from diff4splat.data.clip_part import ClipPart
+from diff4splat.io.images import write_png
+
+COLUMNS, GAP_PX = 8, 4
+MOST_CLIPS = 64
+
+
+def write_clip_sheet(folder: Path, file: Path) -> None:
+    """Up to ``MOST_CLIPS`` clips, spread evenly over the folder."""
+    clips = ClipFolder(folder)
+    count = min(len(clips), MOST_CLIPS)
+    places = torch.linspace(0, len(clips) - 1, count).round().long().tolist()
+    part = ClipPart(views=(0,), flow=False, instances=False, tracks=False)
+    write_png(clip_sheet([clips.clip(place, part) for place in places]), file)
+
+
+def clip_sheet(clips: list[Clip]) -> Float[Tensor, "height width 3"]:
+    """Rows of eight clips on white."""
+    tiles = [_first_and_last(clip) for clip in clips]
+    blank = torch.ones_like(tiles[0])
+    columns = min(COLUMNS, len(tiles))
+    tiles += [blank] * (-len(tiles) % columns)
+    rows = [torch.cat(tiles[at : at + columns], 1) for at in range(0, len(tiles), columns)]
+    return torch.cat(rows)
+
+
+def _first_and_last(clip: Clip) -> Float[Tensor, "h w 3"]:
+    rgb = clip.views[0].rgb
+    both = torch.cat([rgb[0], rgb[-1]], 1).float() / 255
+    return torch.nn.functional.pad(both, (0, 0, 0, GAP_PX, 0, GAP_PX), value=1.0)

@@ -1,0 +1,1 @@
+"""Drawing procedural worlds: pictures with exact depth, masks, flow and tracks, on one core."""

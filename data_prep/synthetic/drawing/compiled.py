@@ -1,0 +1,40 @@
+"""How the kernels here are compiled: to equal bits on every machine.
+
+Nothing is fused or reordered, and no function of a mathematics library is called, so that a world
+looks the same wherever it is drawn. A ``kernel`` is called from Python, ``inlined`` functions and
+``shared`` ones from kernels; the latter are compiled once however many places call them.
+"""
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit
+
+from diff4splat.render.raster.jit import cache_folder
+
+_OPTIONS = {"nogil": True, "error_model": "numpy"}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile ``function`` when it is first called, and keep it on disk where that is allowed."""
+    # Test hooks wrap functions to check their annotations; kernels need the bare one.
+    bare, before = inspect.unwrap(function), config.CACHE_DIR
+    try:
+        config.CACHE_DIR = str(cache_folder(Path(__file__).parent))
+        return njit(cache=True, **_OPTIONS)(bare)
+    except (OSError, RuntimeError):
+        return njit(**_OPTIONS)(bare)
+    finally:
+        config.CACHE_DIR = before
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile ``function`` into every place that calls it."""
+    return njit(forceinline=True, **_OPTIONS)(inspect.unwrap(function))
+
+
+def shared(function: Callable[..., Any]) -> Any:
+    """Compile ``function`` once for all kernels of a module that call it; scalars only."""
+    return njit(**_OPTIONS)(inspect.unwrap(function))

@@ -1,0 +1,1 @@
+"""Where things stand: scene kinds, backdrops, and the space that motions and cameras need."""

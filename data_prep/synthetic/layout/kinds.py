@@ -1,0 +1,130 @@
+"""The kinds of scenes and their measures.
+
+The stage is the circle around the origin in which things happen; its radius sets the scale of
+everything else. Ranges are drawn from evenly.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneKind:
+    """One kind of place."""
+
+    phrase: str
+    """How captions name it."""
+    stage_m: tuple[float, float]
+    tilt_deg: tuple[float, float]
+    """How far the camera looks down."""
+    ground: str
+    """Role of what things stand on."""
+    tags: frozenset[str]
+    """Which families stand around: see ``Family.places``."""
+    props: tuple[int, int]
+    far: frozenset[str] = frozenset()
+    far_count: tuple[int, int] = (0, 0)
+    is_indoors: bool = False
+    is_under_water: bool = False
+    hills_m: tuple[float, float] = (0.0, 0.0)
+    weight: float = 1.0
+    """How often it comes, beside the others."""
+
+
+SCENE_KINDS: dict[str, SceneKind] = {
+    "room": SceneKind(
+        weight=2.0,
+        phrase="in a room",
+        tags=frozenset(["room"]),
+        stage_m=(0.7, 1.3),
+        tilt_deg=(6.0, 28.0),
+        ground="floor",
+        props=(4, 7),
+        is_indoors=True,
+    ),
+    "tabletop": SceneKind(
+        weight=1.5,
+        phrase="on a table",
+        tags=frozenset(["table"]),
+        stage_m=(0.16, 0.34),
+        tilt_deg=(10.0, 34.0),
+        ground="wood",
+        props=(4, 8),
+        is_indoors=True,
+    ),
+    "meadow": SceneKind(
+        weight=1.5,
+        phrase="in a meadow",
+        tags=frozenset(["ground"]),
+        far=frozenset(["tree", "conifer", "house", "windmill", "bush"]),
+        stage_m=(1.2, 3.6),
+        tilt_deg=(2.0, 20.0),
+        ground="lawn",
+        props=(7, 14),
+        far_count=(5, 9),
+        hills_m=(3.0, 16.0),
+    ),
+    "garden": SceneKind(
+        weight=1.5,
+        phrase="in a garden",
+        tags=frozenset(["ground"]),
+        far=frozenset(["tree", "house", "bush", "fence"]),
+        stage_m=(0.8, 2.2),
+        tilt_deg=(4.0, 24.0),
+        ground="lawn",
+        props=(8, 14),
+        far_count=(4, 7),
+        hills_m=(0.0, 3.0),
+    ),
+    "dunes": SceneKind(
+        weight=0.7,
+        phrase="on sand",
+        tags=frozenset(["sand"]),
+        far=frozenset(["conifer", "tower", "bush"]),
+        stage_m=(1.0, 3.4),
+        tilt_deg=(2.0, 20.0),
+        ground="sand",
+        props=(5, 10),
+        far_count=(1, 4),
+        hills_m=(6.0, 20.0),
+    ),
+    "street": SceneKind(
+        weight=1.5,
+        phrase="in a street",
+        tags=frozenset(["street"]),
+        far=frozenset(["house", "flats", "tree", "tower"]),
+        stage_m=(1.4, 3.6),
+        tilt_deg=(3.0, 20.0),
+        ground="asphalt",
+        props=(4, 8),
+        far_count=(5, 8),
+        hills_m=(0.0, 5.0),
+    ),
+    "courtyard": SceneKind(
+        weight=1.5,
+        phrase="in a courtyard",
+        tags=frozenset(["street", "ground"]),
+        stage_m=(1.1, 2.6),
+        tilt_deg=(4.0, 26.0),
+        ground="paving",
+        props=(5, 9),
+    ),
+    "seabed": SceneKind(
+        weight=0.6,
+        phrase="under water",
+        tags=frozenset(["sea"]),
+        stage_m=(0.7, 1.8),
+        tilt_deg=(2.0, 18.0),
+        ground="sand",
+        props=(9, 15),
+        is_under_water=True,
+        hills_m=(2.0, 5.0),
+    ),
+}
+
+OUTSIDERS: dict[str, frozenset[str]] = {
+    "sand": frozenset(
+        {"rock", "grass", "bush", "barrel", "crate", "arch", "pillar", "vase", "fence"}
+    ),
+    "sea": frozenset({"rock", "grass", "mushroom", "pillar", "vase", "arch", "bush", "barrel"}),
+}
+"""Families for places that ``Family.places`` does not know."""

@@ -1,0 +1,102 @@
+"""Which families, textures, motions, palettes and scenes a split may use: data, versioned.
+
+``training`` worlds use the training lists alone. ``held_out`` worlds use both lists, and at least
+one family, one texture and, when something moves, one motion that no training world has.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
+
+from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
+from diff4splat.data_prep.synthetic.materials import ROLES
+from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
+from diff4splat.data_prep.synthetic.palettes import PALETTES
+from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
+from diff4splat.errors import ConfigError
+
+SplitName = Literal["training", "held_out"]
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allowed:
+    """Names of one kind that a split may use, and those among them that training lacks."""
+
+    names: tuple[str, ...]
+    new: frozenset[str]
+
+    def only(self, chosen: tuple[str, ...] | None, what: str) -> "Allowed":
+        """Narrowed to what a recipe asks for.
+
+        Raises:
+            ConfigError: a name is unknown or belongs to the other split.
+        """
+        if chosen is None:
+            return self
+        for name in chosen:
+            if name not in self.names:
+                raise ConfigError(
+                    f"{what}: expected one of {', '.join(self.names)}, got '{name}'; "
+                    "choose another name or the other split"
+                )
+        return Allowed(names=chosen, new=self.new & frozenset(chosen))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Split:
+    """Everything a split may use."""
+
+    families: Allowed
+    textures: Allowed
+    motions: Allowed
+    palettes: Allowed
+    scenes: Allowed
+
+
+def known_names() -> dict[str, frozenset[str]]:
+    """All names there are, by list."""
+    textures = {option.family for role in ROLES.values() for option in role.options}
+    tables = (FAMILIES, textures, MOTIONS, PALETTES, SCENE_KINDS)
+    lists = ("families", "textures", "motions", "palettes", "scenes")
+    return {name: frozenset(table) for name, table in zip(lists, tables, strict=True)}
+
+
+@cache
+def load_split(name: SplitName) -> Split:
+    """The current split file, checked."""
+    file = resources.files("diff4splat.data_prep.synthetic.splits") / f"v{VERSION}.json"
+    return parse_split(json.loads(file.read_text(encoding="utf-8")), name)
+
+
+def parse_split(content: dict[str, Any], name: str) -> Split:
+    """A split from the content of its file.
+
+    Raises:
+        ConfigError: another version, an unknown name, a name in both lists or in neither.
+    """
+    if content.get("version") != VERSION:
+        raise ConfigError(f"splits: expected version {VERSION}, got {content.get('version')!r}")
+    if name not in ("training", "held_out"):
+        raise ConfigError(f"split: expected training or held_out, got '{name}'")
+    return Split(
+        **{key: _allowed(content, key, known, name) for key, known in known_names().items()}
+    )
+
+
+def _allowed(content: dict[str, Any], key: str, known: frozenset[str], name: str) -> Allowed:
+    training, held_out = content[key]["training"], content[key]["held_out"]
+    both = [*training, *held_out]
+    if unknown := set(both) - known:
+        raise ConfigError(f"splits.{key}: expected known names, got {', '.join(sorted(unknown))}")
+    if missing := known - set(both):
+        raise ConfigError(
+            f"splits.{key}: expected every name, missing {', '.join(sorted(missing))}"
+        )
+    if len(both) != len(set(both)):
+        raise ConfigError(f"splits.{key}: expected every name once, got one twice")
+    if name == "training":
+        return Allowed(names=tuple(sorted(training)), new=frozenset())
+    return Allowed(names=tuple(sorted(both)), new=frozenset(held_out))
