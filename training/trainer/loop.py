@@ -1,0 +1,124 @@
+"""What happens in one step, and after it.
+
+forward and backward ─ share losses ─ update or skip ─ watch spikes ─ evaluate ─ save
+"""
+
+import time
+from collections.abc import Callable, Iterator
+
+from diff4splat.training.trainer.divergence import (
+    record_loss,
+    record_skip,
+    require_few_skips,
+    skip_reason,
+)
+from diff4splat.training.trainer.loader import Loaded
+from diff4splat.training.trainer.optim import (
+    clip_gradient,
+    gradient_norm,
+    schedule,
+    set_learning_rate,
+)
+from diff4splat.training.trainer.parallel import trained_parameters
+from diff4splat.training.trainer.run_files import finite
+from diff4splat.training.trainer.settings import Outcome
+from diff4splat.training.trainer.step import RandomState, StepReport, merge, run_micro_batches
+from diff4splat.training.trainer.training_run import TrainingRun
+
+StopReason = Callable[[], Outcome | None]
+
+
+def take_step(training: TrainingRun, batches: Iterator[Loaded], stop: StopReason) -> StepReport:
+    """Learn from one global batch, unless that would spoil the weights.
+
+    Raises:
+        DivergenceError: too many steps were skipped.
+    """
+    began, progress = time.perf_counter(), training.progress
+    random = RandomState(
+        seed=training.run.seed, stage=training.recipe.name, device=training.processes.device
+    )
+    mine = run_micro_batches(training.parallel, batches, training.plan.accumulation, random)
+    norm = gradient_norm(trained_parameters(training.parallel.stage).values())
+    mine.stop = stop()
+    report = merge(training.processes.gather(mine))
+    _learn(training, report, norm)
+    training.optimizer.zero_grad(set_to_none=True)
+    for failure in report.failures:
+        progress.replaced[failure.reason] = progress.replaced.get(failure.reason, 0) + 1
+    training.journal.step(
+        progress.step, report, _figures(training, report, norm, time.perf_counter() - began)
+    )
+    require_few_skips(progress, training.run.trainer, training.journal.snapshot)
+    return report
+
+
+def must_roll_back(training: TrainingRun) -> bool:
+    """Whether spikes came in a row and there is something to return to; returns to it.
+
+    Raises:
+        DivergenceError: returning did not help before.
+    """
+    settings, progress = training.run.trainer, training.progress
+    if settings.spike_factor <= 0 or progress.spikes_in_a_row < settings.spikes_before_rollback:
+        return False
+    if training.roll_back():
+        return True
+    training.journal.note("loss spikes, and no checkpoint to go back to: training goes on")
+    progress.spikes_in_a_row = 0
+    return False
+
+
+def finish_step(training: TrainingRun) -> None:
+    """Count the step, then evaluate and save when it is time."""
+    progress, settings = training.progress, training.run.trainer
+    progress.step += 1
+    training.saved = None
+    last = progress.step == training.recipe.steps
+    if settings.evaluation_samples and (last or progress.step % settings.evaluate_every == 0):
+        _evaluate(training)
+    # A checkpoint amid spikes is nothing to go back to.
+    if progress.step % settings.checkpoint_every == 0 and not progress.spikes_in_a_row:
+        training.save()
+
+
+def _learn(training: TrainingRun, report: StepReport, norm: float) -> None:
+    """Update weights and averages, or count why not."""
+    progress, parameters = training.progress, trained_parameters(training.parallel.stage).values()
+    if reason := skip_reason(report.total, norm):
+        record_skip(progress, reason)
+        training.journal.skip(progress.step, report, reason)
+        return
+    progress.skips_in_a_row = 0
+    clip_gradient(parameters, norm, training.recipe.optimizer.clip_norm)
+    set_learning_rate(training.optimizer, _learning_rate(training))
+    training.optimizer.step()
+    training.averages.update()
+    if record_loss(progress, report.total, training.run.trainer.spike_factor):
+        training.journal.spike(progress.step, report)
+
+
+def _figures(
+    training: TrainingRun, report: StepReport, norm: float, seconds: float
+) -> dict[str, float]:
+    return {
+        "gradient_norm": norm,
+        "learning_rate": _learning_rate(training),
+        "seconds": seconds,
+        "waiting_share": report.waited_s / seconds,
+        "samples_per_s": training.recipe.global_batch / seconds,
+        "skipped": training.progress.skipped,
+    }
+
+
+def _learning_rate(training: TrainingRun) -> float:
+    settings, recipe = training.recipe.optimizer, training.recipe
+    return settings.learning_rate * schedule(training.progress.step, recipe.steps, settings)
+
+
+def _evaluate(training: TrainingRun) -> None:
+    module, averages = training.parallel.module, training.averages
+    measures = training.evaluation.measure(module, averages)
+    panel = training.evaluation.panel(module, averages)
+    training.progress.measures = finite(measures)
+    training.journal.evaluation(training.progress.step, measures, panel)

@@ -1,0 +1,67 @@
+"""How a call of ``run_stage`` is carried out, and what it returns."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from diff4splat.errors import ConfigError
+from diff4splat.report.phases import Phases
+from diff4splat.training.recipe import TrainerSettings
+
+Outcome = Literal["finished", "signalled", "step_limit", "time_limit"]
+"""Why training returned; all but ``finished`` go on with the next call."""
+
+
+def _silent(text: str) -> None:
+    """Take a note to nobody."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSettings:
+    """One call; calls with the same folder continue each other."""
+
+    folder: Path
+    """Of this stage alone: log, checkpoints, panels, result. All processes must see it."""
+    seed: int
+    fingerprint: str
+    """Hash of everything that decides what is learnt; a checkpoint with another is refused."""
+    trainer: TrainerSettings = field(default_factory=TrainerSettings)
+    start_from: Path | None = None
+    """Folder of the finished stage before this one: its weights and averages are taken over."""
+    store_frozen: bool = False
+    """Put frozen parts into checkpoints too."""
+    stop_after_steps: int | None = None
+    """Save and return after so many steps of this call."""
+    stop_after_s: float | None = None
+    """Save and return at the first step that ends after so many seconds of this call."""
+    log_every: int = 1
+    device: str | None = None
+    """None takes the GPU of this process if there is one."""
+    timeout_s: float = 600.0
+    """How long processes wait for each other before they give up."""
+    phases: Phases = field(default_factory=Phases)
+    note: Callable[[str], None] = _silent
+    """Takes one line for people; only the first process talks."""
+
+    def __post_init__(self) -> None:
+        counts = (self.stop_after_steps or 1, self.log_every, self.timeout_s)
+        if min(counts) <= 0 or (self.stop_after_s or 0) < 0:
+            raise ConfigError(
+                "run: expected stop_after_steps, log_every and timeout_s above 0, got "
+                f"{self.stop_after_steps}, {self.log_every} and {self.timeout_s}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageResult:
+    """Where a stage stands."""
+
+    stage: str
+    outcome: Outcome
+    step: int
+    """Steps done, over all calls."""
+    measures: Mapping[str, float]
+    """Means of the last evaluation."""
+    checkpoint: Path
+    """Folder of the newest checkpoint."""
