@@ -33,5 +33,9 @@ class CheckpointError(Diff4SplatError, ValueError):
     """Weights do not belong to the configuration that should load them."""
 
 
+class DivergenceError(Diff4SplatError, RuntimeError):
+    """A training run does not learn any more: too many skips, or spikes that come back."""
+
+
 class MissingExtraError(Diff4SplatError, ImportError):
     """An optional dependency is not installed."""

@@ -4,7 +4,7 @@ Every part starts from its own random stream, so weights depend on the configura
 the part alone: not on the caller's random state, nor on whether the text encoder is built.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 
@@ -52,15 +52,18 @@ def create_networks(
     *,
     with_text: bool = True,
     seed: int = 0,
+    needed: Collection[str] | None = None,
 ) -> Networks:
     """Networks with random weights that are the same for the same arguments.
 
     On the meta device nothing is allocated; elsewhere weights are drawn on the CPU and then moved.
+    Where ``needed`` names parts, all others stay on the meta device: shapes without weights.
     """
     target = torch.device("cpu" if device is None else device)
 
     def build(part: str, make: Callable[[], nn.Module]) -> nn.Module:
-        return _build(part, make, target, seed)
+        wanted = needed is None or part in needed
+        return _build(part, make, target if wanted else torch.device("meta"), seed)
 
     return Networks(
         vae=build("vae", lambda: VideoVae(config.vae)),

@@ -118,6 +118,10 @@ class StageRecipe:
     optimizer: OptimizerSettings = field(default_factory=OptimizerSettings)
     data: DataSettings = field(default_factory=DataSettings)
     gates: tuple[Gate, ...] = ()
+    text_dropout: float = 0.1
+    """Share of steps without text, for guidance (public code of the paper: 0.1)."""
+    level_shift: float = 1.0
+    """Above 1 leans to noisy levels; 5 in the paper's public code, at 512² and 49 frames."""
 
     def __post_init__(self) -> None:
         if self.steps < 1 or self.micro_batch < 1 or self.global_batch % self.micro_batch:

@@ -7,7 +7,7 @@ by ``SampleKey``, never from global state, so that a run resumes exactly on any 
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Float, Int
@@ -17,6 +17,7 @@ TOTAL = "total"
 """The term that is differentiated; all others are there to be looked at."""
 
 
+@runtime_checkable
 class Batch(Protocol):
     """What a stage takes; the trainer only moves it and reads which samples it holds."""
 
@@ -25,7 +26,7 @@ class Batch(Protocol):
         """Global index of each sample: all randomness inside a step derives from it."""
         ...
 
-    def to(self, device: torch.device) -> Self:
+    def to(self, device: torch.device) -> "Batch":
         """Move every tensor."""
         ...
 

@@ -16,7 +16,10 @@ class ConsolePhases(Phases):
 
     @contextmanager
     def bar(self, name: str, steps: int) -> Iterator[Advance]:
-        """One bar for one phase; it stays on screen when the phase is over."""
+        """One bar for one phase; it stays on screen when the phase is over.
+
+        Phases that stop early keep their count; those that report no steps are then complete.
+        """
         columns = (
             TextColumn("{task.description:<14}"),
             BarColumn(bar_width=28),
@@ -26,7 +29,8 @@ class ConsolePhases(Phases):
         with Progress(*columns, console=CONSOLE) as progress:
             task = progress.add_task(name, total=steps)
             yield lambda: progress.advance(task)
-            progress.update(task, completed=steps)
+            if not progress.tasks[task].completed:
+                progress.update(task, completed=steps)
 
 
 def note(text: str) -> None:

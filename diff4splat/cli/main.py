@@ -9,15 +9,21 @@ import tyro
 
 from diff4splat.cli.convert import Convert
 from diff4splat.cli.doctor import Doctor
+from diff4splat.cli.evaluate import Evaluate
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.paths import ListPaths, PreviewPath
+from diff4splat.cli.prepare import PrepareCheck, PrepareSynthetic
 from diff4splat.cli.render import Render
 from diff4splat.cli.report import ErrorTime, ListKnobs
+from diff4splat.cli.train import Train
 from diff4splat.errors import Diff4SplatError, InputError
 
 subcommand = tyro.conf.subcommand
 Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
+Prepare = (
+    Annotated[PrepareSynthetic, subcommand("synth")] | Annotated[PrepareCheck, subcommand("check")]
+)
 Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
 Command = (
     Annotated[Generate, subcommand("generate")]
@@ -26,6 +32,9 @@ Command = (
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]
+    | Annotated[Prepare, subcommand("prepare", description="Clips to train on: make, check.")]
+    | Annotated[Train, subcommand("train")]
+    | Annotated[Evaluate, subcommand("eval")]
     | Annotated[Doctor, subcommand("doctor")]
 )
 BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 2, 130, 141

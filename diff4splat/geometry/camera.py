@@ -5,6 +5,7 @@ at (x, y) = (j + 0.5, i + 0.5). In OpenCV camera axes: u = f_x x/z + c_x, v = f_
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -114,6 +115,28 @@ def pinhole(
         center_px=torch.tensor([width / 2, height / 2], dtype=dtype),
         world_from_camera=torch.eye(4, dtype=dtype),
         size_px=size_px,
+    )
+
+
+def stack_cameras(cameras: Sequence[Camera]) -> Camera:
+    """Cameras of one batch shape along a new leading axis."""
+    return _combined(cameras, torch.stack)
+
+
+def join_cameras(cameras: Sequence[Camera]) -> Camera:
+    """Batches of cameras one after the other."""
+    return _combined(cameras, torch.cat)
+
+
+def _combined(cameras: Sequence[Camera], combine: Callable[[list[Tensor]], Tensor]) -> Camera:
+    sizes = {camera.size_px for camera in cameras}
+    if len(sizes) != 1:
+        raise ShapeError(f"cameras: expected one picture size, got {sorted(sizes)}; resize them")
+    return Camera(
+        focal_px=combine([camera.focal_px for camera in cameras]),
+        center_px=combine([camera.center_px for camera in cameras]),
+        world_from_camera=combine([camera.world_from_camera for camera in cameras]),
+        size_px=cameras[0].size_px,
     )
 
 

@@ -109,3 +109,9 @@ def test_documentation_lists_the_counts() -> None:
     rows["total"] = [sum(table.values()) for table in counts]
     for part, row in rows.items():
         assert f"| {part} | {' | '.join(f'{count:,}' for count in row)} |" in text
+
+
+def test_parts_that_are_not_needed_have_shapes_but_no_weights() -> None:
+    full, some = create_networks(tiny_size()), create_networks(tiny_size(), needed=("ldrm",))
+    assert torch.equal(weights(full.ldrm), weights(some.ldrm))
+    assert {parameter.device.type for parameter in some.dit.parameters()} == {"meta"}

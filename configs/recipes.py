@@ -1,0 +1,59 @@
+"""Every recipe by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+from diff4splat.configs.paper import paper_recipe
+from diff4splat.configs.small import small_recipe
+from diff4splat.configs.test import test_recipe
+from diff4splat.errors import ConfigError
+from diff4splat.training.recipe import DataSettings, Recipe
+from diff4splat.training.recipe_json import recipe_from_json
+
+RECIPES: Mapping[str, Callable[[], Recipe]] = MappingProxyType(
+    {"test": test_recipe, "small": small_recipe, "paper": paper_recipe}
+)
+
+
+def recipe_by_name(name: str) -> Recipe:
+    """The recipe of that name.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    if name not in RECIPES:
+        raise ConfigError(f"--config: expected one of {', '.join(RECIPES)}, got {name!r}")
+    return RECIPES[name]()
+
+
+def find_recipe(name_or_file: str) -> Recipe:
+    """A recipe by name, or from a JSON file.
+
+    Raises:
+        ConfigError: neither, or the file is not a recipe.
+    """
+    if not name_or_file.endswith(".json"):
+        return recipe_by_name(name_or_file)
+    try:
+        text = Path(name_or_file).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"--config {name_or_file}: expected a recipe in JSON, got a file that cannot be read; "
+            "check the path"
+        ) from error
+    return recipe_from_json(text)
+
+
+def with_clips(recipe: Recipe, folder: Path) -> Recipe:
+    """The recipe with every source replaced by a folder of shards; shares of still clips stay."""
+    stages = [
+        replace(stage, data=_from_folder(stage.data, folder.resolve())) for stage in recipe.stages
+    ]
+    return replace(recipe, stages=tuple(stages))
+
+
+def _from_folder(data: DataSettings, folder: Path) -> DataSettings:
+    sources = [replace(source, kind="shards", folder=str(folder)) for source in data.sources]
+    return replace(data, sources=tuple(sources))

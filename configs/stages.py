@@ -1,0 +1,44 @@
+"""The order of stages that every recipe keeps, and what differs between them.
+
+    vae → static-low → static-high → dynamic → generator → joint
+
+The middle three are the paper's (40,000, 40,000 and 20,000 steps). The autoencoder comes first and
+the video model after them because no public weights are assumed; both are trained by the paper in
+some other way that it does not describe.
+"""
+
+from dataclasses import replace
+
+from diff4splat.training.recipe import DataSettings, Gate, SourceSettings, StageRecipe
+
+STILL = (SourceSettings(still_share=1.0),)
+"""Clips in which only the camera moves."""
+MIXED = (SourceSettings(still_share=0.25),)
+"""Static clips keep their share in the dynamic stage: 20 to 30 % (ours, after MoVieS)."""
+
+
+def static_data(data: DataSettings) -> DataSettings:
+    """The same samples from clips in which nothing moves, without tracks."""
+    return replace(data, sources=STILL, tracks=0)
+
+
+def dynamic_data(data: DataSettings) -> DataSettings:
+    """The same samples from moving and still clips."""
+    return replace(data, sources=MIXED)
+
+
+def reconstruction_gates(psnr: float, depth_correlation: float) -> tuple[Gate, ...]:
+    """What a static stage must reach."""
+    return (
+        Gate(measure="psnr", bound=psnr),
+        Gate(measure="depth_correlation", bound=depth_correlation),
+    )
+
+
+def later(
+    stage: StageRecipe, name: str, size_px: tuple[int, int], rate_factor: float
+) -> StageRecipe:
+    """The same stage at another size with another learning rate."""
+    optimizer = replace(stage.optimizer, learning_rate=stage.optimizer.learning_rate * rate_factor)
+    data = replace(stage.data, size_px=size_px)
+    return replace(stage, name=name, data=data, optimizer=optimizer)

@@ -1,0 +1,73 @@
+"""A recipe of seconds: random networks of the ``test`` size, to prove that every stage learns."""
+
+from dataclasses import replace
+
+from diff4splat.configs.stages import dynamic_data, later, reconstruction_gates, static_data
+from diff4splat.models.sizes import test_size
+from diff4splat.training.recipe import (
+    DataSettings,
+    OptimizerSettings,
+    Recipe,
+    StageRecipe,
+    TrainerSettings,
+)
+
+
+def test_recipe() -> Recipe:
+    """Five frames of 32 × 32; a hundred steps a stage."""
+    model = test_size()
+    data = DataSettings(
+        size_px=model.size_px, frames=model.frames, views=2, target_frames=2, tracks=32, workers=0
+    )
+    optimizer = OptimizerSettings(learning_rate=3e-3, warmup_steps=10)
+    vae = StageRecipe(
+        name="vae",
+        kind="vae",
+        steps=100,
+        global_batch=2,
+        micro_batch=1,
+        trained=("vae",),
+        optimizer=optimizer,
+        data=static_data(data),
+    )
+    static = replace(
+        vae,
+        name="static-low",
+        kind="static",
+        trained=("ldrm",),
+        gates=reconstruction_gates(psnr=5.0, depth_correlation=-1.0),
+    )
+    dynamic = replace(
+        static,
+        name="dynamic",
+        kind="dynamic",
+        trained=("ldrm", "deformation"),
+        data=dynamic_data(data),
+    )
+    generator = replace(
+        dynamic, name="generator", kind="generator", trained=("text_encoder", "dit"), gates=()
+    )
+    joint = replace(
+        generator,
+        name="joint",
+        kind="joint",
+        trained=("text_encoder", "dit", "ldrm", "deformation"),
+    )
+    return Recipe(
+        name="test",
+        seed=0,
+        model=model,
+        stages=(
+            vae,
+            static,
+            later(static, "static-high", (64, 64), 0.25),
+            dynamic,
+            generator,
+            joint,
+        ),
+        trainer=TrainerSettings(checkpoint_every=50, evaluate_every=50, evaluation_samples=2),
+    )
+
+
+test_recipe.__test__ = False
+"""pytest must not take the function for a test."""

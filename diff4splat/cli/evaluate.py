@@ -1,0 +1,92 @@
+"""``diff4splat eval``: how good a model is on clips that nobody trained on, beside trivial answers.
+
+--protocol ── load_protocol ── open_clips ─┐
+--model ───── Diff4SplatPipeline ── subject ┴─ evaluate ─ results.json, results.md, items.png
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from diff4splat.training.evaluation.subjects import Subject
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate:
+    """Measure a model on held-out clips, with trivial baselines in the same table."""
+
+    model: str = "small"
+    """A model folder, or the name of a size with random weights: test, small."""
+    protocol: str = "held_out_v1"
+    """Name of a protocol that ships, or a JSON file of your own."""
+    task: Literal["generation", "reconstruction", "text"] = "generation"
+    """From the first picture; from the whole input video; or does the text decide what moves."""
+    out: Path = Path("evaluation")
+    """Folder for the results."""
+    items: int | None = None
+    """Measure the first so many clips only; the table then says that it is a subset."""
+    features: str | None = None
+    """LPIPS weights that you have, as `vgg:FILE` or `alex:TRUNK,HEADS`; if left out, a stand-in."""
+    steps: int = 16
+    """Steps of the sampler."""
+    fresh: bool = False
+    """Measure again what an earlier run into the same folder has measured."""
+
+    def run(self) -> None:
+        """Check everything cheap first, then measure, write, and print the table."""
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.cli.installation import speck
+        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.metrics.features.load import load_features
+        from diff4splat.training.evaluation.captions import grammar_caption
+        from diff4splat.training.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
+        from diff4splat.training.evaluation.measuring import Setup
+        from diff4splat.training.evaluation.opening import open_clips
+        from diff4splat.training.evaluation.protocol_json import load_protocol
+
+        loaded, phases = load_protocol(self.protocol), ConsolePhases()
+        features, clips = load_features(self.features), open_clips(loaded)
+        with phases.phase("load model"):
+            subject = self.subject()
+        protocol = loaded.protocol
+        setup = Setup(
+            protocol=protocol,
+            task=self.task,
+            subject=subject,
+            features=features,
+            captioner=grammar_caption,
+        )
+        prepare_renderer(speck("cpu"), phases)
+        extent = Extent(limit=self.items, fresh=self.fresh)
+        found = evaluate(clips, setup, self.out, extent, phases)
+        print(found.markdown)
+        if found.outcome.taken_up:
+            note(
+                f"{found.outcome.taken_up} items were measured before; --fresh measures them again"
+            )
+        for failure in found.outcome.failures:
+            note(f"failed: item {failure.item} ({failure.clip}): {failure.why}")
+        note(f"wrote {', '.join(OUTPUT_FILES)} to {self.out}")
+
+    def subject(self) -> "Subject":
+        """The model in the role that the task asks for."""
+        from functools import partial
+
+        from diff4splat.models.pipeline import Diff4SplatPipeline
+        from diff4splat.models.settings import GenerationSettings
+        from diff4splat.training.evaluation.subjects import (
+            Generator,
+            Reconstructor,
+            model_identity,
+            reconstruct_clip,
+        )
+
+        settings = GenerationSettings(steps=self.steps)
+        pipeline = Diff4SplatPipeline.from_pretrained(self.model)
+        if self.task != "reconstruction":
+            return Generator(pipeline=pipeline, settings=settings)
+        identity = model_identity(pipeline, "reconstruction")
+        return Reconstructor(
+            reconstruct=partial(reconstruct_clip, pipeline.model), identity=identity
+        )

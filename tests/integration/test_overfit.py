@@ -1,0 +1,78 @@
+"""Every stage learns one clip by heart: its loss falls to a tenth, through the real trainer.
+
+Noise, levels and targets differ at every step; only the clip stays. In stages with motion the
+paper's pull to standstill is off: its minimum is far above zero by design (see the last test).
+"""
+
+import json
+import statistics
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from oracles_clips import make_clip
+from stage_fixtures import STAGES, make_stage, stage_recipe
+
+from diff4splat.data.clip import Clip
+from diff4splat.training.batches.samples import ClipSamples
+from diff4splat.training.losses.motion import track_motion
+from diff4splat.training.recipe import OptimizerSettings, StageRecipe, TrainerSettings
+from diff4splat.training.stage import TOTAL
+from diff4splat.training.trainer.run import run_stage
+from diff4splat.training.trainer.settings import RunSettings
+
+STEPS = {"vae": 600, "dynamic": 400, "generator": 300, "joint": 300}
+USUAL_STEPS = 150
+TARGET_FRAMES = 4
+"""Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
+
+
+class OneClip:
+    """The same clip for every index."""
+
+    def __init__(self, recipe: StageRecipe) -> None:
+        data, static = recipe.data, recipe.kind == "static"
+        self.made = make_clip(
+            frames=data.frames, size_px=data.size_px, views=data.views, static=static, tracks=24
+        )
+
+    def clip(self, index: int) -> Clip:
+        del index
+        return self.made
+
+
+def overfit(name: str, folder: Path) -> list[float]:
+    """The total loss of every step."""
+    recipe = stage_recipe(name, motion_size=0.0)
+    recipe = replace(
+        recipe,
+        data=replace(recipe.data, target_frames=TARGET_FRAMES),
+        steps=STEPS.get(name, USUAL_STEPS),
+        global_batch=1,
+        optimizer=OptimizerSettings(learning_rate=7e-3, warmup_steps=10, weight_decay=0.0),
+    )
+    trainer = TrainerSettings(evaluation_samples=0, checkpoint_every=10_000, spike_factor=0.0)
+    settings = RunSettings(
+        folder=folder, seed=0, fingerprint="overfit", trainer=trainer, device="cpu"
+    )
+    samples = ClipSamples(recipe, 0, [OneClip(recipe)])
+    run_stage(make_stage(recipe), samples, recipe, settings)
+    rows = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+    return [row[f"loss/{TOTAL}"] for row in rows if row["event"] == "step"]
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_one_clip_is_learnt_by_heart(name: str, tmp_path: Path) -> None:
+    losses = overfit(name, tmp_path)
+    assert len(losses) == STEPS.get(name, USUAL_STEPS)
+    assert statistics.mean(losses[-20:]) <= statistics.mean(losses[:5]) / 10
+
+
+def test_the_papers_motion_loss_cannot_fall_to_a_tenth() -> None:
+    """At the truth it is still ‖Δx‖₁ of the 2 ‖Δx‖₂ that standing still costs: at least half."""
+    truth = torch.randn(1, 64, 3, generator=torch.Generator().manual_seed(0))
+    valid = torch.ones(1, 64, dtype=torch.bool)
+    reached = track_motion(truth, truth, valid)
+    still = track_motion(torch.zeros_like(truth), truth, valid)
+    assert float(reached / still) > 0.5

@@ -1,0 +1,112 @@
+"""Recipes on disk and from the command line."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from diff4splat.configs.recipes import RECIPES, recipe_by_name
+from diff4splat.errors import ConfigError
+from diff4splat.training.recipe_json import (
+    changed,
+    fingerprint,
+    recipe_from_json,
+    recipe_to_json,
+)
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_every_recipe_survives_its_json(name: str) -> None:
+    recipe = recipe_by_name(name)
+    assert recipe_from_json(recipe_to_json(recipe)) == recipe
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
+    names = [stage.name for stage in recipe_by_name(name).stages]
+    assert names == ["vae", "static-low", "static-high", "dynamic", "generator", "joint"]
+
+
+def test_the_paper_recipe_is_the_papers() -> None:
+    recipe = recipe_by_name("paper")
+    low, high, dynamic = (recipe.stage(n) for n in ("static-low", "static-high", "dynamic"))
+    assert (low.steps, high.steps, dynamic.steps) == (40_000, 40_000, 20_000)
+    assert (low.data.size_px, high.data.size_px) == ((256, 256), (512, 512))
+    assert (low.optimizer.learning_rate, low.optimizer.weight_decay) == (1e-5, 1e-4)
+    weights = dynamic.losses
+    assert (weights.photometric, weights.perceptual) == (1.0, 0.5)
+    assert (weights.depth, weights.motion, weights.motion_distance) == (0.5, 2.0, 2.0)
+    assert "deformation" not in low.trained + high.trained
+    assert recipe.trainer.precision == "bfloat16"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("stages.vae", "expected key=value, got 'stages.vae'"),
+        ("nothing=1", "expected one of model, name, seed, stages, trainer, got 'nothing'"),
+        ("stages.first.steps=1", "expected one of vae, static-low, .* got 'first'"),
+        ("stages.vae.lr=1", "got 'lr'"),
+        ("stages.vae.steps=many", "steps: expected int, got 'many'"),
+        ("stages.vae.steps=true", "steps: expected int, got True"),
+        ("stages.vae.steps=0", "expected steps above 0"),
+        ("stages.vae.data.size_px=[1]", "expected 2 values, got"),
+        ("stages.vae.data.sources=3", "expected a list, got 3"),
+        ("stages.vae.steps.more=1", "expected one of no keys below it, got 'more'"),
+        ("trainer.precision=half", "expected one of float32, bfloat16, got 'half'"),
+        ("model.ldrm.width=7", "LdrmConfig.heads"),
+    ],
+)
+def test_changes_that_cannot_be_meant_are_refused(change: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        changed(recipe_by_name("test"), [change])
+
+
+def test_changes_reach_their_field() -> None:
+    recipe = changed(
+        recipe_by_name("test"),
+        ["stages.vae.steps=7", "trainer.parallel=ddp", "seed=3", "stages.vae.losses.depth=0"],
+    )
+    vae = recipe.stage("vae")
+    assert (vae.steps, vae.losses.depth, recipe.seed) == (7, 0.0, 3)
+    assert recipe.trainer.parallel == "ddp"
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 100_000, '{"name": 1}'])
+def test_other_json_is_refused(text: str) -> None:
+    with pytest.raises(ConfigError, match="recipe"):
+        recipe_from_json(text)
+
+
+def test_unknown_and_missing_keys_are_named() -> None:
+    data = json.loads(recipe_to_json(recipe_by_name("test")))
+    with pytest.raises(ConfigError, match=r"expected the keys .* got 'extra'"):
+        recipe_from_json(json.dumps(data | {"extra": 1}))
+    del data["seed"]
+    with pytest.raises(ConfigError, match="expected the key 'seed', got 'none'"):
+        recipe_from_json(json.dumps(data))
+
+
+def test_the_fingerprint_follows_what_decides_the_weights_of_its_stage() -> None:
+    recipe = recipe_by_name("test")
+    before = fingerprint(recipe, "vae")
+    for same in (
+        "trainer.precision=bfloat16",
+        "stages.dynamic.steps=3",
+        "stages.vae.micro_batch=2",
+    ):
+        assert fingerprint(changed(recipe, [same]), "vae") == before
+    for other in ("stages.vae.steps=3", "seed=1", "model.vae.latent_channels=5"):
+        assert fingerprint(changed(recipe, [other]), "vae") != before
+
+
+def test_stages_that_do_not_exist_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"--stage: expected one of vae, .* got 'last'"):
+        recipe_by_name("small").stage("last")
+    with pytest.raises(ConfigError, match="--config: expected one of test, small, paper"):
+        recipe_by_name("large")
+
+
+def test_a_global_batch_is_made_of_micro_batches() -> None:
+    with pytest.raises(ConfigError, match=r"stage vae: expected .* got 100, 3 and 2"):
+        replace(recipe_by_name("test").stage("vae"), global_batch=3, micro_batch=2)

@@ -1,0 +1,82 @@
+"""One clip to one sample: frames, size, units, targets.
+
+Axes: ``f`` frames, ``h w`` pixels. Everything random comes from the generator of the sample's key.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.data.clip import Clip
+from diff4splat.geometry.camera import Camera, stack_cameras
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.batches.resize import resized
+from diff4splat.training.batches.scale import normalized
+from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
+from diff4splat.training.batches.window import cut
+from diff4splat.training.recipe import DataSettings
+from diff4splat.training.stage import SampleKey
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Where a sample comes from."""
+
+    key: SampleKey
+    source: str
+
+
+def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch:
+    """A batch of one.
+
+    Raises:
+        InputError: the clip is too short, has too little depth, or another shape than asked for.
+    """
+    generator = origin.key.generator()
+    clip = resized(cut(clip, settings.frames, generator), settings.size_px)
+    clip = normalized(clip, settings.least_depth_share)
+    targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
+    tracks = draw_tracks(clip, targets.frames, settings.tracks, generator)
+    view = clip.views[INPUT_VIEW]
+    return ClipBatch(
+        sample_index=torch.tensor([origin.key.sample]),
+        source=(origin.source,),
+        video=view.rgb[None],
+        cameras=stack_cameras([view.cameras]).to(torch.float32),
+        target_rgb=_pictures(clip, targets, "rgb")[None],
+        target_depth=_pictures(clip, targets, "depth").float()[None],
+        target_cameras=stack_cameras([_target_cameras(clip, targets)]).to(torch.float32),
+        target_time=_fractions(clip, targets, generator)[None],
+        track_cell=tracks.cell[None],
+        track_offset=tracks.offset[None],
+        track_valid=tracks.valid[None],
+        is_static=torch.tensor([clip.note.is_static]),
+        captions=(clip.note.caption,),
+    )
+
+
+def _pictures(clip: Clip, targets: Targets, name: str) -> Tensor:
+    """One kind of picture at every target, with axes ``m p`` in front."""
+    rows = [
+        torch.stack([getattr(clip.views[view], name)[frame] for view in views])
+        for frame, views in targets.pairs()
+    ]
+    return torch.stack(rows)
+
+
+def _target_cameras(clip: Clip, targets: Targets) -> Camera:
+    rows = [
+        stack_cameras([clip.views[view].cameras[frame] for view in views])
+        for frame, views in targets.pairs()
+    ]
+    return stack_cameras(rows)
+
+
+def _fractions(clip: Clip, targets: Targets, generator: torch.Generator) -> Float[Tensor, " m"]:
+    """Target times; any time shows a static clip, which teaches that time alone moves nothing."""
+    if clip.note.is_static:
+        return torch.rand(len(targets.frames), generator=generator)
+    span_s = clip.times_s[-1] - clip.times_s[0]
+    return ((clip.times_s[targets.frames] - clip.times_s[0]) / span_s.clamp_min(1e-9)).float()

@@ -1,0 +1,59 @@
+"""Samples by global index: which source, which clip, which frames; the same on any machine.
+
+The trainer asks for indices; everything else follows from them, the seed and the stage's name.
+"""
+
+from collections.abc import Sequence
+
+import torch
+
+from diff4splat.training.batches.clip_batch import ClipBatch, collate
+from diff4splat.training.batches.sample import Origin, make_sample
+from diff4splat.training.batches.sources import ClipSource, open_source
+from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.stage import SampleKey
+
+
+class ClipSamples:
+    """A mixture of sources as samples of one shape."""
+
+    def __init__(self, recipe: StageRecipe, seed: int, sources: Sequence[ClipSource]) -> None:
+        self.recipe = recipe
+        self.seed = seed
+        self.sources = tuple(sources)
+
+    @classmethod
+    def open(cls, recipe: StageRecipe, seed: int) -> "ClipSamples":
+        """The sources that the recipe names.
+
+        Raises:
+            InputError, FileFormatError: a folder is not one of shards.
+        """
+        data = recipe.data
+        return cls(recipe, seed, [open_source(source, data, seed) for source in data.sources])
+
+    def __getitem__(self, sample_index: int) -> ClipBatch:
+        """A batch of one.
+
+        Raises:
+            Diff4SplatError: the clip cannot be used; another index may do.
+        """
+        number = self._source(sample_index)
+        key = SampleKey(self.seed, self.recipe.name, sample_index, "sample")
+        clip = self.sources[number].clip(sample_index)
+        return make_sample(clip, self.recipe.data, Origin(key=key, source=self._name(number)))
+
+    def collate(self, samples: list[ClipBatch]) -> ClipBatch:
+        """Samples as one batch."""
+        return collate(samples)
+
+    def _name(self, number: int) -> str:
+        """For the log: losses are told apart by source."""
+        source = self.recipe.data.sources[number]
+        return f"{number} {source.folder or f'{source.kind} {source.split}'}"
+
+    def _source(self, sample_index: int) -> int:
+        """Drawn in proportion to the weights."""
+        weights = torch.tensor([source.weight for source in self.recipe.data.sources])
+        key = SampleKey(self.seed, self.recipe.name, sample_index, "source")
+        return int(torch.multinomial(weights.double(), 1, generator=key.generator()))

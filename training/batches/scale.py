@@ -1,0 +1,63 @@
+"""The unit of length that a model sees.
+
+One picture does not tell its scale, so every clip is scaled until the median depth of its first
+input frame is where the photograph's plane stands (``models/base_scene.py``). Camera paths at
+generation time are in the same unit.
+"""
+
+from dataclasses import replace
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.data.clip import Clip, View
+from diff4splat.errors import InputError
+from diff4splat.geometry.camera import Camera
+from diff4splat.models.base_scene import PLANE_DEPTH
+
+
+def normalized(clip: Clip, least_depth_share: float = 0.01) -> Clip:
+    """The clip in model units.
+
+    Raises:
+        InputError: too few pixels of the first input frame have a depth.
+    """
+    return rescaled(clip, PLANE_DEPTH / typical_depth(clip, least_depth_share))
+
+
+def typical_depth(clip: Clip, least_depth_share: float) -> float:
+    """Median depth of the first input frame.
+
+    Raises:
+        InputError: fewer than ``least_depth_share`` of its pixels have a depth.
+    """
+    depth = clip.views[0].depth[0]
+    valid = torch.isfinite(depth) & (depth > 0)
+    share = float(valid.float().mean())
+    if share < least_depth_share or not bool(valid.any()):
+        raise InputError(
+            f"clip {clip.note.identifier}: expected depth in at least {least_depth_share:.0%} of "
+            f"the first input frame, got {share:.1%}; leave the clip out"
+        )
+    return float(depth[valid].median())
+
+
+def rescaled(clip: Clip, factor: float) -> Clip:
+    """The same clip with every length multiplied by ``factor``."""
+    tracks = clip.tracks
+    if tracks is not None:
+        tracks = replace(tracks, positions=tracks.positions * factor)
+    views = tuple(_rescaled_view(view, factor) for view in clip.views)
+    return replace(clip, views=views, tracks=tracks)
+
+
+def _rescaled_view(view: View, factor: float) -> View:
+    return replace(view, depth=view.depth * factor, cameras=rescaled_cameras(view.cameras, factor))
+
+
+def rescaled_cameras(cameras: Camera, factor: float) -> Camera:
+    """Cameras whose positions are multiplied by ``factor``."""
+    pose: Float[Tensor, "*b 4 4"] = cameras.world_from_camera.clone()
+    pose[..., :3, 3] *= factor
+    return replace(cameras, world_from_camera=pose)

@@ -1,0 +1,127 @@
+"""Where clips come from: procedural worlds without end, or folders of shards.
+
+A source answers any index from 0; training and evaluation never share a clip: worlds of evaluation
+have indices from EVALUATION on, and a folder keeps its last clips back for it.
+"""
+
+from functools import cached_property
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+import torch
+
+from diff4splat.data.clip import Clip
+from diff4splat.data.clip_folder import ClipFolder, Selection
+from diff4splat.data.clip_part import ClipPart
+from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
+from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
+from diff4splat.errors import InputError
+from diff4splat.training.recipe import DataSettings, SourceSettings
+from diff4splat.training.stage import SampleKey
+
+EVALUATION = 1 << 40
+"""Sample indices from here on belong to evaluation."""
+KEPT_BACK = 16
+"""One clip in so many of a folder is kept back for evaluation."""
+
+
+@runtime_checkable
+class ClipSource(Protocol):
+    """Clips by index, without end."""
+
+    def clip(self, index: int) -> Clip:
+        """The clip of a sample; equal indices give equal clips.
+
+        Raises:
+            FileFormatError, InputError: this clip cannot be had; others may.
+        """
+        ...
+
+
+class WorldClips:
+    """Procedural worlds, drawn when they are asked for; every index is another world."""
+
+    def __init__(self, recipe: WorldRecipe, draw: DrawSettings) -> None:
+        self.recipe = recipe
+        self.draw = draw
+
+    def clip(self, index: int) -> Clip:
+        """World number ``index``."""
+        return draw_clip(make_world(self.recipe, index), self.draw)
+
+
+class FolderClips:
+    """A folder of shards, shuffled anew in every epoch."""
+
+    def __init__(self, settings: SourceSettings, views: int, seed: int) -> None:
+        self.folder = Path(settings.folder)
+        self.still_share = settings.still_share
+        self.views = views
+        self.seed = seed
+
+    @cached_property
+    def clips(self) -> ClipFolder:
+        """Opened when first needed, so that every worker process opens its own."""
+        return ClipFolder(self.folder)
+
+    def clip(self, index: int) -> Clip:
+        """Still and moving clips in the asked share, each shuffled on its own."""
+        judged = index >= EVALUATION
+        draw = torch.rand((), generator=SampleKey(self.seed, "kind", index, "still").generator())
+        kind = "still" if bool(draw < self.still_share) else "moving"
+        positions = self._positions[kind, judged]
+        if not positions:
+            raise InputError(
+                f"{self.folder}: expected {kind} clips, got none; "
+                "prepare some, or set still_share to 0 or 1"
+            )
+        epoch, place = divmod(index % EVALUATION, len(positions))
+        shuffle = SampleKey(self.seed, "epoch", epoch, kind).generator()
+        order = torch.randperm(len(positions), generator=shuffle)
+        return self._read(positions[int(order[place])])
+
+    def _read(self, position: int) -> Clip:
+        """Without flow, and no more views than samples have."""
+        present = self.clips.entries[position].views
+        part = ClipPart(views=tuple(range(min(self.views, present))), flow=False)
+        return self.clips.clip(position, part)
+
+    @cached_property
+    def _positions(self) -> dict[tuple[str, bool], list[int]]:
+        """Places in the folder by kind and by whether evaluation owns them."""
+        chosen = {}
+        for kind, wanted in (("still", True), ("moving", False)):
+            places = list(self.clips.positions(Selection(is_static=wanted)))
+            kept = -(-len(places) // KEPT_BACK) if len(places) > 1 else 0
+            chosen[kind, False] = places[: len(places) - kept]
+            # A single clip serves both: over-fitting tests want exactly that.
+            chosen[kind, True] = places[len(places) - kept :] if kept else places
+        return chosen
+
+
+def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> ClipSource:
+    """The source that the settings name.
+
+    Raises:
+        InputError, FileFormatError: the folder is not one of shards.
+    """
+    if settings.kind == "worlds":
+        return world_clips(settings, data, seed)
+    # A missing folder stops the run now, not every sample later.
+    if len(ClipFolder(settings.folder)) == 0:
+        raise InputError(f"{settings.folder}: expected clips, got none; prepare some")
+    return FolderClips(settings, data.views, seed)
+
+
+def world_clips(settings: SourceSettings, data: DataSettings, seed: int) -> "WorldClips":
+    """Worlds at the size of the samples."""
+    recipe = WorldRecipe(
+        seed=seed,
+        split=settings.split,
+        still_share=settings.still_share,
+        frames=data.frames,
+        size_px=data.size_px,
+        views=data.views,
+    )
+    return WorldClips(recipe, DrawSettings(tracks=data.tracks, flow=False))

@@ -1,0 +1,97 @@
+"""Which pictures of a clip a sample is judged by, and which points.
+
+Axes: ``f`` frames, ``m`` target times, ``p`` views per time, ``n`` points. At least half of the
+pictures come from other cameras than the input's: supervision by the input views alone over-fits
+them (Wonderland §3.3, in effect).
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from diff4splat.data.clip import Clip
+from diff4splat.training.recipe import DataSettings
+
+INPUT_VIEW = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Targets:
+    """Frames, and for each of them views."""
+
+    frames: Int[Tensor, " m"]
+    views: Int[Tensor, "m p"]
+
+    def pairs(self) -> list[tuple[int, list[int]]]:
+        """(frame, its views) in order."""
+        return list(zip(self.frames.tolist(), self.views.tolist(), strict=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackTargets:
+    """Points seen by the input view and where they go; padded to one length."""
+
+    cell: Int[Tensor, "n 3"]
+    offset: Float[Tensor, "m n 3"]
+    valid: Bool[Tensor, " n"]
+
+
+def draw_targets(
+    frames: int, views: int, settings: DataSettings, generator: torch.Generator
+) -> Targets:
+    """Different times, and per time another camera's view and, if there is room, the input's."""
+    per_time = 2 if views > 1 and settings.target_frames > 1 else 1
+    count = min(max(settings.target_frames // per_time, 1), frames)
+    times = torch.randperm(frames, generator=generator)[:count].sort().values
+    chosen = torch.zeros(count, per_time, dtype=torch.long)
+    if views > 1:
+        chosen[:, 0] = torch.randint(1, views, (count,), generator=generator)
+    return Targets(frames=times, views=chosen)
+
+
+def draw_tracks(
+    clip: Clip, target_frames: Int[Tensor, " m"], count: int, generator: torch.Generator
+) -> TrackTargets:
+    """Up to ``count`` points, each at one of the frames in which the input view sees it."""
+    seen = _seen_cells(clip)
+    chosen = torch.randperm(len(seen), generator=generator)
+    # One cell per point: the first of its frames in random order.
+    point = seen[chosen, 0]
+    first = _first_of_each(point)
+    seen = seen[chosen[first]][:count]
+    offset = torch.zeros(len(target_frames), count, 3)
+    cell = torch.zeros(count, 3, dtype=torch.long)
+    valid = torch.arange(count) < len(seen)
+    if len(seen):
+        cell[: len(seen)] = seen[:, 1:]
+        positions = clip.tracks.positions
+        here = positions[seen[:, 1], seen[:, 0]]
+        offset[:, : len(seen)] = positions[target_frames][:, seen[:, 0]] - here
+    return TrackTargets(cell=cell, offset=offset, valid=valid)
+
+
+def _seen_cells(clip: Clip) -> Int[Tensor, "s 4"]:
+    """(point, frame, row, column) wherever the input view sees a point on its own object."""
+    view = clip.views[INPUT_VIEW]
+    if clip.tracks is None or view.track_uv is None or view.track_visible is None:
+        return torch.zeros(0, 4, dtype=torch.long)
+    frame, point = view.track_visible.nonzero(as_tuple=True)
+    column, row = view.track_uv[frame, point].long().unbind(-1)
+    height, width = view.cameras.size_px
+    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    if view.instances is not None:
+        # Near an edge the pixel's centre may show another object than the point lies on.
+        shown = view.instances[frame, row.clamp(0, height - 1), column.clamp(0, width - 1)]
+        inside &= shown == clip.tracks.instances[point]
+    return torch.stack([point, frame, row, column], -1)[inside]
+
+
+def _first_of_each(values: Int[Tensor, " s"]) -> Int[Tensor, " u"]:
+    """Positions of the first occurrence of every value, in order."""
+    order = torch.argsort(values, stable=True)
+    ordered = values[order]
+    starts = torch.ones_like(ordered, dtype=torch.bool)
+    starts[1:] = ordered[1:] != ordered[:-1]
+    return order[starts].sort().values

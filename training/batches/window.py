@@ -1,0 +1,66 @@
+"""A clip's frames from a random start.
+
+Axes: ``f`` frames. The world of what is cut out is again its first input camera.
+"""
+
+from dataclasses import replace
+
+import torch
+
+from diff4splat.data.clip import Clip
+from diff4splat.errors import InputError
+from diff4splat.training.batches.targets import INPUT_VIEW
+
+
+def cut(clip: Clip, frames: int, generator: torch.Generator) -> Clip:
+    """``frames`` consecutive frames from a random start; the new first camera is the identity.
+
+    Raises:
+        InputError: the clip has fewer frames.
+    """
+    if clip.frames < frames:
+        raise InputError(
+            f"clip {clip.note.identifier}: expected at least {frames} frames, got {clip.frames}; "
+            "leave the clip out or train on shorter samples"
+        )
+    if clip.frames == frames:
+        return clip
+    first = int(torch.randint(clip.frames - frames + 1, (), generator=generator))
+    return _from_first_camera(_frames(clip, slice(first, first + frames)))
+
+
+def _frames(clip: Clip, window: slice) -> Clip:
+    views = tuple(
+        replace(
+            view,
+            rgb=view.rgb[window],
+            depth=view.depth[window],
+            cameras=view.cameras[window],
+            instances=None if view.instances is None else view.instances[window],
+            flow=None,
+            track_uv=None if view.track_uv is None else view.track_uv[window],
+            track_visible=None if view.track_visible is None else view.track_visible[window],
+        )
+        for view in clip.views
+    )
+    tracks = clip.tracks
+    if tracks is not None:
+        tracks = replace(tracks, positions=tracks.positions[window])
+    return replace(clip, times_s=clip.times_s[window], views=views, tracks=tracks)
+
+
+def _from_first_camera(clip: Clip) -> Clip:
+    """The clip in the world of its first input camera."""
+    first_from_world = clip.views[INPUT_VIEW].cameras.camera_from_world[0]
+    views = tuple(
+        replace(
+            view, cameras=view.cameras.with_pose(first_from_world @ view.cameras.world_from_camera)
+        )
+        for view in clip.views
+    )
+    tracks = clip.tracks
+    if tracks is not None:
+        rotation, shift = first_from_world[:3, :3], first_from_world[:3, 3]
+        moved = tracks.positions.to(rotation) @ rotation.mT + shift
+        tracks = replace(tracks, positions=moved.to(tracks.positions))
+    return replace(clip, views=views, tracks=tracks)

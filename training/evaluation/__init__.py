@@ -1,0 +1,1 @@
+"""Judging models on a fixed, versioned set of clips, with trivial baselines in the same table."""

@@ -1,0 +1,92 @@
+"""Everything that is measured on one item: the system and all baselines, in one go."""
+
+from dataclasses import dataclass
+
+import torch
+
+from diff4splat.data.clip import Clip
+from diff4splat.errors import ConfigError, InputError
+from diff4splat.metrics.features.protocol import PerceptualFeatures
+from diff4splat.training.evaluation.answers import Answer, SceneAnswer
+from diff4splat.training.evaluation.baselines import BASELINES, ZERO_MOTION, make_baseline
+from diff4splat.training.evaluation.camera_measures import pose_entries
+from diff4splat.training.evaluation.case import Case, clip_sha256, make_case
+from diff4splat.training.evaluation.columns import SYSTEM
+from diff4splat.training.evaluation.picture_measures import Entries, picture_entries
+from diff4splat.training.evaluation.protocol import Protocol, Task
+from diff4splat.training.evaluation.records import ItemResult, Score, Skip
+from diff4splat.training.evaluation.scene_measures import check_path, scene_entries
+from diff4splat.training.evaluation.subjects import Subject
+from diff4splat.training.evaluation.text_measures import (
+    Captioner,
+    motionless_entries,
+    plain_caption,
+    text_entries,
+)
+from diff4splat.training.evaluation.track_measures import Followed, followed_points, track_entries
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """One evaluation: who is measured, how, and with which helpers."""
+
+    protocol: Protocol
+    task: Task
+    subject: Subject
+    features: PerceptualFeatures | None = None
+    """None leaves the perceptual column out."""
+    captioner: Captioner = plain_caption
+    """A function; its name is part of what results belong to."""
+
+    def __post_init__(self) -> None:
+        if self.task == "text" and not hasattr(self.subject, "generate"):
+            raise ConfigError(
+                "--task text: expected a system that reads captions, got one that does not; "
+                "choose another task"
+            )
+
+
+@torch.no_grad()
+def measure_item(item: int, clip: Clip, setup: Setup) -> ItemResult:
+    """All rows of one item.
+
+    Raises:
+        Diff4SplatError: the clip does not fit the protocol, or the system does not take it.
+    """
+    case = make_case(clip, setup.protocol, setup.task)
+    entries = _text(case, setup) if setup.task == "text" else _pictures(case, setup)
+    return ItemResult(
+        item=item,
+        clip=clip.note.identifier,
+        clip_sha256=clip_sha256(clip),
+        scores=tuple(entry for entry in entries if isinstance(entry, Score)),
+        skips=tuple(entry for entry in entries if isinstance(entry, Skip)),
+    )
+
+
+def _text(case: Case, setup: Setup) -> Entries:
+    own = text_entries(SYSTEM, case, setup.subject, setup.captioner, setup.protocol)
+    return own + motionless_entries(ZERO_MOTION, case)
+
+
+def _pictures(case: Case, setup: Setup) -> Entries:
+    scene = setup.subject.answer(case, setup.protocol.seed)
+    followed = followed_points(case, setup.protocol)
+    entries = _answered(SYSTEM, case, SceneAnswer(scene), followed, setup)
+    entries += scene_entries(SYSTEM, case, scene, setup.protocol)
+    entries += pose_entries(SYSTEM, scene, check_path(setup.protocol.pose, case))
+    for name in BASELINES:
+        try:
+            answer = make_baseline(name, case, setup.protocol.planes)
+        except InputError as error:
+            entries.append(Skip(row=name, key="psnr", why=str(error)))
+            continue
+        entries += _answered(name, case, answer, followed, setup)
+    return entries
+
+
+def _answered(
+    row: str, case: Case, answer: Answer, followed: list[Followed], setup: Setup
+) -> Entries:
+    pictures = picture_entries(row, case, answer, setup.features)
+    return pictures + track_entries(row, case, answer, followed)

@@ -1,0 +1,57 @@
+"""Colour and depth of the judged pictures.
+
+Axes: ``p`` judged pictures, ``h w`` pixels. A depth map that is constant has no correlation, and a
+picture without true depth has no depth error: both are left out of means, and counted.
+"""
+
+import torch
+
+from diff4splat.metrics.depth import depth_pearson, relative_error
+from diff4splat.metrics.features.protocol import PerceptualFeatures
+from diff4splat.metrics.image import psnr
+from diff4splat.metrics.perceptual import perceptual_distance
+from diff4splat.metrics.structure import ssim
+from diff4splat.training.evaluation.answers import Answer, Look
+from diff4splat.training.evaluation.case import Case, valid_depth
+from diff4splat.training.evaluation.columns import PSNR_CAP_DB
+from diff4splat.training.evaluation.records import Score, Skip, score
+
+Entries = list[Score | Skip]
+
+
+def picture_entries(
+    row: str, case: Case, answer: Answer, features: PerceptualFeatures | None
+) -> Entries:
+    """PSNR, SSIM, perceptual distance and both depth errors of one answer; none without looks."""
+    looks = [answer.look(case.camera(p), case.time_s(p[1]), p[1]) for p in case.judged.pairs]
+    shown = [look for look in looks if look is not None]
+    if not shown:
+        return []
+    rgb = torch.stack([look.rgb.cpu().float() for look in shown])
+    truth = torch.stack([case.true_rgb(pair) for pair in case.judged.pairs])
+    entries = [
+        score(row, "psnr", psnr(rgb, truth).clamp_max(PSNR_CAP_DB).tolist()),
+        score(row, "ssim", ssim(rgb, truth).tolist()),
+    ]
+    if features is not None:
+        with torch.no_grad():
+            distances = perceptual_distance(rgb, truth, features)
+        entries.append(score(row, "perceptual", distances.tolist()))
+    return entries + _depth_entries(row, case, shown)
+
+
+def _depth_entries(row: str, case: Case, looks: list[Look]) -> Entries:
+    if any(look.depth is None for look in looks):
+        return []
+    if not case.has_depth:
+        return [
+            Skip(row=row, key=key, why="the clip has no depth")
+            for key in ("depth_pearson", "depth_absrel")
+        ]
+    depth = torch.stack([look.depth.cpu().float() for look in looks])
+    truth = torch.stack([case.true_depth(pair) for pair in case.judged.pairs])
+    known = valid_depth(truth)
+    return [
+        score(row, "depth_pearson", depth_pearson(depth, truth, known).tolist()),
+        score(row, "depth_absrel", relative_error(depth, truth, known).tolist()),
+    ]

@@ -1,0 +1,110 @@
+"""Systems under test: what sees the input of a case and answers with a scene."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol as Interface
+from typing import runtime_checkable
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.data.clip import Clip
+from diff4splat.geometry.camera import Camera
+from diff4splat.models.picture import Picture
+from diff4splat.models.pipeline import Diff4SplatPipeline
+from diff4splat.models.pretrained import Model
+from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.video_to_scene import scene_from_video
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.scene.scene import Scene
+from diff4splat.training.evaluation.case import Case
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """Which system a result belongs to; results are reused only when all of it is equal."""
+
+    name: str
+    """For people, such as ``small``."""
+    weights_sha256: str
+    fingerprint: str
+    """Of the configuration."""
+    settings: str
+    """Everything else that changes answers, in words or JSON."""
+    untrained: bool
+
+
+@runtime_checkable
+class Subject(Interface):
+    """A system under test."""
+
+    @property
+    def identity(self) -> Identity:
+        """Which system this is."""
+        ...
+
+    def answer(self, case: Case, seed: int) -> Scene:
+        """A scene in the case's units and world (its first camera); time starts at 0."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Generator:
+    """The pipeline: first picture, camera path of the input view, caption."""
+
+    pipeline: Diff4SplatPipeline
+    settings: GenerationSettings = field(default_factory=GenerationSettings)
+
+    @property
+    def identity(self) -> Identity:
+        """Model and sampling settings."""
+        return model_identity(self.pipeline, repr(self.settings))
+
+    def answer(self, case: Case, seed: int) -> Scene:
+        """Generate along the input view's cameras, with the clip's caption if it has one."""
+        return self.generate(case, case.clip.note.caption or None, seed)
+
+    def generate(self, case: Case, prompt: str | None, seed: int) -> Scene:
+        """Generate with another caption."""
+        cameras = case.input_view.cameras.to(torch.float32)
+        path = CameraPath(cameras=cameras, times_s=case.clip.times_s.float())
+        picture = input_picture(case.input_rgb(0), cameras[0])
+        return self.pipeline(picture, path, prompt, seed=seed, settings=self.settings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reconstructor:
+    """Any function from a whole clip's input view to a scene; it must not look at other views."""
+
+    reconstruct: Callable[[Clip], Scene]
+    identity: Identity
+
+    def answer(self, case: Case, seed: int) -> Scene:
+        """Reconstruct; nothing is drawn, so the seed is not needed."""
+        del seed
+        return self.reconstruct(case.clip)
+
+
+def reconstruct_clip(model: Model, clip: Clip) -> Scene:
+    """The scene that a model's reconstruction sees in a clip's input view, and in no other."""
+    view = clip.views[0]
+    path = CameraPath(cameras=view.cameras.to(torch.float32), times_s=clip.times_s.float())
+    return scene_from_video(model, view.rgb.float() / 255, path)
+
+
+def model_identity(pipeline: Diff4SplatPipeline, settings: str) -> Identity:
+    """Which model a pipeline runs."""
+    model = pipeline.model
+    return Identity(
+        name=model.config.name,
+        weights_sha256=model.weights_sha256,
+        fingerprint=model.config.fingerprint(),
+        settings=settings,
+        untrained=model.untrained,
+    )
+
+
+def input_picture(rgb: Float[Tensor, "h w 3"], camera: Camera) -> Picture:
+    """The first picture with the lens that the clip names."""
+    return Picture(rgb=rgb, camera=camera, focal_source="clip")

@@ -1,0 +1,69 @@
+"""Mean and deviation of the latents of a trained autoencoder, over fixed evaluation samples.
+
+Everything after the autoencoder works with standardised latents (``models/video_vae.py``). The
+statistics are of the averaged weights, and lie beside their checkpoints.
+
+Axes: ``c`` latent channels.
+"""
+
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.errors import CheckpointError
+from diff4splat.io.tensor_file import TensorFile, read_tensors, write_tensors
+from diff4splat.models.video_vae import VideoVae
+from diff4splat.report.phases import Advance
+from diff4splat.training.batches.samples import ClipSamples
+from diff4splat.training.batches.sources import EVALUATION
+from diff4splat.training.stages.model_stage import network_video
+
+FILE = "latent_statistics.safetensors"
+CLIPS = 16
+LEAST_STD = 1e-3
+"""A channel that never varies is left nearly as it is instead of being blown up."""
+
+Statistics = tuple[Float[Tensor, " c"], Float[Tensor, " c"]]
+
+
+@torch.no_grad()
+def measure_statistics(vae: VideoVae, samples: ClipSamples, advance: Advance) -> Statistics:
+    """Mean and standard deviation per channel of what the encoder answers without noise."""
+    total = squares = torch.zeros(vae.config.latent_channels, dtype=torch.float64)
+    count = 0
+    for index in range(CLIPS):
+        batch = samples.collate([samples[EVALUATION + index]])
+        latent = vae.encode(network_video(batch)).mean.double()
+        total = total + latent.sum((0, 2, 3, 4)).cpu()
+        squares = squares + latent.square().sum((0, 2, 3, 4)).cpu()
+        count += latent[:, 0].numel()
+        advance()
+    mean = total / count
+    deviation = (squares / count - mean.square()).clamp_min(LEAST_STD**2).sqrt()
+    return mean.float(), deviation.float()
+
+
+def write_statistics(statistics: Statistics, folder: Path) -> None:
+    """Beside the checkpoints of the autoencoder's stage."""
+    mean, deviation = statistics
+    content = TensorFile(tensors={"mean": mean, "std": deviation}, metadata={"clips": str(CLIPS)})
+    write_tensors(content, folder / FILE)
+
+
+def read_statistics(folder: Path) -> Statistics:
+    """What ``write_statistics`` wrote.
+
+    Raises:
+        CheckpointError: the autoencoder's stage did not come to its end.
+        FileFormatError: the file is damaged.
+    """
+    file = folder / FILE
+    if not file.is_file():
+        raise CheckpointError(
+            f"{file}: expected the statistics of the latents, got none; "
+            "run the autoencoder's stage to its end"
+        )
+    stored = read_tensors(file)
+    return stored["mean"], stored["std"]

@@ -1,0 +1,110 @@
+"""Which earlier stages a stage builds on, and the networks it starts with.
+
+    RUN/recipe.json  RUN/<stage>/{checkpoints, result.json, log, panels}  RUN/model/ (for pipelines)
+
+A part comes from the last earlier stage that trained it: frozen ones with averaged weights, learnt
+ones are then taken over by the trainer, averages and all. Parts nobody trained yet are random.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from torch import Tensor, nn
+
+from diff4splat.errors import CheckpointError
+from diff4splat.models.factory import Networks, create_networks
+from diff4splat.training.latent_statistics import read_statistics
+from diff4splat.training.recipe import Recipe, StageRecipe
+from diff4splat.training.stages.factory import STAGES
+from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.trainer.gates import read_result, stage_may_start
+from diff4splat.training.trainer.run_files import CHECKPOINTS, RESULT_FILE
+
+
+def sources_of_parts(recipe: Recipe, stage: StageRecipe) -> dict[str, StageRecipe]:
+    """For each part the stage runs, the last stage before it that trains the part."""
+    before = recipe.stages[: recipe.stages.index(stage)]
+    return {
+        part: earlier
+        for earlier in before
+        for part in earlier.trained
+        if part in STAGES[stage.kind].parts
+    }
+
+
+def require_prerequisites(
+    recipe: Recipe, stage: StageRecipe, folder: Path, ignore_gates: bool
+) -> None:
+    """All stages that this one builds on are over and good enough.
+
+    Raises:
+        ConfigError: one is not; says which measure is short by how much.
+    """
+    for earlier in _in_order(recipe, sources_of_parts(recipe, stage)):
+        stage_may_start(earlier, folder / earlier.name, ignore_gates)
+
+
+def continued_stage(recipe: Recipe, stage: StageRecipe) -> StageRecipe | None:
+    """The last earlier stage that trained something this one goes on training."""
+    sources = sources_of_parts(recipe, stage)
+    learnt = {part: sources[part] for part in stage.trained if part in sources}
+    return (_in_order(recipe, learnt) or [None])[-1]
+
+
+def starting_networks(recipe: Recipe, stage: StageRecipe, folder: Path) -> Networks:
+    """Random networks, with the averaged weights of every part that was trained before.
+
+    Parts that the stage does not run are not built: in the ``paper`` recipe they would not fit.
+
+    Raises:
+        CheckpointError, FileFormatError: a checkpoint is missing, damaged or of other networks.
+    """
+    needed = STAGES[stage.kind].parts
+    networks = create_networks(recipe.model, seed=recipe.seed, needed=needed)
+    return _filled(networks, sources_of_parts(recipe, stage), folder)
+
+
+def trained_networks(recipe: Recipe, folder: Path) -> tuple[Networks, frozenset[str]]:
+    """Networks with the newest averaged weights of all stages begun, and the parts that are done.
+
+    Raises:
+        CheckpointError, FileFormatError: as ``starting_networks``.
+    """
+    begun = [stage for stage in recipe.stages if (folder / stage.name / RESULT_FILE).is_file()]
+    finished = [stage for stage in begun if read_result(folder / stage.name).finished]
+    sources = {part: stage for stage in begun for part in stage.trained}
+    networks = create_networks(recipe.model, seed=recipe.seed)
+    done = frozenset(part for stage in finished for part in stage.trained)
+    return _filled(networks, sources, folder), done
+
+
+def _filled(networks: Networks, sources: Mapping[str, StageRecipe], folder: Path) -> Networks:
+    for part, earlier in sources.items():
+        stored = load_parts(last_checkpoint(folder / earlier.name))
+        _fill(getattr(networks, part), stored.get(part, {}), f"{folder / earlier.name}: {part}")
+        if part == "vae":
+            networks.vae.set_statistics(*read_statistics(folder / earlier.name))
+    return networks
+
+
+def _fill(network: nn.Module, stored: Mapping[str, Tensor], what: str) -> None:
+    wanted = {key: value.shape for key, value in network.state_dict().items()}
+    if wanted != {key: value.shape for key, value in stored.items()}:
+        raise CheckpointError(
+            f"{what}: expected the weights of the recipe's model, got others; "
+            "go on with the recipe that the run began with"
+        )
+    network.load_state_dict(stored)
+
+
+def last_checkpoint(folder: Path) -> Path:
+    """The checkpoint that a stage's result speaks of.
+
+    Raises:
+        ConfigError: the stage was never begun there.
+    """
+    return folder / CHECKPOINTS / read_result(folder).checkpoint
+
+
+def _in_order(recipe: Recipe, sources: dict[str, StageRecipe]) -> list[StageRecipe]:
+    return [stage for stage in recipe.stages if stage in sources.values()]

@@ -1,0 +1,31 @@
+"""Which stage a recipe means."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from diff4splat.models.factory import Networks
+from diff4splat.training.recipe import StageKind
+from diff4splat.training.stages.autoencoder import AutoencoderStage
+from diff4splat.training.stages.generator import GeneratorStage
+from diff4splat.training.stages.joint import JointStage
+from diff4splat.training.stages.model_stage import ModelStage, StagePlan
+from diff4splat.training.stages.reconstruction import DynamicStage, StaticStage
+
+STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
+    {
+        "vae": AutoencoderStage,
+        "static": StaticStage,
+        "dynamic": DynamicStage,
+        "generator": GeneratorStage,
+        "joint": JointStage,
+    }
+)
+
+
+def create_stage(networks: Networks, plan: StagePlan) -> ModelStage:
+    """The stage with the parts of ``networks`` that it runs.
+
+    Raises:
+        ConfigError: a part is to be trained that the stage does not run.
+    """
+    return STAGES[plan.recipe.kind](networks, plan)

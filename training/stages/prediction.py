@@ -1,0 +1,127 @@
+"""From maps to pictures and displacements, with gradients: what the rendering losses look at.
+
+Axes: ``b`` batch, ``m`` target times, ``p`` views per time, ``n`` tracked points, ``h w`` pixels.
+Everything here runs in float32 whatever the networks run in. Nothing is pruned: the base scene's
+later frames start below the pruning threshold and could otherwise never be raised; renderers skip
+contributions below ``alpha_cutoff``, which is lowered for the same reason.
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.geometry import quaternion
+from diff4splat.models.base_scene import PLANE_DEPTH, UNSEEN, plane_base
+from diff4splat.models.config import ModelConfig
+from diff4splat.models.deformation_heads import (
+    DeformationState,
+    DeformationUnits,
+    deformation_state,
+    raw_scales,
+)
+from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.picture import Picture
+from diff4splat.models.reconstruction import Canonical, reconstruct
+from diff4splat.render.api import render
+from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.stages.model_stage import pictures
+
+SETTINGS = RenderSettings(alpha_cutoff=UNSEEN / 10)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rendered:
+    """What the predicted scenes look like at the targets."""
+
+    rgb: Float[Tensor, "b m p h w 3"]
+    depth: Float[Tensor, "b m p h w"]
+    offsets: Float[Tensor, "b m n 3"] | None
+    """Of the tracked points; None where no deformation network ran."""
+
+
+def canonical_scenes(
+    maps: ReconstructionMaps, batch: ClipBatch, model: ModelConfig
+) -> list[Canonical]:
+    """One set of Gaussians per sample, around its first input picture."""
+    scenes = []
+    for index in range(len(batch)):
+        base = plane_base(_picture(batch, index), batch.cameras[index], model.ldrm.grid_stride)
+        own = ReconstructionMaps(
+            gaussians=maps.gaussians[index : index + 1], tokens=maps.tokens[index : index + 1]
+        )
+        scenes.append(reconstruct(own, base, model.activation))
+    return scenes
+
+
+def still_pictures(scenes: list[Canonical], batch: ClipBatch) -> Rendered:
+    """Every target shows the canonical state: the deformation network is not executed."""
+    shown = []
+    for index, scene in enumerate(scenes):
+        targets = batch.target_cameras[index]
+        flat = [_pictures(scene.gaussians, targets[time]) for time in range(len(targets))]
+        shown.append(_stack(flat))
+    rgb, depth = _stack(shown)
+    return Rendered(rgb=rgb, depth=depth, offsets=None)
+
+
+def moving_pictures(
+    scenes: list[Canonical], deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
+) -> Rendered:
+    """``deformations`` hold the raw maps of all samples, one tensor (b, 10, …) per target time."""
+    shown, offsets = [], []
+    for index, scene in enumerate(scenes):
+        states = [deformed_state(scene, maps[index], model) for maps in deformations]
+        moved = [deformed(scene.gaussians, state) for state in states]
+        targets = batch.target_cameras[index]
+        flat = [_pictures(state, targets[time]) for time, state in enumerate(moved)]
+        shown.append(_stack(flat))
+        cells = _cell_index(batch.track_cell[index], batch, model.ldrm.grid_stride)
+        offsets.append(torch.stack([state.offsets[cells] for state in states]))
+    rgb, depth = _stack(shown)
+    return Rendered(rgb=rgb, depth=depth, offsets=torch.stack(offsets))
+
+
+def deformed_state(
+    scene: Canonical, raw: Float[Tensor, "10 t h w"], model: ModelConfig
+) -> DeformationState:
+    """How all Gaussians differ from the canonical ones at one time."""
+    units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.activation)
+    raw_scale = raw_scales(scene.maps.gaussians[0].float())
+    return deformation_state(raw.float(), raw_scale, scene.cells, units)
+
+
+def deformed(gaussians: Gaussians, state: DeformationState) -> Gaussians:
+    """The Gaussians at that time: mean + offset, quaternion ⊗ rotation, scale · exp(offset)."""
+    return replace(
+        gaussians,
+        means=gaussians.means + state.offsets,
+        quats=quaternion.multiply(gaussians.quats, state.rotations),
+        scales=gaussians.scales * state.log_scale_offsets.exp(),
+    )
+
+
+def _pictures(gaussians: Gaussians, cameras: object) -> tuple[Tensor, Tensor]:
+    output = render(gaussians, cameras, outputs=("rgb", "depth"), settings=SETTINGS)
+    return output.rgb, output.depth
+
+
+def _stack(pairs: list[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
+    rgb, depth = zip(*pairs, strict=True)
+    return torch.stack(rgb), torch.stack(depth)
+
+
+def _picture(batch: ClipBatch, index: int) -> Picture:
+    return Picture(
+        rgb=pictures(batch.video[index, 0]), camera=batch.cameras[index][0], focal_source="clip"
+    )
+
+
+def _cell_index(cell: Int[Tensor, "n 3"], batch: ClipBatch, grid_stride: int) -> Int[Tensor, " n"]:
+    """(frame, row, column) of input pixels to places in the flattened grid of Gaussians."""
+    height, width = (side // grid_stride for side in batch.video.shape[2:4])
+    frame, row, column = cell.unbind(-1)
+    return (frame * height + row // grid_stride) * width + column // grid_stride

@@ -1,0 +1,68 @@
+"""Latents of a true video to a scene, judged by its renders: static stages, then motion.
+
+    video ─ vae (frozen) ─ latent ─┐
+    cameras ─ Plücker maps ────────┴─ ldrm ─ Gaussians ─┬───────────────── render ─ losses
+                                     └ tokens, time ─ deformation ─ moved ┘
+
+In a static stage the deformation network is not held, let alone executed.
+"""
+
+from collections.abc import Mapping
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.stages.measures import reconstruction_measures
+from diff4splat.training.stages.model_stage import ModelStage, network_rays
+from diff4splat.training.stages.panels import reconstruction_panel
+from diff4splat.training.stages.prediction import (
+    Rendered,
+    canonical_scenes,
+    moving_pictures,
+    still_pictures,
+)
+from diff4splat.training.stages.terms import rendering_terms
+
+
+class StaticStage(ModelStage):
+    """Canonical Gaussians from clips in which nothing moves."""
+
+    parts = ("vae", "ldrm")
+
+    def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
+        """Rendering losses at the targets."""
+        rendered = self.render(batch, self.encode(batch))
+        return rendering_terms(rendered, batch, self.plan.recipe.losses, self.plan.features)
+
+    def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
+        """Pictures of the canonical scenes at the targets."""
+        maps = self.ldrm(latent, network_rays(batch))
+        with torch.autocast(latent.device.type, enabled=False):
+            return still_pictures(canonical_scenes(maps, batch, self.plan.model), batch)
+
+    @torch.no_grad()
+    def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
+        """PSNR and depth correlation at the targets, and displacement error where there is one."""
+        return reconstruction_measures(self.render(batch, self.encode(batch)), batch)
+
+    @torch.no_grad()
+    def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
+        """Input, truth, prediction, both depths, motion."""
+        return reconstruction_panel(self.render(batch, self.encode(batch)), batch)
+
+
+class DynamicStage(StaticStage):
+    """The same with the deformation network: targets at any time, and the motion loss."""
+
+    parts = ("vae", "ldrm", "deformation")
+
+    def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
+        """Pictures of the moved scenes at the targets, one query time after the other."""
+        maps = self.ldrm(latent, network_rays(batch))
+        times = batch.target_time.unbind(1)
+        deformations = [self.deformation(maps.tokens, time) for time in times]
+        with torch.autocast(latent.device.type, enabled=False):
+            scenes = canonical_scenes(maps, batch, self.plan.model)
+            return moving_pictures(scenes, deformations, batch, self.plan.model)

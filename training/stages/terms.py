@@ -1,0 +1,60 @@
+"""The rendering losses of one batch, weighted as the recipe says (Diff4Splat, training losses).
+
+    L = λ_photo (MSE + λ_p LPIPS) + λ_geo (1 − Pearson) + smoothness + λ_motion L_motion
+
+Axes: ``b`` batch, ``m p`` targets, ``h w`` pixels. A weight of 0 leaves the term's work out.
+"""
+
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.metrics.features.protocol import PerceptualFeatures
+from diff4splat.metrics.image import mse
+from diff4splat.metrics.perceptual import perceptual_distance
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
+from diff4splat.training.losses.motion import track_motion
+from diff4splat.training.recipe import LossWeights
+from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.model_stage import pictures
+from diff4splat.training.stages.prediction import Rendered
+
+Terms = dict[str, Float[Tensor, " b"]]
+
+
+def rendering_terms(
+    rendered: Rendered, batch: ClipBatch, weights: LossWeights, features: PerceptualFeatures
+) -> Terms:
+    """Every term by name, and their weighted sum as ``total``."""
+    truth = pictures(batch.target_rgb)
+    rgb, depth = rendered.rgb.flatten(1, 2), rendered.depth.flatten(1, 2)
+    true_depth = batch.target_depth.flatten(1, 2)
+    valid = true_depth > 0
+    terms = {"photometric": mse(rgb, truth.flatten(1, 2)).mean(1)}
+    weighted = {"photometric": weights.photometric}
+    if weights.photometric * weights.perceptual:
+        terms["perceptual"] = perceptual_distance(rgb, truth.flatten(1, 2), features).mean(1)
+        weighted["perceptual"] = weights.photometric * weights.perceptual
+    if weights.depth:
+        terms["depth"] = depth_correlation(depth, true_depth, valid)
+        weighted["depth"] = weights.depth
+    if weights.depth * weights.smoothness:
+        terms["smoothness"] = depth_smoothness(depth, valid)
+        weighted["smoothness"] = weights.depth * weights.smoothness
+    if weights.motion and rendered.offsets is not None:
+        terms["motion"] = _motion(rendered.offsets, batch, weights)
+        weighted["motion"] = weights.motion
+    return terms | {TOTAL: sum(weight * terms[name] for name, weight in weighted.items())}
+
+
+def _motion(
+    offsets: Float[Tensor, "b m n 3"], batch: ClipBatch, weights: LossWeights
+) -> Float[Tensor, " b"]:
+    valid = batch.track_valid[:, None].expand(offsets.shape[:3])
+    return track_motion(
+        offsets.flatten(1, 2),
+        batch.track_offset.flatten(1, 2),
+        valid.flatten(1, 2),
+        distance_weight=weights.motion_distance,
+        size_weight=weights.motion_size,
+    )
