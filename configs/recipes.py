@@ -43,7 +43,10 @@ def find_recipe(name_or_file: str) -> Recipe:
             f"--config {name_or_file}: expected a recipe in JSON, got a file that cannot be read; "
             "check the path"
         ) from error
-    return recipe_from_json(text)
+    try:
+        return recipe_from_json(text)
+    except ConfigError as error:
+        raise ConfigError(f"--config {name_or_file}: {error}") from error
 
 
 def with_clips(recipe: Recipe, folder: Path) -> Recipe:

@@ -45,7 +45,12 @@ def test_recipe() -> Recipe:
         data=dynamic_data(data),
     )
     generator = replace(
-        dynamic, name="generator", kind="generator", trained=("text_encoder", "dit"), gates=()
+        dynamic,
+        name="generator",
+        kind="generator",
+        trained=("text_encoder", "dit"),
+        gates=(),
+        level_shift=5.0,
     )
     joint = replace(
         generator,

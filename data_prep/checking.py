@@ -8,7 +8,7 @@ import torch
 from diff4splat.data.agreement import EXACT, MEASURED, Agreement, require_agreement
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.comparing.spread import Share
-from diff4splat.errors import InputError
+from diff4splat.errors import ConfigError, InputError
 from diff4splat.report.phases import Phases
 
 
@@ -16,9 +16,12 @@ def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
     """The worst figure of each kind over the clips; ``most`` of them, spread evenly.
 
     Raises:
+        ConfigError: ``most`` is below 1.
         InputError: the folder is empty, or a clip disagrees by more than its kind of truth may.
         FileFormatError: a shard is missing or damaged.
     """
+    if most is not None and most < 1:
+        raise ConfigError(f"--most: expected at least 1, got {most}; leave it out to look at all")
     clips = ClipFolder(folder)
     if not len(clips):
         raise InputError(f"{folder}: expected clips, got none; prepare some")

@@ -28,8 +28,10 @@ def write_clip_sheet(folder: Path, file: Path) -> None:
 
 
 def clip_sheet(clips: list[Clip]) -> Float[Tensor, "height width 3"]:
-    """Rows of eight clips on white."""
+    """Rows of eight clips on white, each in the corner of a tile that holds the largest."""
     tiles = [_first_and_last(clip) for clip in clips]
+    height, width = (max(tile.shape[axis] for tile in tiles) for axis in (0, 1))
+    tiles = [_padded(tile, height, width) for tile in tiles]
     blank = torch.ones_like(tiles[0])
     columns = min(COLUMNS, len(tiles))
     tiles += [blank] * (-len(tiles) % columns)
@@ -40,4 +42,11 @@ def clip_sheet(clips: list[Clip]) -> Float[Tensor, "height width 3"]:
 def _first_and_last(clip: Clip) -> Float[Tensor, "h w 3"]:
     rgb = clip.views[0].rgb
     both = torch.cat([rgb[0], rgb[-1]], 1).float() / 255
-    return torch.nn.functional.pad(both, (0, 0, 0, GAP_PX, 0, GAP_PX), value=1.0)
+    return _padded(both, both.shape[0] + GAP_PX, both.shape[1] + GAP_PX)
+
+
+def _padded(
+    tile: Float[Tensor, "h w 3"], height: int, width: int
+) -> Float[Tensor, "height width 3"]:
+    right, below = width - tile.shape[1], height - tile.shape[0]
+    return torch.nn.functional.pad(tile, (0, 0, 0, right, 0, below), value=1.0)

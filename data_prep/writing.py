@@ -5,16 +5,20 @@ requests give equal bytes whatever the number of processes.
 """
 
 import multiprocessing
-import os
+import signal
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import torch
+
+from diff4splat.data.manifest import read_manifest
 from diff4splat.data.members.encode import EncodedClip, encode_clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.drawing.warm import prepare_drawing
 from diff4splat.data_prep.synthetic.narration import SOURCE
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.errors import ConfigError
@@ -40,25 +44,52 @@ class WorldJob:
                 f"least 0, got {self.clips}, {self.workers} and {self.first}"
             )
 
+    @property
+    def indices(self) -> range:
+        """Of the worlds."""
+        return range(self.first, self.first + self.clips)
+
 
 def write_worlds(job: WorldJob, phases: Phases, append: bool = False) -> int:
     """Write all clips of the job that the folder does not hold yet; returns how many those were.
 
     Raises:
         OutputError: the folder has clips and ``append`` is False, or cannot be written.
+        ConfigError: clips of the same names are there that were drawn otherwise.
+        KeyboardInterrupt: after what was drawn until then has been written.
     """
-    options = ShardOptions(generator=SOURCE)
-    with ShardWriter(job.folder, options, append) as writer:
-        indices = [
-            index
-            for index in range(job.first, job.first + job.clips)
-            if world_identifier(job.recipe, index) not in writer.identifiers
-        ]
-        with phases.phase("draw clips", len(indices)) as advance:
-            for clip in _drawn(job, indices):
-                writer.write(clip)
-                advance()
+    stopped = None
+    with ShardWriter(job.folder, ShardOptions(generator=SOURCE), append) as writer:
+        if writer.identifiers:
+            _require_alike(job)
+        names = {index: world_identifier(job.recipe, index) for index in job.indices}
+        indices = [index for index, name in names.items() if name not in writer.identifiers]
+        try:
+            if indices:
+                prepare_drawing(phases)
+            with phases.phase("draw clips", len(indices)) as advance:
+                for clip in _drawn(job, indices):
+                    writer.write(clip)
+                    advance()
+        except KeyboardInterrupt as interrupt:
+            # Leaving the writer in peace names the open shard: hours of drawing may lie in it.
+            stopped = interrupt
+    if stopped:
+        raise stopped
     return len(indices)
+
+
+def _require_alike(job: WorldJob) -> None:
+    """Names say seed, split and index alone: clips of another size would be taken for done."""
+    wanted = (job.recipe.frames, job.recipe.views, job.recipe.size_px)
+    names = {world_identifier(job.recipe, index) for index in job.indices}
+    for entry in read_manifest(job.folder).clips:
+        found = (entry.frames, entry.views, entry.size_px)
+        if entry.identifier in names and found != wanted:
+            raise ConfigError(
+                f"{job.folder}: expected clip '{entry.identifier}' with (frames, views, size) "
+                f"{wanted}, got it with {found}; choose another folder, --seed or --first"
+            )
 
 
 def _drawn(job: WorldJob, indices: list[int]) -> Iterator[EncodedClip]:
@@ -67,19 +98,24 @@ def _drawn(job: WorldJob, indices: list[int]) -> Iterator[EncodedClip]:
         yield from (_draw(job.recipe, job.draw, index) for index in indices)
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(job.workers, context, initializer=_one_thread) as pool:
-        # A few ahead keeps workers busy without holding every clip in memory.
-        waiting: list[Future[EncodedClip]] = []
+    pool = ProcessPoolExecutor(job.workers, context, initializer=_begin_worker)
+    # A few ahead keeps workers busy without holding every clip in memory.
+    waiting: list[Future[EncodedClip]] = []
+    try:
         for index in indices:
             waiting.append(pool.submit(_draw, job.recipe, job.draw, index))
             if len(waiting) > 2 * job.workers:
                 yield waiting.pop(0).result()
         for future in waiting:
             yield future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
-def _one_thread() -> None:
-    os.environ["OMP_NUM_THREADS"] = "1"
+def _begin_worker() -> None:
+    """One thread each; Ctrl-C is for the process that writes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    torch.set_num_threads(1)
 
 
 def _draw(recipe: WorldRecipe, draw: DrawSettings, index: int) -> EncodedClip:

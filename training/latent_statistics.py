@@ -12,13 +12,14 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.errors import CheckpointError
+from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.tensor_file import TensorFile, read_tensors, write_tensors
 from diff4splat.models.video_vae import VideoVae
 from diff4splat.report.phases import Advance
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.batches.sources import EVALUATION
 from diff4splat.training.stages.model_stage import network_video
+from diff4splat.training.trainer.loader import load_batch, require_batch
+from diff4splat.training.trainer.samples import EVALUATION_START
 
 FILE = "latent_statistics.safetensors"
 CLIPS = 16
@@ -30,11 +31,15 @@ Statistics = tuple[Float[Tensor, " c"], Float[Tensor, " c"]]
 
 @torch.no_grad()
 def measure_statistics(vae: VideoVae, samples: ClipSamples, advance: Advance) -> Statistics:
-    """Mean and standard deviation per channel of what the encoder answers without noise."""
+    """Mean and standard deviation per channel of what the encoder answers without noise.
+
+    Raises:
+        InputError: neither evaluation samples nor those in their place can be used.
+    """
     total = squares = torch.zeros(vae.config.latent_channels, dtype=torch.float64)
     count = 0
     for index in range(CLIPS):
-        batch = samples.collate([samples[EVALUATION + index]])
+        batch = require_batch(load_batch(samples, [EVALUATION_START + index]))
         latent = vae.encode(network_video(batch)).mean.double()
         total = total + latent.sum((0, 2, 3, 4)).cpu()
         squares = squares + latent.square().sum((0, 2, 3, 4)).cpu()
@@ -65,5 +70,11 @@ def read_statistics(folder: Path) -> Statistics:
             f"{file}: expected the statistics of the latents, got none; "
             "run the autoencoder's stage to its end"
         )
-    stored = read_tensors(file)
-    return stored["mean"], stored["std"]
+    try:
+        stored = read_tensors(file)
+        return stored["mean"], stored["std"]
+    except (FileFormatError, KeyError) as error:
+        raise FileFormatError(
+            f"{file}: expected mean and deviation of the latents, got a damaged file; "
+            "run the autoencoder's stage again, which writes it anew"
+        ) from error

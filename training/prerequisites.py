@@ -1,6 +1,7 @@
 """Which earlier stages a stage builds on, and the networks it starts with.
 
-    RUN/recipe.json  RUN/<stage>/{checkpoints, result.json, log, panels}  RUN/model/ (for pipelines)
+    RUN/<stage>/{recipe.json, checkpoints, result.json, log.jsonl, panels}
+    RUN/model/ (for pipelines)
 
 A part comes from the last earlier stage that trained it: frozen ones with averaged weights, learnt
 ones are then taken over by the trainer, averages and all. Parts nobody trained yet are random.
@@ -9,13 +10,16 @@ ones are then taken over by the trainer, averages and all. Parts nobody trained 
 from collections.abc import Mapping
 from pathlib import Path
 
+import torch
 from torch import Tensor, nn
 
-from diff4splat.errors import CheckpointError
+from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import Networks, create_networks
 from diff4splat.training.latent_statistics import read_statistics
 from diff4splat.training.recipe import Recipe, StageRecipe
 from diff4splat.training.stages.factory import STAGES
+from diff4splat.training.trainer.checkpoint_files import read_checkpoint
+from diff4splat.training.trainer.distributed import Processes
 from diff4splat.training.trainer.export import load_parts
 from diff4splat.training.trainer.gates import read_result, stage_may_start
 from diff4splat.training.trainer.run_files import CHECKPOINTS, RESULT_FILE
@@ -79,11 +83,13 @@ def trained_networks(recipe: Recipe, folder: Path) -> tuple[Networks, frozenset[
 
 
 def _filled(networks: Networks, sources: Mapping[str, StageRecipe], folder: Path) -> Networks:
-    for part, earlier in sources.items():
-        stored = load_parts(last_checkpoint(folder / earlier.name))
-        _fill(getattr(networks, part), stored.get(part, {}), f"{folder / earlier.name}: {part}")
-        if part == "vae":
-            networks.vae.set_statistics(*read_statistics(folder / earlier.name))
+    for earlier in dict.fromkeys(sources.values()):
+        place = folder / earlier.name
+        stored = load_parts(last_checkpoint(place))
+        for part in (part for part, source in sources.items() if source == earlier):
+            _fill(getattr(networks, part), stored.get(part, {}), f"{place}: {part}")
+            if part == "vae":
+                networks.vae.set_statistics(*read_statistics(place))
     return networks
 
 
@@ -98,12 +104,20 @@ def _fill(network: nn.Module, stored: Mapping[str, Tensor], what: str) -> None:
 
 
 def last_checkpoint(folder: Path) -> Path:
-    """The checkpoint that a stage's result speaks of.
+    """The checkpoint that a stage's result speaks of, every byte compared with its digest.
 
     Raises:
         ConfigError: the stage was never begun there.
+        FileFormatError: the checkpoint is missing or damaged.
     """
-    return folder / CHECKPOINTS / read_result(folder).checkpoint
+    checkpoint = folder / CHECKPOINTS / read_result(folder).checkpoint
+    try:
+        read_checkpoint(checkpoint, Processes(rank=0, count=1, device=torch.device("cpu")))
+    except FileFormatError as error:
+        raise FileFormatError(
+            f"{error}; run stage {folder.name} again: it goes on from the checkpoint before"
+        ) from error
+    return checkpoint
 
 
 def _in_order(recipe: Recipe, sources: dict[str, StageRecipe]) -> list[StageRecipe]:

@@ -4,6 +4,7 @@
 "ours" is a choice made here. Functions in ``configs`` return recipes; ``recipe_json`` stores them.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -14,6 +15,11 @@ StageKind = Literal["vae", "static", "dynamic", "generator", "joint"]
 Precision = Literal["float32", "bfloat16"]
 Parallel = Literal["none", "ddp", "fsdp2"]
 Direction = Literal["at_least", "at_most"]
+
+
+def _require(holds: bool, what: str, expected: str, got: object) -> None:
+    if not holds:
+        raise ConfigError(f"{what}: expected {expected}, got {got}; correct the recipe")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +65,18 @@ class OptimizerSettings:
     clip_norm: float = 1.0
     """Largest norm of the whole gradient (MoVieS)."""
 
+    def __post_init__(self) -> None:
+        for name in ("learning_rate", "clip_norm"):
+            value = getattr(self, name)
+            _require(0 < value < math.inf, f"optimizer.{name}", "a number above 0", value)
+        inside = all(0 <= beta < 1 for beta in self.betas)
+        _require(inside, "optimizer.betas", "numbers from 0 to below 1", self.betas)
+        decay, warmup = self.weight_decay, self.warmup_steps
+        _require(0 <= decay < math.inf, "optimizer.weight_decay", "at least 0", decay)
+        _require(warmup >= 0, "optimizer.warmup_steps", "at least 0", warmup)
+        share = self.final_fraction
+        _require(0 <= share <= 1, "optimizer.final_fraction", "0 to 1", share)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceSettings:
@@ -72,6 +90,12 @@ class SourceSettings:
     still_share: float = 0.25
     """Share of worlds in which nothing moves."""
     weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        _require(0 <= self.still_share <= 1, "source.still_share", "0 to 1", self.still_share)
+        _require(0 <= self.weight < math.inf, "source.weight", "at least 0", self.weight)
+        named = self.kind == "worlds" or self.folder != ""
+        _require(named, "source.folder", "the folder of the shards", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +115,19 @@ class DataSettings:
     """Processes that make samples; 0 makes them in the training process."""
     least_depth_share: float = 0.01
     """Clips whose input view has less valid depth are skipped and counted (MoVieS)."""
+
+    def __post_init__(self) -> None:
+        weight = sum(source.weight for source in self.sources)
+        _require(weight > 0, "data.sources", "some with a weight above 0", f"{len(self.sources)}")
+        for name in ("frames", "views", "target_frames"):
+            value = getattr(self, name)
+            _require(value >= 1, f"data.{name}", "at least 1", value)
+        for name in ("tracks", "workers"):
+            value = getattr(self, name)
+            _require(value >= 0, f"data.{name}", "at least 0", value)
+        _require(min(self.size_px) >= 8, "data.size_px", "sides of at least 8", self.size_px)
+        share = self.least_depth_share
+        _require(0 <= share <= 1, "data.least_depth_share", "0 to 1", share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,11 +161,15 @@ class StageRecipe:
     """Above 1 leans to noisy levels; 5 in the paper's public code, at 512² and 49 frames."""
 
     def __post_init__(self) -> None:
-        if self.steps < 1 or self.micro_batch < 1 or self.global_batch % self.micro_batch:
+        counts = (self.steps, self.micro_batch, self.global_batch)
+        if min(counts) < 1 or self.global_batch % self.micro_batch:
             raise ConfigError(
                 f"stage {self.name}: expected steps above 0 and a global batch that micro batches "
                 f"divide, got {self.steps}, {self.global_batch} and {self.micro_batch}"
             )
+        share, shift = self.text_dropout, self.level_shift
+        _require(0 <= share <= 1, f"stage {self.name}: text_dropout", "0 to 1", share)
+        _require(0 < shift < math.inf, f"stage {self.name}: level_shift", "above 0", shift)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,6 +193,14 @@ class TrainerSettings:
     spikes_before_rollback: int = 3
     """Spikes in a row before the last good checkpoint is taken up again."""
 
+    def __post_init__(self) -> None:
+        at_least_1 = ("checkpoint_every", "evaluate_every", "keep_checkpoints")
+        for name in (*at_least_1, "most_skips_in_a_row", "spikes_before_rollback"):
+            value = getattr(self, name)
+            _require(value >= 1, f"trainer.{name}", "at least 1", value)
+        samples = self.evaluation_samples
+        _require(samples >= 0, "trainer.evaluation_samples", "at least 0", samples)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
@@ -162,6 +211,10 @@ class Recipe:
     model: ModelConfig
     stages: tuple[StageRecipe, ...]
     trainer: TrainerSettings = field(default_factory=TrainerSettings)
+
+    def __post_init__(self) -> None:
+        names = [stage.name for stage in self.stages]
+        _require(len(set(names)) == len(names) > 0, "stages", "different names", ", ".join(names))
 
     def stage(self, name: str) -> StageRecipe:
         """The stage of that name.

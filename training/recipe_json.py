@@ -8,14 +8,14 @@ with the stage's name.
 
 import hashlib
 import json
-import types
 from collections.abc import Sequence
-from dataclasses import MISSING, asdict, fields, is_dataclass
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from dataclasses import asdict
+from typing import Any
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config import ModelConfig
 from diff4splat.training.recipe import Recipe
+from diff4splat.training.typed_json import TypedReader
 
 
 def recipe_to_json(recipe: Recipe) -> str:
@@ -33,7 +33,7 @@ def recipe_from_json(text: str) -> Recipe:
         data = json.loads(text)
     except (json.JSONDecodeError, RecursionError) as error:
         raise ConfigError(f"recipe: expected JSON, got {error}") from error
-    return _value(Recipe, data, "recipe")
+    return _recipe(data)
 
 
 def changed(recipe: Recipe, changes: Sequence[str]) -> Recipe:
@@ -49,7 +49,7 @@ def changed(recipe: Recipe, changes: Sequence[str]) -> Recipe:
             raise ConfigError(f"--set: expected key=value, got {change!r}")
         place, last = _place(data, key.strip())
         place[last] = _parsed(text.strip())
-    return _value(Recipe, data, "recipe")
+    return _recipe(data)
 
 
 def fingerprint(recipe: Recipe, stage: str, features: str = "") -> str:
@@ -67,6 +67,11 @@ def fingerprint(recipe: Recipe, stage: str, features: str = "") -> str:
     if own["losses"]["perceptual"]:
         facts["features"] = features
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def _recipe(data: Any) -> Recipe:
+    own = {ModelConfig: lambda value: ModelConfig.from_json(json.dumps(value))}
+    return TypedReader(refusal=ConfigError, own=own).read(Recipe, data, "recipe")
 
 
 def _place(data: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
@@ -98,48 +103,3 @@ def _parsed(text: str) -> Any:
         return json.loads(text)
     except (json.JSONDecodeError, RecursionError):
         return text
-
-
-def _value(kind: Any, value: Any, where: str) -> Any:
-    """``value`` as an instance of the annotated ``kind``."""
-    if kind is ModelConfig:
-        return ModelConfig.from_json(json.dumps(value))
-    if is_dataclass(kind):
-        return _built(kind, value, where)
-    if get_origin(kind) is tuple:
-        return _tuple(get_args(kind), value, where)
-    if get_origin(kind) is Literal:
-        choices = get_args(kind)
-        _require(value in choices, where, f"one of {', '.join(map(str, choices))}", value)
-        return value
-    numbers = {int: (int,), float: (int, float), str: (str,), bool: (bool,)}[kind]
-    fits = isinstance(value, numbers) and (kind is bool or not isinstance(value, bool))
-    _require(fits, where, kind.__name__, value)
-    return float(value) if kind is float else value
-
-
-def _built(kind: type, value: Any, where: str) -> Any:
-    _require(isinstance(value, dict), where, "an object", value)
-    hints, known = get_type_hints(kind), {field.name: field for field in fields(kind)}
-    for key in value:
-        _require(key in known, where, f"the keys {', '.join(known)}", key)
-    for name, field in known.items():
-        optional = field.default is not MISSING or field.default_factory is not MISSING
-        _require(name in value or optional, where, f"the key {name!r}", "none")
-    return kind(**{key: _value(hints[key], one, f"{where}.{key}") for key, one in value.items()})
-
-
-def _tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
-    _require(isinstance(value, list), where, "a list", value)
-    if kinds[-1] is types.EllipsisType or kinds[-1] is Ellipsis:
-        kinds = (kinds[0],) * len(value)
-    _require(len(value) == len(kinds), where, f"{len(kinds)} values", value)
-    return tuple(
-        _value(kind, one, f"{where}[{index}]")
-        for index, (kind, one) in enumerate(zip(kinds, value, strict=True))
-    )
-
-
-def _require(holds: bool, where: str, expected: str, got: Any) -> None:
-    if not holds:
-        raise ConfigError(f"{where}: expected {expected}, got {got!r}")

@@ -27,6 +27,7 @@ from diff4splat.training.recipe_json import fingerprint, recipe_to_json
 from diff4splat.training.stages.factory import create_stage
 from diff4splat.training.stages.model_stage import StagePlan
 from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.trainer.gates import read_result
 from diff4splat.training.trainer.run import run_stage
 from diff4splat.training.trainer.settings import RunSettings, StageResult
 
@@ -74,27 +75,29 @@ def train_stage(asked: StageRun) -> StageResult:
         features=load_features(asked.features),
     )
     stage = create_stage(networks, plan)
-    if _is_first_process():
-        write_text(asked.folder / asked.stage / RECIPE_FILE, recipe_to_json(recipe))
     result = run_stage(stage, samples, stage_recipe, _settings(asked, plan))
-    if _is_first_process():
+    if is_first_process():
         _hand_over(asked, stage_recipe, samples)
     return result
 
 
 def _settings(asked: StageRun, plan: StagePlan) -> RunSettings:
-    recipe, before = asked.recipe, continued_stage(asked.recipe, plan.recipe)
+    recipe, folder = asked.recipe, asked.folder / asked.stage
+    before = continued_stage(recipe, plan.recipe)
+    # Gates ignored, the stage before may be unfinished: its averages are all there is to take.
+    over = before is not None and read_result(asked.folder / before.name).finished
     return RunSettings(
-        folder=asked.folder / asked.stage,
+        folder=folder,
         seed=recipe.seed,
         fingerprint=fingerprint(recipe, asked.stage, plan.features.name),
         trainer=recipe.trainer,
-        start_from=None if before is None else asked.folder / before.name,
+        start_from=asked.folder / before.name if over else None,
         stop_after_steps=asked.stop_after_steps,
         stop_after_s=asked.stop_after_s,
         device=asked.device,
         phases=asked.phases,
         note=asked.note,
+        begin=lambda: write_text(folder / RECIPE_FILE, recipe_to_json(recipe)),
     )
 
 
@@ -120,6 +123,6 @@ def _measure_latents(asked: StageRun, stage: StageRecipe, samples: ClipSamples) 
         write_statistics(measure_statistics(vae, samples, advance), folder)
 
 
-def _is_first_process() -> bool:
+def is_first_process() -> bool:
     """The one that writes: torchrun numbers its processes; alone, there is no number."""
     return os.environ.get("RANK", "0") == "0"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.layout.kinds import OUTSIDERS, SCENE_KINDS
-from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
+from diff4splat.data_prep.synthetic.motions.registry import MOTIONS, families_for
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.splits import Split
 
@@ -56,8 +56,8 @@ class Cast:
         return [
             (motion, family)
             for motion in self.split.motions.names
-            for family in sorted(able)
-            if MOTIONS[motion].suits(FAMILIES[family]) and not self._is_odd(motion)
+            if not self._is_odd(motion)
+            for family in sorted(able.intersection(families_for(motion)))
         ]
 
     def _is_odd(self, motion: str) -> bool:

@@ -7,12 +7,16 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from diff4splat.cli import installation
+from diff4splat.cli import installation, worlds
 from diff4splat.errors import Diff4SplatError
+
+if TYPE_CHECKING:
+    from diff4splat.report.phases import Phases
 
 EXTRAS = (
     ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),
@@ -29,7 +33,7 @@ class Doctor:
     """Check the installation: versions, back ends, extras, and that a picture comes out right."""
 
     warm: bool = False
-    """Only compile the CPU renderer, which otherwise happens before the first picture."""
+    """Only compile, which otherwise happens before the first picture and the first world."""
 
     def run(self) -> None:
         """Print the table, or compile."""
@@ -41,30 +45,41 @@ class Doctor:
         installation.load_libraries()
         print_rows(torch_rows())
         print_rows(backend_rows())
+        print_rows([("worlds", worlds.readiness())])
         print_rows(extra_rows())
         print_rows([("self-test", installation.self_test())])
 
 
 def warm_up() -> None:
-    """Compile the CPU renderer and say how long it took and where the result lies.
+    """Compile what draws worlds and the CPU renderer, and say how long each took and where it lies.
 
     Raises:
-        Diff4SplatError: it cannot run here.
+        Diff4SplatError: the renderer cannot run here.
     """
-    from diff4splat.cli.console import ConsolePhases, note
     from diff4splat.cli.renderer import COMPILED, compile_renderer
+    from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS as DRAWING
+    from diff4splat.data_prep.synthetic.drawing.warm import compile_drawing
+    from diff4splat.render.raster.jit import KERNELS
 
+    warm_one("worlds", compile_drawing, DRAWING)
     reason = installation.refusal(COMPILED, "cpu")
     if reason is not None:
         raise Diff4SplatError(f"renderer {COMPILED}: {reason}")
-    phases = ConsolePhases()
-    compiled = compile_renderer(phases)
-    from diff4splat.render.raster.jit import KERNELS
+    warm_one(f"renderer {COMPILED}", compile_renderer, KERNELS)
 
-    folder = KERNELS[0].stats.cache_path
+
+def warm_one(
+    what: str, compile_all: "Callable[[Phases], tuple[str, ...]]", kernels: list[Any]
+) -> None:
+    """Compile one list of ``kernels`` with its own bar and line."""
+    from diff4splat.cli.console import ConsolePhases, note
+
+    phases = ConsolePhases()
+    compiled = compile_all(phases)
+    folder = kernels[0].stats.cache_path
     place = f"kept in {folder}" if folder else "not kept, because no folder can be written to"
     did = f"compiled {len(compiled)} kernels" if compiled else "was already compiled; loaded"
-    note(f"{did} in {phases.seconds['compile']:.1f} s; {place}")
+    note(f"{what}: {did} in {phases.seconds['compile']:.1f} s; {place}")
 
 
 def print_rows(rows: Rows) -> None:

@@ -38,6 +38,7 @@ class Evaluate:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.worlds import prepare_sources
         from diff4splat.metrics.features.load import load_features
         from diff4splat.training.evaluation.captions import grammar_caption
         from diff4splat.training.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
@@ -58,6 +59,7 @@ class Evaluate:
             captioner=grammar_caption,
         )
         prepare_renderer(speck("cpu"), phases)
+        prepare_sources([protocol.source], phases)
         extent = Extent(limit=self.items, fresh=self.fresh)
         found = evaluate(clips, setup, self.out, extent, phases)
         print(found.markdown)

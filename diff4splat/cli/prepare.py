@@ -7,7 +7,7 @@ from typing import Literal
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareSynthetic:
-    """Draw procedural worlds into a folder of shards; the same command goes on after a stop."""
+    """Draw procedural worlds into a folder of shards; after a stop, --append goes on."""
 
     out: Path
     """Folder for the shards, the manifest and a contact sheet."""

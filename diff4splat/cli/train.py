@@ -2,6 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from diff4splat.errors import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,8 +21,8 @@ class Train:
     """Folder of the whole run; every stage has its own folder in it."""
     clips: Path | None = None
     """Folder of shards to learn from; if left out, the worlds that the recipe names."""
-    set: tuple[str, ...] = ()
-    """Changes such as stages.vae.steps=2000 or trainer.parallel=ddp."""
+    set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
+    """Changes such as stages.vae.steps=2000 or trainer.parallel=ddp; may be given again."""
     features: str | None = None
     """Weights of LPIPS, as vgg:FILE or alex:FILE; if left out, a stand-in without weights."""
     steps: int | None = None
@@ -34,16 +39,19 @@ class Train:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.worlds import prepare_sources
         from diff4splat.configs.recipes import find_recipe, with_clips
         from diff4splat.training.recipe_json import changed
-        from diff4splat.training.stage_run import StageRun, train_stage
+        from diff4splat.training.stage_run import StageRun, is_first_process, train_stage
 
-        recipe = changed(find_recipe(self.config), self.set)
+        self._require_some_work()
+        recipe = changed(find_recipe(self.config), [one for given in self.set for one in given])
         if self.clips is not None:
             recipe = with_clips(recipe, self.clips)
         recipe.stage(self.stage)
         phases = ConsolePhases()
         prepare_renderer(speck("cpu"), phases)
+        prepare_sources(recipe.stage(self.stage).data.sources, phases)
         asked = StageRun(
             recipe=recipe,
             stage=self.stage,
@@ -57,7 +65,21 @@ class Train:
             note=note,
         )
         result = train_stage(asked)
+        if not is_first_process():
+            return
         measures = ", ".join(f"{name} {value:.4g}" for name, value in result.measures.items())
         total = recipe.stage(self.stage).steps
         more = "" if result.outcome == "finished" else "; the same command goes on"
         print(f"{self.stage}: step {result.step} of {total} ({measures or 'not judged yet'}){more}")
+
+    def _require_some_work(self) -> None:
+        """Refuse limits that leave nothing to do, before anything is loaded.
+
+        Raises:
+            ConfigError: a limit is not above 0.
+        """
+        for name, limit in (("--steps", self.steps), ("--minutes", self.minutes)):
+            if limit is not None and not limit > 0:
+                raise ConfigError(
+                    f"{name}: expected more than 0, got {limit}; leave it out to finish"
+                )

@@ -22,7 +22,7 @@ from diff4splat.training.stage import TOTAL
 from diff4splat.training.trainer.run import run_stage
 from diff4splat.training.trainer.settings import RunSettings
 
-STEPS = {"vae": 600, "dynamic": 400, "generator": 300, "joint": 300}
+STEPS = {"vae": 600, "dynamic": 400, "generator": 300, "joint": 450}
 USUAL_STEPS = 150
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
@@ -62,6 +62,7 @@ def overfit(name: str, folder: Path) -> list[float]:
     return [row[f"loss/{TOTAL}"] for row in rows if row["event"] == "step"]
 
 
+@pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize("name", STAGES)
 def test_one_clip_is_learnt_by_heart(name: str, tmp_path: Path) -> None:
     losses = overfit(name, tmp_path)

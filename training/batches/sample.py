@@ -10,6 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data.clip import Clip
+from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.resize import resized
@@ -35,6 +36,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         InputError: the clip is too short, has too little depth, or another shape than asked for.
     """
     generator = origin.key.generator()
+    _require_views(clip, settings.views)
     clip = resized(cut(clip, settings.frames, generator), settings.size_px)
     clip = normalized(clip, settings.least_depth_share)
     targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
@@ -55,6 +57,15 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
     )
+
+
+def _require_views(clip: Clip, views: int) -> None:
+    """Clips of one view have samples of another shape than clips of several."""
+    if len(clip.views) == 1 < views:
+        raise InputError(
+            f"clip {clip.note.identifier}: expected at least 2 views, got 1; "
+            "leave the clip out or train with data.views=1"
+        )
 
 
 def _pictures(clip: Clip, targets: Targets, name: str) -> Tensor:

@@ -1,7 +1,7 @@
 """Where clips come from: procedural worlds without end, or folders of shards.
 
 A source answers any index from 0; training and evaluation never share a clip: worlds of evaluation
-have indices from EVALUATION on, and a folder keeps its last clips back for it.
+have indices from EVALUATION_START on, and a folder keeps its last clips back for it.
 """
 
 from functools import cached_property
@@ -19,9 +19,8 @@ from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import InputError
 from diff4splat.training.recipe import DataSettings, SourceSettings
 from diff4splat.training.stage import SampleKey
+from diff4splat.training.trainer.samples import EVALUATION_START
 
-EVALUATION = 1 << 40
-"""Sample indices from here on belong to evaluation."""
 KEPT_BACK = 16
 """One clip in so many of a folder is kept back for evaluation."""
 
@@ -67,16 +66,11 @@ class FolderClips:
 
     def clip(self, index: int) -> Clip:
         """Still and moving clips in the asked share, each shuffled on its own."""
-        judged = index >= EVALUATION
+        judged = index >= EVALUATION_START
         draw = torch.rand((), generator=SampleKey(self.seed, "kind", index, "still").generator())
         kind = "still" if bool(draw < self.still_share) else "moving"
         positions = self._positions[kind, judged]
-        if not positions:
-            raise InputError(
-                f"{self.folder}: expected {kind} clips, got none; "
-                "prepare some, or set still_share to 0 or 1"
-            )
-        epoch, place = divmod(index % EVALUATION, len(positions))
+        epoch, place = divmod(index % EVALUATION_START, len(positions))
         shuffle = SampleKey(self.seed, "epoch", epoch, kind).generator()
         order = torch.randperm(len(positions), generator=shuffle)
         return self._read(positions[int(order[place])])
@@ -104,14 +98,28 @@ def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> Clip
     """The source that the settings name.
 
     Raises:
-        InputError, FileFormatError: the folder is not one of shards.
+        InputError, FileFormatError: the folder is not one of shards, or lacks a kind of clip.
     """
     if settings.kind == "worlds":
         return world_clips(settings, data, seed)
     # A missing folder stops the run now, not every sample later.
-    if len(ClipFolder(settings.folder)) == 0:
-        raise InputError(f"{settings.folder}: expected clips, got none; prepare some")
+    _require_clips(ClipFolder(settings.folder), settings)
     return FolderClips(settings, data.views, seed)
+
+
+def _require_clips(clips: ClipFolder, settings: SourceSettings) -> None:
+    """The folder has clips of every kind that samples will ask for."""
+    stills = len(clips.positions(Selection(is_static=True)))
+    share = settings.still_share
+    needed = {"still": (stills, share > 0, 0), "moving": (len(clips) - stills, share < 1, 1)}
+    if not len(clips):
+        raise InputError(f"{settings.folder}: expected clips, got none; prepare some")
+    for kind, (count, wanted, other) in needed.items():
+        if wanted and not count:
+            raise InputError(
+                f"{settings.folder}: expected {kind} clips for still_share {share:g}, got none; "
+                f"prepare some or set still_share to {other}"
+            )
 
 
 def world_clips(settings: SourceSettings, data: DataSettings, seed: int) -> "WorldClips":

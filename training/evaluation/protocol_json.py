@@ -1,19 +1,17 @@
 """Protocols as JSON: every key must be there, none may be unknown, and numbers keep their kind."""
 
 import json
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
-from types import GenericAlias
-from typing import Literal, TypeVar, get_args, get_origin
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.existing import require_file
 from diff4splat.training.evaluation.protocol import VERSION, Protocol
+from diff4splat.training.typed_json import TypedReader
 
 FORMAT = "diff4splat-evaluation"
 PACKAGE = "diff4splat.training.evaluation.protocols"
-Record = TypeVar("Record")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,51 +68,10 @@ def parse_protocol(text: str, where: str) -> Protocol:
         raise FileFormatError(
             f"{where}: expected version {VERSION}, got {version!r}; a newer diff4splat may read it"
         )
-    return _record(Protocol, data, where)
+    return TypedReader(refusal=FileFormatError).read(Protocol, data, where)
 
 
 def protocol_json(protocol: Protocol) -> str:
     """Every key, as indented JSON."""
     record = {"format": FORMAT, "version": VERSION, **asdict(protocol)}
     return json.dumps(record, indent=2) + "\n"
-
-
-def _record(kind: type[Record], data: object, where: str) -> Record:
-    if not isinstance(data, dict):
-        raise FileFormatError(f"{where}: expected an object, got {type(data).__name__}")
-    names = [field.name for field in fields(kind)]
-    unknown, missing = sorted(set(data) - set(names)), sorted(set(names) - set(data))
-    if unknown:
-        raise FileFormatError(f"{where}: expected the keys {names}, got {unknown[0]!r}; remove it")
-    if missing:
-        raise FileFormatError(f"{where}: expected the key {missing[0]!r}, got none; add it")
-    values = {f.name: _value(f.type, data[f.name], f"{where}.{f.name}") for f in fields(kind)}
-    return kind(**values)
-
-
-def _value(kind: object, value: object, where: str) -> object:
-    """``value`` as ``kind``: a record, a tuple, one of some words, or a plain number or text."""
-    if is_dataclass(kind):
-        return _record(kind, value, where)
-    if isinstance(kind, GenericAlias) and get_origin(kind) is tuple:
-        return _tuple(get_args(kind), value, where)
-    if get_origin(kind) is Literal:
-        if value not in get_args(kind):
-            raise FileFormatError(f"{where}: expected one of {get_args(kind)}, got {value!r}")
-        return value
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if kind is float and number:
-        return float(value)
-    if type(value) is not kind:
-        raise FileFormatError(f"{where}: expected {kind.__name__}, got {value!r}")
-    return value
-
-
-def _tuple(inner: tuple[object, ...], value: object, where: str) -> tuple[object, ...]:
-    if not isinstance(value, list):
-        raise FileFormatError(f"{where}: expected a list, got {value!r}")
-    kinds = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
-    if len(kinds) != len(value):
-        raise FileFormatError(f"{where}: expected {len(kinds)} values, got {len(value)}")
-    pairs = zip(kinds, value, strict=True)
-    return tuple(_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(pairs))

@@ -1,4 +1,4 @@
-"""What the video autoencoder is trained by, beside ``photometric``.
+"""What the video autoencoder is trained by, beside ``perceptual_error``.
 
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid, ``*d`` everything else of a video.
 

@@ -7,9 +7,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.metrics.image import psnr
-from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.autoencoder import charbonnier, posterior_divergence
+from diff4splat.training.losses.photometric import perceptual_error
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.model_stage import ModelStage, network_video, pictures
 from diff4splat.training.stages.panels import panel
@@ -30,7 +30,7 @@ class AutoencoderStage(ModelStage):
         total = weights.photometric * terms["pixels"] + weights.divergence * terms["divergence"]
         if weights.perceptual:
             shown, truth = _frames(decoded), _frames(video)
-            terms["perceptual"] = perceptual_distance(shown, truth, self.plan.features).mean(1)
+            terms["perceptual"] = perceptual_error(shown, truth, self.plan.features)
             total = total + weights.perceptual * terms["perceptual"]
         return terms | {TOTAL: total}
 

@@ -25,6 +25,10 @@ from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.model_stage import ModelStage, network_rays, pictures
 from diff4splat.training.stages.panels import Row, panel
 
+UNSAID = "a scene"
+"""What clips without a caption say, so that every process runs the text encoder alike."""
+Terms = Mapping[str, Float[Tensor, " b"]]
+
 JUDGED_LEVELS = (0.25, 0.5, 0.75)
 """Noise levels at which evaluation measures the velocity."""
 
@@ -55,9 +59,13 @@ class GeneratorStage(ModelStage):
 
     parts = ("vae", "text_encoder", "dit")
 
-    def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
+    def forward(self, batch: ClipBatch) -> Terms:
         """The term ``flow``."""
-        video = self.noisy(batch, self.encode(batch))
+        return self.flow_terms(batch, self.encode(batch))
+
+    def flow_terms(self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]) -> Terms:
+        """Flow matching at one level per sample, for the latents of the batch."""
+        video = self.noisy(batch, clean)
         velocity = self.velocity(batch, video, self._drops_text(batch))
         flow = flow_matching(velocity, video.clean, video.noise, first_frame_is_clean=True)
         return {"flow": flow, TOTAL: self.plan.recipe.losses.flow * flow}
@@ -79,27 +87,29 @@ class GeneratorStage(ModelStage):
         batch: ClipBatch,
         latent: Float[Tensor, "b c t h w"],
         levels: Float[Tensor, "b t"],
-        without_text: bool,
+        without_text: bool = False,
     ) -> Float[Tensor, "b c t h w"]:
         """The model's answer for any latent."""
         text, mask = (None, None) if without_text else self._text(batch)
         return self.dit(latent, levels, network_rays(batch), text, mask)
 
     def _text(self, batch: ClipBatch) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
-        tokens, mask = tokenize(list(batch.captions), self.plan.model.text.max_bytes)
+        captions = [caption or UNSAID for caption in batch.captions]
+        tokens, mask = tokenize(captions, self.plan.model.text.max_bytes)
         tokens, mask = tokens.to(batch.video.device), mask.to(batch.video.device)
         return self.text_encoder(tokens, mask), mask
 
     def _drops_text(self, batch: ClipBatch) -> bool:
-        if not all(batch.captions):
-            return True
         draw = torch.rand((), generator=self.draw_for_step(batch, "text"))
         return self.training and bool(draw < self.plan.recipe.text_dropout)
 
     @torch.no_grad()
-    def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
+    def measure(self, batch: ClipBatch) -> Terms:
         """``flow_error``: mean squared error of the velocity over fixed levels."""
-        clean = self.encode(batch)
+        return self.flow_measures(batch, self.encode(batch))
+
+    def flow_measures(self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]) -> Terms:
+        """The same for the latents of the batch."""
         errors = [self._error_at(batch, clean, level) for level in JUDGED_LEVELS]
         return {"flow_error": torch.stack(errors).mean(0)}
 
@@ -110,7 +120,7 @@ class GeneratorStage(ModelStage):
         rows: list[Row] = [("truth", list(pictures(batch.video)[0]))]
         for level in JUDGED_LEVELS:
             video = self._at_level(batch, clean, level)
-            guess = clean_from_velocity(video.latent, self._velocity(batch, video), video.level)
+            guess = clean_from_velocity(video.latent, self.velocity(batch, video), video.level)
             guess = torch.cat([clean[:, :, :1], guess[:, :, 1:]], 2)
             decoded = self.vae.decode(guess[:1])[0].movedim(0, -1).float()
             rows.append((f"from level {level:g}", list(((decoded + 1) / 2).clamp(0, 1))))
@@ -119,11 +129,8 @@ class GeneratorStage(ModelStage):
     def _error_at(self, batch: ClipBatch, clean: Tensor, level: float) -> Float[Tensor, " b"]:
         video = self._at_level(batch, clean, level)
         return flow_matching(
-            self._velocity(batch, video), clean, video.noise, first_frame_is_clean=True
+            self.velocity(batch, video), clean, video.noise, first_frame_is_clean=True
         )
-
-    def _velocity(self, batch: ClipBatch, video: NoisyVideo) -> Float[Tensor, "b c t h w"]:
-        return self.velocity(batch, video, without_text=not all(batch.captions))
 
     def _at_level(self, batch: ClipBatch, clean: Tensor, level: float) -> NoisyVideo:
         levels = clean.new_full((len(clean),), level)

@@ -34,22 +34,24 @@ class JointStage(GeneratorStage, DynamicStage):
 
     def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """The terms of both stages, and their sum as ``total``."""
-        flow = GeneratorStage.forward(self, batch)
-        rendered = self.render(batch, self.regenerated(batch))
+        clean = self.encode(batch)
+        flow = self.flow_terms(batch, clean)
+        rendered = self.render(batch, self.regenerated(batch, clean))
         scene = rendering_terms(rendered, batch, self.plan.recipe.losses, self.plan.features)
         return {**flow, **scene, TOTAL: flow[TOTAL] + scene[TOTAL]}
 
     @torch.no_grad()
-    def regenerated(self, batch: ClipBatch) -> Float[Tensor, "b c t h w"]:
+    def regenerated(
+        self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]
+    ) -> Float[Tensor, "b c t h w"]:
         """The clip's latents after a detour through noise."""
-        clean = self.encode(batch)
         draws = [torch.rand(1, generator=own) for own in self.draw(batch, "detour")]
         start = DEEPEST * torch.cat(draws).to(clean)
         video = NoisyVideo(clean=clean, noise=self.noise(batch, clean, "detour noise"), level=start)
         latent = video.latent
         for step in range(STEPS):
             at = replace(video, level=start * (1 - step / STEPS))
-            velocity = self.velocity_at(batch, latent, at.levels, not all(batch.captions))
+            velocity = self.velocity_at(batch, latent, at.levels)
             moved = latent - (start / STEPS)[:, None, None, None, None] * velocity
             latent = torch.cat([clean[:, :, :1], moved[:, :, 1:]], 2)
         return latent
@@ -57,10 +59,12 @@ class JointStage(GeneratorStage, DynamicStage):
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """Velocity error, and the reconstruction of regenerated latents."""
-        rendered = self.render(batch, self.regenerated(batch))
-        return {**GeneratorStage.measure(self, batch), **reconstruction_measures(rendered, batch)}
+        clean = self.encode(batch)
+        rendered = self.render(batch, self.regenerated(batch, clean))
+        return {**self.flow_measures(batch, clean), **reconstruction_measures(rendered, batch)}
 
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """The reconstruction of regenerated latents."""
-        return reconstruction_panel(self.render(batch, self.regenerated(batch)), batch)
+        latent = self.regenerated(batch, self.encode(batch))
+        return reconstruction_panel(self.render(batch, latent), batch)

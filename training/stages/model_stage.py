@@ -18,6 +18,7 @@ from diff4splat.models.factory import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import StageRecipe
 from diff4splat.training.stage import SampleKey, Stage
+from diff4splat.training.trainer.samples import asked_index
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +66,7 @@ class ModelStage(Stage):
 
     def draw_for_step(self, batch: ClipBatch, purpose: str) -> torch.Generator:
         """One generator for all samples of a step, on every process alike."""
-        step = int(batch.sample_index[0]) // self.plan.recipe.global_batch
+        step = asked_index(int(batch.sample_index[0])) // self.plan.recipe.global_batch
         return self._key(step, purpose).generator()
 
     def noise(self, batch: ClipBatch, like: Tensor, purpose: str) -> Tensor:

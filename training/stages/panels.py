@@ -93,7 +93,8 @@ def _arrows(
     valid: Bool[Tensor, " n"],
 ) -> Float[Tensor, "h w 3"]:
     """Displacements across the picture as lines, coloured by direction."""
-    canvas = np.ascontiguousarray(background.cpu().numpy())
+    # A copy of its own: lines of one picture must not show in the next.
+    canvas = background.cpu().numpy().copy()
     scale = float(batch.cameras.focal_px[0, 0, 0]) / 4
     for (_, row, column), shift in zip(
         batch.track_cell[0][valid].tolist(), offset[valid].detach().tolist(), strict=True

@@ -9,11 +9,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.metrics.features.protocol import PerceptualFeatures
-from diff4splat.metrics.image import mse
-from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
 from diff4splat.training.losses.motion import track_motion
+from diff4splat.training.losses.photometric import perceptual_error, squared_error
 from diff4splat.training.recipe import LossWeights
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.model_stage import pictures
@@ -26,14 +25,14 @@ def rendering_terms(
     rendered: Rendered, batch: ClipBatch, weights: LossWeights, features: PerceptualFeatures
 ) -> Terms:
     """Every term by name, and their weighted sum as ``total``."""
-    truth = pictures(batch.target_rgb)
-    rgb, depth = rendered.rgb.flatten(1, 2), rendered.depth.flatten(1, 2)
+    rgb, truth = rendered.rgb.flatten(1, 2), pictures(batch.target_rgb).flatten(1, 2)
+    depth = rendered.depth.flatten(1, 2)
     true_depth = batch.target_depth.flatten(1, 2)
     valid = true_depth > 0
-    terms = {"photometric": mse(rgb, truth.flatten(1, 2)).mean(1)}
+    terms = {"photometric": squared_error(rgb, truth)}
     weighted = {"photometric": weights.photometric}
     if weights.photometric * weights.perceptual:
-        terms["perceptual"] = perceptual_distance(rgb, truth.flatten(1, 2), features).mean(1)
+        terms["perceptual"] = perceptual_error(rgb, truth, features)
         weighted["perceptual"] = weights.photometric * weights.perceptual
     if weights.depth:
         terms["depth"] = depth_correlation(depth, true_depth, valid)

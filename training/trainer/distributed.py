@@ -7,7 +7,7 @@ the same list in the same order. Nothing is received from outside the run.
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import TypeVar
@@ -90,11 +90,23 @@ def open_processes(
 
 def _device(wanted: str | None) -> torch.device:
     local = int(os.environ.get("LOCAL_RANK", "0"))
-    found = torch.device(wanted or ("cuda" if torch.cuda.is_available() else "cpu"))
+    found = _named_device(wanted or ("cuda" if torch.cuda.is_available() else "cpu"))
     if found.type == "cuda":
         found = torch.device("cuda", local if found.index is None else found.index)
         torch.cuda.set_device(found)
     return found
+
+
+def _named_device(name: str) -> torch.device:
+    with suppress(RuntimeError):
+        found = torch.device(name)
+        present = torch.cuda.device_count() if found.type == "cuda" else 1
+        if found.type in ("cpu", "cuda") and (found.index or 0) < present:
+            return found
+    known = ["cpu", *(f"cuda:{index}" for index in range(torch.cuda.device_count()))]
+    raise ConfigError(
+        f"device: expected {' or '.join(known)}, got {name!r}; leave it out to take the best"
+    )
 
 
 def _join(rank: int, count: int, device: torch.device, timeout_s: float) -> None:

@@ -1,9 +1,13 @@
 """Means of a stage's measures over fixed samples that training never sees, with averaged weights.
 
+NaN says that a measure does not apply to a sample, such as motion where nothing moves: means leave
+it out, and are NaN only where it applies to no sample.
+
 The samples are shared out over processes; sharded networks need all processes in every call, so
 that whoever has fewer samples repeats one, and repeats do not count.
 """
 
+import math
 from dataclasses import dataclass, field
 
 from jaxtyping import Float
@@ -60,7 +64,10 @@ class Evaluation:
 def _means(per_process: list[dict[int, dict[str, float]]]) -> dict[str, float]:
     merged = {position: row for found in per_process for position, row in found.items()}
     names = sorted({name for row in merged.values() for name in row})
-    return {
-        name: exact_mean([row[name] for _, row in sorted(merged.items()) if name in row])
-        for name in names
-    }
+    rows = [row for _, row in sorted(merged.items())]
+    return {name: _mean([row[name] for row in rows if name in row]) for name in names}
+
+
+def _mean(values: list[float]) -> float:
+    applying = [value for value in values if not math.isnan(value)]
+    return exact_mean(applying) if applying else math.nan

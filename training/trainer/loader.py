@@ -1,12 +1,11 @@
 """Makes batches in worker processes and replaces samples that cannot be used.
 
-A sample that raises one of our errors is replaced by the sample at ``hash(index, attempt)``: the
-same replacement on any machine and process count. Replacements are counted by reason. Workers are
-started afresh rather than forked, because rasteriser threads do not survive a fork, and each
-computes on one thread. They ignore Ctrl-C: the trainer decides when to stop.
+A sample that raises one of our errors is replaced by one that depends on its index alone: the same
+on any machine and process count. Replacements are counted by reason. Workers are started afresh
+rather than forked, because rasteriser threads do not survive a fork, and each computes on one
+thread. They ignore Ctrl-C: the trainer decides when to stop.
 """
 
-import hashlib
 import os
 import signal
 import time
@@ -21,7 +20,7 @@ from torch.utils.data import DataLoader, Dataset
 from diff4splat.errors import Diff4SplatError, InputError
 from diff4splat.training.stage import Batch
 from diff4splat.training.trainer.sampler import StepRange
-from diff4splat.training.trainer.samples import EVALUATION_START, Samples
+from diff4splat.training.trainer.samples import Samples, replacement
 
 MOST_ATTEMPTS = 10
 """Unusable samples in a row before a run gives up: then the source is broken, not a sample."""
@@ -53,20 +52,13 @@ class Loaded:
     waited_s: float = 0.0
 
 
-def replacement(sample_index: int, attempt: int) -> int:
-    """Another index, on the same side of ``EVALUATION_START``."""
-    digest = hashlib.blake2b(f"{sample_index}/{attempt}".encode(), digest_size=8).digest()
-    start = EVALUATION_START if sample_index >= EVALUATION_START else 0
-    return start + int.from_bytes(digest, "big") % EVALUATION_START
-
-
 def load_batch(samples: Samples, indices: Sequence[int]) -> Loaded:
     """Samples at the indices or in their place; never raises our own errors."""
     found, failures = [], []
     for index in indices:
         for attempt in range(MOST_ATTEMPTS):
             try:
-                found.append(samples[replacement(index, attempt) if attempt else index])
+                found.append(samples[replacement(index, attempt)])
                 break
             except Diff4SplatError as error:
                 failures.append(_failure(index, error))
@@ -86,7 +78,8 @@ def require_batch(loaded: Loaded) -> Batch:
         listed = "; ".join(f"{count} × {reason}" for reason, count in reasons.most_common())
         raise InputError(
             f"sample {loaded.failures[-1].sample}: expected a usable sample among "
-            f"{MOST_ATTEMPTS} tries, got {listed}; check the data source"
+            f"{MOST_ATTEMPTS} tries, got {listed}; check the data source, last of all: "
+            f"{loaded.failures[-1].message}"
         )
     return loaded.batch
 

@@ -52,10 +52,11 @@ class StageModule(nn.Module):
             return self.stage.panel(batch).float().cpu().clamp(0, 1)
 
     def set_training(self, training: bool) -> None:
-        """Trained parts learn or are evaluated; everything else is always evaluated."""
-        self.stage.eval()
-        for name in self.stage.trained:
-            self.stage.get_submodule(name).train(training)
+        """The stage and its trained parts learn or are evaluated; frozen parts are evaluated."""
+        self.stage.train(training)
+        for name, part in self.stage.named_children():
+            if name not in self.stage.trained:
+                part.eval()
 
     def _precision(self) -> AbstractContextManager:
         return torch.autocast(self.device.type, torch.bfloat16, enabled=self.half)

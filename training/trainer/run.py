@@ -34,6 +34,7 @@ def run_stage(stage: Stage, samples: Samples, recipe: StageRecipe, run: RunSetti
         stop_request(run) as stop,
     ):
         training = assemble(stage, samples, recipe, run, processes)
+        processes.first_does(run.begin)
         with closing(training.journal):
             return _conclude(training, _train(training, stop))
 

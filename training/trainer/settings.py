@@ -17,6 +17,10 @@ def _silent(text: str) -> None:
     """Take a note to nobody."""
 
 
+def _nothing() -> None:
+    """Do nothing."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSettings:
     """One call; calls with the same folder continue each other."""
@@ -43,10 +47,13 @@ class RunSettings:
     phases: Phases = field(default_factory=Phases)
     note: Callable[[str], None] = _silent
     """Takes one line for people; only the first process talks."""
+    begin: Callable[[], None] = _nothing
+    """Called by the first process once folder and settings are known to fit, before any step."""
 
     def __post_init__(self) -> None:
-        counts = (self.stop_after_steps or 1, self.log_every, self.timeout_s)
-        if min(counts) <= 0 or (self.stop_after_s or 0) < 0:
+        steps = 1 if self.stop_after_steps is None else self.stop_after_steps
+        counts = (steps, self.log_every, self.timeout_s)
+        if min(counts) <= 0 or not (self.stop_after_s or 0) >= 0:
             raise ConfigError(
                 "run: expected stop_after_steps, log_every and timeout_s above 0, got "
                 f"{self.stop_after_steps}, {self.log_every} and {self.timeout_s}"

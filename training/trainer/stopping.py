@@ -1,4 +1,7 @@
-"""Polite stops: the first SIGTERM or Ctrl-C ends training after the step, the second at once."""
+"""Polite stops: the first SIGTERM, SIGHUP or Ctrl-C ends training after the step.
+
+The second one ends it at once.
+"""
 
 import signal
 import threading
@@ -8,7 +11,7 @@ from contextlib import contextmanager
 
 from diff4splat.training.trainer.settings import Outcome, RunSettings
 
-_SIGNALS = (signal.SIGTERM, signal.SIGINT)
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 class StopRequest:

@@ -100,7 +100,9 @@ def follow(stage: Stage, points: Points) -> Float64[np.ndarray, "t n 3"]:
     corners = stage.triangles[points.triangles]
     a, b, c = (stage.positions[:, corners[:, corner]] for corner in range(3))
     share = points.weights
-    return a * share[:, :1] + b * share[:, 1:2] + c * share[:, 2:]
+    moved = a * share[:, :1] + b * share[:, 1:2] + c * share[:, 2:]
+    # As gathered, frames are not the slowest axis: kernels would compile for that order too.
+    return np.ascontiguousarray(moved)
 
 
 def look(

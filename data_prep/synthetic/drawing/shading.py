@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.drawing.compiled import inlined, kernel, shared
+from diff4splat.data_prep.synthetic.drawing.compiled import inlined, kernel, merged, shared
 from diff4splat.data_prep.synthetic.drawing.numerics import (
     blend,
     clamp,
@@ -103,7 +103,7 @@ def _goes_on(index, other, surfaces, materials):
     )
 
 
-@inlined
+@merged
 def _seen(index, x, y, turn, lens, surfaces, materials, lighting, shades):
     """Linear light along (x, y, 1) from a triangle, or from the sky where there is none."""
     axes = lens.rotation

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 from diff4splat.data_prep.synthetic.motions import articulated, rigid, soft
 from diff4splat.data_prep.synthetic.motions.act import Act, Performance
@@ -71,6 +72,7 @@ MOTIONS: dict[str, Motion] = {
 }
 
 
-def families_for(motion: str) -> list[str]:
+@cache
+def families_for(motion: str) -> tuple[str, ...]:
     """Names of the families that can do it."""
-    return [name for name, family in FAMILIES.items() if MOTIONS[motion].suits(family)]
+    return tuple(name for name, family in FAMILIES.items() if MOTIONS[motion].suits(family))

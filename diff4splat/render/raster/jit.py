@@ -8,7 +8,8 @@ import hashlib
 import inspect
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import llvmlite.binding
 import numba
 from numba import config, njit
+from numba.core import event
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
 
@@ -86,3 +88,26 @@ def is_ready(compiled: Any) -> bool:
     name = compiled.py_func.__qualname__
     module = Path(inspect.getfile(compiled.py_func)).stem
     return folder is not None and any(Path(folder).glob(f"{module}.{name}-*.nbi"))
+
+
+@contextmanager
+def announced(kernels: list[Any], advance: Callable[[str], None]) -> Iterator[None]:
+    """Tell ``advance`` the name of each of the ``kernels`` when it has been compiled."""
+    with event.install_listener("numba:compile", _Names(kernels, advance)):
+        yield
+
+
+class _Names(event.Listener):
+    """Reports kernels as their compilation ends, and not the functions inside them."""
+
+    def __init__(self, kernels: list[Any], advance: Callable[[str], None]) -> None:
+        self._kernels, self._advance = kernels, advance
+
+    def on_start(self, event: Any) -> None:
+        """Nothing to say yet."""
+
+    def on_end(self, event: Any) -> None:
+        """One more is ready."""
+        dispatcher = event.data["dispatcher"]
+        if any(dispatcher is kernel for kernel in self._kernels):
+            self._advance(dispatcher.py_func.__name__)

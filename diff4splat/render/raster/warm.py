@@ -10,11 +10,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from threading import Lock
-from typing import Any
 
 import torch
 from jaxtyping import Int
-from numba.core import event
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, pinhole
@@ -48,7 +46,7 @@ def warm(advance: Callable[[str], None] = lambda name: None) -> float:
     """
     began = time.perf_counter()
     with (
-        event.install_listener("numba:compile", _Names(advance)),
+        jit.announced(jit.KERNELS, advance),
         torch.inference_mode(False),
         torch.enable_grad(),
     ):
@@ -76,22 +74,6 @@ def _show(text: str) -> None:
     if sys.stderr is not None:
         sys.stderr.write(text)
         sys.stderr.flush()
-
-
-class _Names(event.Listener):
-    """Reports kernels as their compilation ends, and not the functions inside them."""
-
-    def __init__(self, advance: Callable[[str], None]) -> None:
-        self._advance = advance
-
-    def on_start(self, event: Any) -> None:
-        """Nothing to say yet."""
-
-    def on_end(self, event: Any) -> None:
-        """One more is ready."""
-        dispatcher = event.data["dispatcher"]
-        if any(dispatcher is kernel for kernel in jit.KERNELS):
-            self._advance(dispatcher.py_func.__name__)
 
 
 def _draw_tiny_scene() -> None:

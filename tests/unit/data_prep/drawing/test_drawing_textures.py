@@ -4,7 +4,7 @@ import numpy as np
 import oracles_drawing as oracle
 import pytest
 
-from diff4splat.data_prep.synthetic.drawing.compiled import kernel
+from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS, kernel
 from diff4splat.data_prep.synthetic.drawing.gather import gather
 from diff4splat.data_prep.synthetic.drawing.lettering import FONT
 from diff4splat.data_prep.synthetic.drawing.textures import FAMILIES, materials_of, pattern
@@ -20,6 +20,9 @@ def sampled(family, places, footprint, seed, values):
         )
         for at in range(4):
             values[index, at] = found[at]
+
+
+KERNELS.remove(sampled)
 
 
 def values_of(family: str, places: np.ndarray, footprint: float = 0.01, seed: int = 5):

@@ -82,7 +82,7 @@ def test_reconstruction_sees_the_whole_input_video(
         return wall_and_patch()
 
     monkeypatch.setattr(
-        "diff4splat.training.stages.reconstruct_clip", reconstruct_clip, raising=False
+        "diff4splat.training.evaluation.subjects.reconstruct_clip", reconstruct_clip
     )
     Evaluate(
         model="test", protocol=str(protocol_file), task="reconstruction", out=tmp_path / "out"

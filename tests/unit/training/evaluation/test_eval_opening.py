@@ -1,9 +1,7 @@
 """Protocols name their clips: shards in a folder, or worlds of one split and seed."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from oracles_clips import make_clip
@@ -13,8 +11,10 @@ from diff4splat.data.clip import Clip
 from diff4splat.data.members.encode import Coding
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
+from diff4splat.training.evaluation import opening
 from diff4splat.training.evaluation.opening import open_clips
 from diff4splat.training.evaluation.protocol_json import LoadedProtocol
+from diff4splat.training.recipe import DataSettings, SourceSettings
 
 
 def test_shards_lie_beside_the_protocol_file(tmp_path: Path) -> None:
@@ -40,15 +40,15 @@ def test_worlds_are_asked_for_as_the_protocol_says(monkeypatch: pytest.MonkeyPat
     asked: list[object] = []
 
     class Worlds:
-        def __init__(self, settings: object, data: object, seed: int) -> None:
-            asked.extend([settings, data, seed])
-
         def clip(self, index: int) -> Clip:
             asked.append(index)
             return make_clip(1, (8, 8), views=1, seed=index)
 
-    module = SimpleNamespace(WorldClips=Worlds)
-    monkeypatch.setitem(sys.modules, "diff4splat.data_prep.synthetic.clips", module)
+    def source_of(settings: SourceSettings, data: DataSettings, seed: int) -> Worlds:
+        asked.extend([settings, data, seed])
+        return Worlds()
+
+    monkeypatch.setattr(opening, "open_source", source_of)
     protocol = tiny_protocol(2)
     source = replace(protocol.source, first=5, seed=9)
     clips = open_clips(LoadedProtocol(protocol=replace(protocol, source=source), folder=Path()))

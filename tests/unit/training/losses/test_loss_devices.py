@@ -11,13 +11,12 @@ from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.level_draws import LevelDraw, bell_weights, draw_levels
 from diff4splat.training.losses.motion import track_distribution, track_motion
-from diff4splat.training.losses.photometric import photometric
+from diff4splat.training.losses.photometric import perceptual_error, squared_error
 
 LOSSES: dict[str, Callable[[torch.Tensor, torch.Tensor], torch.Tensor]] = {
     "flow": lambda own, true: flow_matching(own, true, true, first_frame_is_clean=True),
-    "photometric": lambda own, true: photometric(
-        own, true, features=load_features(None), perceptual_weight=0.5
-    ),
+    "squared": squared_error,
+    "perceptual": lambda own, true: perceptual_error(own, true, load_features(None)),
     "depth": lambda own, true: depth_correlation(own[..., 0], true[..., 0]),
     "smoothness": lambda own, true: depth_smoothness(own[..., 0], guide=true),
     "motion": track_motion,

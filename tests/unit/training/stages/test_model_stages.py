@@ -8,6 +8,8 @@ from stage_fixtures import STAGES, make_batch, make_stage, shake_heads, stage_re
 
 from diff4splat.errors import ConfigError
 from diff4splat.training.stage import TOTAL
+from diff4splat.training.trainer.parallel import StageModule
+from diff4splat.training.trainer.samples import replacement
 
 EXPECTED_TERMS = {
     "vae": {"pixels", "perceptual", "divergence"},
@@ -153,6 +155,7 @@ def test_parts_that_a_stage_does_not_run_cannot_be_trained() -> None:
 def test_text_is_left_out_for_whole_steps_at_the_asked_rate() -> None:
     recipe = replace(stage_recipe("generator"), text_dropout=0.5, global_batch=2)
     stage = make_stage(recipe)
+    StageModule(stage, torch.device("cpu"), "float32").set_training(True)
     dropped = []
     for step in range(40):
         batch = make_batch(recipe, (2 * step, 2 * step + 1))
@@ -162,3 +165,34 @@ def test_text_is_left_out_for_whole_steps_at_the_asked_rate() -> None:
         hook.remove()
         dropped.append(not calls)
     assert 0.2 < sum(dropped) / len(dropped) < 0.8
+
+
+def test_text_is_never_left_out_while_a_stage_is_judged() -> None:
+    stage = make_stage(replace(stage_recipe("generator"), text_dropout=1.0))
+    StageModule(stage, torch.device("cpu"), "float32").set_training(False)
+    calls = []
+    stage.text_encoder.register_forward_hook(lambda *_: calls.append(1))
+    stage(make_batch(stage_recipe("generator")))
+    assert calls and not stage.dit.training
+
+
+def test_all_samples_of_a_step_leave_text_out_together_though_some_were_replaced() -> None:
+    stage = make_stage(replace(stage_recipe("generator"), global_batch=2))
+    batch = make_batch(stage.plan.recipe)
+    for step in range(4):
+        same = [
+            replace(batch, sample_index=torch.tensor([replacement(2 * step + place, attempt)]))
+            for place in (0, 1)
+            for attempt in (0, 1)
+        ]
+        seeds = {stage.draw_for_step(one, "text").initial_seed() for one in same}
+        assert len(seeds) == 1
+
+
+def test_clips_without_a_caption_run_the_same_networks() -> None:
+    recipe = replace(stage_recipe("generator"), text_dropout=0.0)
+    stage, batch = make_stage(recipe), make_batch(recipe)
+    calls = []
+    stage.text_encoder.register_forward_hook(lambda *_: calls.append(1))
+    terms = stage(replace(batch, captions=("",)))
+    assert calls and bool(torch.isfinite(terms[TOTAL]).all())

@@ -11,11 +11,14 @@ from diff4splat.training.trainer.loader import (
     MOST_ATTEMPTS,
     batches,
     load_batch,
-    replacement,
     require_batch,
 )
 from diff4splat.training.trainer.sampler import BatchPlan, StepRange
-from diff4splat.training.trainer.samples import EVALUATION_START
+from diff4splat.training.trainer.samples import (
+    EVALUATION_START,
+    asked_index,
+    replacement,
+)
 
 
 def steps(end: int) -> StepRange:
@@ -42,6 +45,12 @@ def test_replacements_stay_on_their_side_of_the_evaluation_samples() -> None:
     for attempt in range(1, 50):
         assert 0 <= replacement(3, attempt) < EVALUATION_START
         assert EVALUATION_START <= replacement(EVALUATION_START + 3, attempt) < 2**41
+
+
+def test_replacements_say_which_sample_was_asked_for() -> None:
+    assert replacement(5, 0) == 5
+    assert len({replacement(5, attempt) for attempt in range(MOST_ATTEMPTS)}) == MOST_ATTEMPTS
+    assert {asked_index(replacement(5, attempt)) for attempt in range(MOST_ATTEMPTS)} == {5}
 
 
 def test_a_broken_source_ends_the_run_with_reasons() -> None:

@@ -1,0 +1,203 @@
+"""Which stage builds on which, and what it starts with."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from clip_shards import reading, write_shards
+
+from diff4splat.configs.recipes import RECIPES, recipe_by_name
+from diff4splat.errors import CheckpointError, ConfigError, FileFormatError
+from diff4splat.models.factory import PARTS, create_networks
+from diff4splat.training.latent_statistics import FILE, read_statistics
+from diff4splat.training.prerequisites import (
+    continued_stage,
+    last_checkpoint,
+    require_prerequisites,
+    sources_of_parts,
+    starting_networks,
+    trained_networks,
+)
+from diff4splat.training.recipe import Gate, Recipe
+from diff4splat.training.stage_run import StageRun, train_stage
+from diff4splat.training.trainer.export import load_parts
+
+BUILDS_ON = {
+    "vae": {},
+    "static-low": {"vae": "vae"},
+    "static-high": {"vae": "vae", "ldrm": "static-low"},
+    "dynamic": {"vae": "vae", "ldrm": "static-high"},
+    "generator": {"vae": "vae"},
+    "joint": {
+        "vae": "vae",
+        "ldrm": "dynamic",
+        "deformation": "dynamic",
+        "text_encoder": "generator",
+        "dit": "generator",
+    },
+}
+CONTINUES = {"static-high": "static-low", "dynamic": "static-high", "joint": "generator"}
+
+
+@pytest.mark.parametrize("name", RECIPES)
+@pytest.mark.parametrize("stage", BUILDS_ON)
+def test_parts_come_from_the_last_stage_that_trained_them(name: str, stage: str) -> None:
+    recipe = recipe_by_name(name)
+    found = sources_of_parts(recipe, recipe.stage(stage))
+    assert {part: earlier.name for part, earlier in found.items()} == BUILDS_ON[stage]
+    before = continued_stage(recipe, recipe.stage(stage))
+    assert (before and before.name) == CONTINUES.get(stage)
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recipe, Path]:
+    """An autoencoder and a first static stage, of two steps each."""
+    shards = write_shards(tmp_path_factory.mktemp("shards"))
+    recipe, run = reading(shards), tmp_path_factory.mktemp("run")
+    for stage in ("vae", "static-low"):
+        train_stage(StageRun(recipe=recipe, stage=stage, folder=run))
+    return recipe, run
+
+
+def result_of(folder: Path) -> dict:
+    return json.loads((folder / "result.json").read_text())
+
+
+@pytest.mark.parametrize("stage", [name for name, parts in BUILDS_ON.items() if parts])
+def test_a_stage_before_that_was_not_begun_is_named(stage: str, tmp_path: Path) -> None:
+    recipe = recipe_by_name("test")
+    for ignoring in (False, True):
+        with pytest.raises(ConfigError, match=r"vae/result.json: .* train that stage first"):
+            require_prerequisites(recipe, recipe.stage(stage), tmp_path, ignoring)
+    require_prerequisites(recipe, recipe.stage("vae"), tmp_path, False)
+
+
+def write_result(folder: Path, **values: object) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    whole = {"stage": folder.name, "finished": True, "step": 2, "checkpoint": "c", "measures": {}}
+    (folder / "result.json").write_text(json.dumps(whole | values))
+
+
+def test_gates_of_all_stages_before_are_looked_at(tmp_path: Path) -> None:
+    recipe = recipe_by_name("test")
+    gate = Gate(measure="psnr", bound=20.0)
+    stages = tuple(replace(stage, gates=(gate,)) for stage in recipe.stages)
+    recipe = replace(recipe, stages=stages)
+    for stage in ("vae", "static-low"):
+        write_result(tmp_path / stage, measures={"psnr": 25.0})
+    high = recipe.stage("static-high")
+    require_prerequisites(recipe, high, tmp_path, False)
+    for short in ("vae", "static-low"):
+        write_result(tmp_path / short, measures={"psnr": 17.5})
+        with pytest.raises(ConfigError, match=rf"{short}: .* at least 20, got 17.5, 2.5 short"):
+            require_prerequisites(recipe, high, tmp_path, False)
+        require_prerequisites(recipe, high, tmp_path, True)
+        write_result(tmp_path / short, measures={"psnr": 25.0})
+    write_result(tmp_path / "static-low", finished=False, step=1)
+    with pytest.raises(ConfigError, match=r"static-low: expected 100 steps .* got 1; .*ignore"):
+        require_prerequisites(recipe, high, tmp_path, False)
+    # Another branch is not asked for.
+    require_prerequisites(recipe, recipe.stage("generator"), tmp_path, False)
+
+
+def test_stages_start_with_averaged_weights(begun: tuple[Recipe, Path]) -> None:
+    recipe, run = begun
+    networks = starting_networks(recipe, recipe.stage("static-high"), run)
+    for part, stage in (("vae", "vae"), ("ldrm", "static-low")):
+        checkpoint = last_checkpoint(run / stage)
+        averaged, raw = (load_parts(checkpoint, kind)[part] for kind in ("averaged", "raw"))
+        found = getattr(networks, part).state_dict()
+        assert any(not torch.equal(averaged[key], raw[key]) for key in averaged)
+        for key, value in averaged.items():
+            if "latent" not in key:  # the statistics are set afterwards
+                assert torch.equal(found[key], value), key
+    mean, std = read_statistics(run / "vae")
+    stored = dict(networks.vae.named_buffers())
+    assert any(torch.equal(buffer.flatten(), mean) for buffer in stored.values())
+    assert any(torch.equal(buffer.flatten(), std) for buffer in stored.values())
+
+
+def test_parts_that_do_not_run_are_only_shapes(begun: tuple[Recipe, Path]) -> None:
+    recipe, run = begun
+    networks = starting_networks(recipe, recipe.stage("static-high"), run)
+    on_meta = {name for name, part in networks.parts() if next(part.parameters()).is_meta}
+    assert on_meta == set(PARTS) - {"vae", "ldrm"}
+
+
+def test_parts_nobody_trained_are_the_recipes_random_ones(begun: tuple[Recipe, Path]) -> None:
+    recipe, run = begun
+    networks, done = trained_networks(recipe, run)
+    assert done == {"vae", "ldrm"}
+    random = create_networks(recipe.model, seed=recipe.seed)
+    for part in set(PARTS) - done:
+        wanted = getattr(random, part).state_dict()
+        for key, value in getattr(networks, part).state_dict().items():
+            assert torch.equal(value, wanted[key]), key
+
+
+def test_an_unfinished_stage_hands_on_its_averages_but_counts_as_untrained(
+    begun: tuple[Recipe, Path], tmp_path: Path
+) -> None:
+    recipe, run = begun
+    for stage in ("vae", "static-low"):
+        (tmp_path / stage).symlink_to(run / stage)
+    train_stage(
+        StageRun(
+            recipe=recipe,
+            stage="static-high",
+            folder=tmp_path,
+            stop_after_steps=1,
+            ignore_gates=True,
+        )
+    )
+    networks, done = trained_networks(recipe, tmp_path)
+    assert done == {"vae", "ldrm"}  # the lower stage is over
+    newest = load_parts(last_checkpoint(tmp_path / "static-high"))["ldrm"]
+    for key, value in networks.ldrm.state_dict().items():
+        assert torch.equal(value, newest[key]), key
+
+
+def test_another_model_than_the_runs_is_refused(begun: tuple[Recipe, Path]) -> None:
+    recipe, run = begun
+    vae = replace(recipe.model.vae, latent_channels=recipe.model.vae.latent_channels + 1)
+    other = replace(recipe, model=replace(recipe.model, vae=vae))
+    with pytest.raises(CheckpointError, match=r"vae: expected the weights of the recipe's model"):
+        starting_networks(other, other.stage("static-low"), run)
+
+
+def damaged(run: Path, folder: Path) -> Path:
+    """A copy of the autoencoder's stage."""
+    import shutil
+
+    shutil.copytree(run / "vae", folder / "vae")
+    return folder / "vae"
+
+
+def test_missing_statistics_say_what_to_do(begun: tuple[Recipe, Path], tmp_path: Path) -> None:
+    recipe, run = begun
+    (damaged(run, tmp_path) / FILE).unlink()
+    with pytest.raises(CheckpointError, match=r"expected the statistics of the latents, got none"):
+        starting_networks(recipe, recipe.stage("static-low"), tmp_path)
+
+
+def test_damaged_checkpoints_and_statistics_are_named(
+    begun: tuple[Recipe, Path], tmp_path: Path
+) -> None:
+    recipe, run = begun
+    stage, low = damaged(run, tmp_path), recipe.stage("static-low")
+    whole = (stage / FILE).read_bytes()
+    (stage / FILE).write_bytes(whole[:-4])
+    with pytest.raises(FileFormatError, match=FILE):
+        starting_networks(recipe, low, tmp_path)
+    (stage / FILE).write_bytes(whole)
+    (weights,) = last_checkpoint(stage).glob("*.safetensors")
+    content = bytearray(weights.read_bytes())
+    content[-100] ^= 0x10
+    weights.write_bytes(content)
+    with pytest.raises(FileFormatError, match="window-000-step-00000002"):
+        starting_networks(recipe, low, tmp_path)
+    weights.unlink()
+    with pytest.raises(FileFormatError, match="window-000-step-00000002"):
+        starting_networks(recipe, low, tmp_path)
