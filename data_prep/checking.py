@@ -1,15 +1,25 @@
 """Agreement of every clip of a folder with itself, as one table."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import torch
 
-from diff4splat.data.agreement import EXACT, MEASURED, Agreement, require_agreement
+from diff4splat.data.agreement import (
+    EXACT,
+    MEASURED,
+    Agreement,
+    Tolerances,
+    require_agreement,
+)
+from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.comparing.spread import Share
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.report.phases import Phases
+
+USUAL_SIDE_PX, THIN_SHARE = 128, 0.05
+"""At this picture side, as many points may lie on leaves and posts thinner than a pixel."""
 
 
 def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
@@ -25,16 +35,26 @@ def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
     clips = ClipFolder(folder)
     if not len(clips):
         raise InputError(f"{folder}: expected clips, got none; prepare some")
-    count = min(len(clips), most or len(clips))
-    places = torch.linspace(0, len(clips) - 1, count).round().long().tolist()
+    places = clips.spread(most)
     found = []
-    with phases.phase("check clips", count) as advance:
+    with phases.phase("check clips", len(places)) as advance:
         for place in places:
             clip = clips.clip(place)
-            tolerances = EXACT if clip.note.metric == "exact" else MEASURED
-            found.append(require_agreement(clip, tolerances))
+            found.append(require_agreement(clip, tolerances_for(clip)))
             advance()
     return _table(found)
+
+
+def tolerances_for(clip: Clip) -> Tolerances:
+    """What the clip's kind of truth may differ by.
+
+    What is thinner than a pixel shows and hides points that no pixel centre sees, and the smaller
+    the picture, the more is. Visibility itself is tested against every triangle elsewhere.
+    """
+    if clip.note.metric != "exact":
+        return MEASURED
+    coarser = max(1.0, USUAL_SIDE_PX / min(clip.size_px))
+    return replace(EXACT, visible_share=1 - THIN_SHARE * coarser)
 
 
 def _table(found: list[Agreement]) -> str:

@@ -13,6 +13,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
 from diff4splat.io.images import write_png
+from diff4splat.io.pixels import unit_rgb
 
 COLUMNS, GAP_PX = 8, 4
 MOST_CLIPS = 64
@@ -21,10 +22,8 @@ MOST_CLIPS = 64
 def write_clip_sheet(folder: Path, file: Path) -> None:
     """Up to ``MOST_CLIPS`` clips, spread evenly over the folder."""
     clips = ClipFolder(folder)
-    count = min(len(clips), MOST_CLIPS)
-    places = torch.linspace(0, len(clips) - 1, count).round().long().tolist()
     part = ClipPart(views=(0,), flow=False, instances=False, tracks=False)
-    write_png(clip_sheet([clips.clip(place, part) for place in places]), file)
+    write_png(clip_sheet([clips.clip(place, part) for place in clips.spread(MOST_CLIPS)]), file)
 
 
 def clip_sheet(clips: list[Clip]) -> Float[Tensor, "height width 3"]:
@@ -41,7 +40,7 @@ def clip_sheet(clips: list[Clip]) -> Float[Tensor, "height width 3"]:
 
 def _first_and_last(clip: Clip) -> Float[Tensor, "h w 3"]:
     rgb = clip.views[0].rgb
-    both = torch.cat([rgb[0], rgb[-1]], 1).float() / 255
+    both = unit_rgb(torch.cat([rgb[0], rgb[-1]], 1))
     return _padded(both, both.shape[0] + GAP_PX, both.shape[1] + GAP_PX)
 
 

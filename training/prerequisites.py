@@ -3,8 +3,10 @@
     RUN/<stage>/{recipe.json, checkpoints, result.json, log.jsonl, panels}
     RUN/model/ (for pipelines)
 
-A part comes from the last earlier stage that trained it: frozen ones with averaged weights, learnt
-ones are then taken over by the trainer, averages and all. Parts nobody trained yet are random.
+A part comes from the last earlier stage that trained it, with averaged weights. The parts that the
+stage goes on training from the latest such stage are then taken over by the trainer with raw
+weights beside their averages; older ones go on from their averages. Parts nobody trained yet are
+random.
 """
 
 from collections.abc import Mapping

@@ -29,13 +29,9 @@ from diff4splat.training.stages.model_stage import StagePlan
 from diff4splat.training.trainer.export import load_parts
 from diff4splat.training.trainer.gates import read_result
 from diff4splat.training.trainer.run import run_stage
-from diff4splat.training.trainer.settings import RunSettings, StageResult
+from diff4splat.training.trainer.settings import RunSettings, StageResult, silent
 
 MODEL_FOLDER, RECIPE_FILE = "model", "recipe.json"
-
-
-def _silent(text: str) -> None:
-    """Take a note to nobody."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +49,7 @@ class StageRun:
     stop_after_s: float | None = None
     device: str | None = None
     phases: Phases = field(default_factory=Phases)
-    note: Callable[[str], None] = _silent
+    note: Callable[[str], None] = silent
 
 
 def train_stage(asked: StageRun) -> StageResult:

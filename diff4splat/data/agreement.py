@@ -53,13 +53,15 @@ class Tolerances:
     reprojection: float = 0.02
     """Relative, of the median: edges and hidden surfaces differ by far more, whatever the data."""
     share: float = 0.98
+    visible_share: float = 0.98
+    """Of visible tracks at the depth of the map; lower where much is thinner than a pixel."""
     judge: Literal["max", "median"] = "max"
     """What of pixels and depth is compared."""
 
 
 EXACT = Tolerances()
 """For synthetic data."""
-MEASURED = Tolerances(pixels=1.0, depth=0.03, share=0.8, judge="median")
+MEASURED = Tolerances(pixels=1.0, depth=0.03, share=0.8, visible_share=0.8, judge="median")
 """For data whose depth or tracks were measured or estimated."""
 
 
@@ -119,5 +121,5 @@ def _checks(tolerances: Tolerances) -> tuple[tuple[str, float, str], ...]:
         ("flow_px", tolerances.pixels, f"{cameras}, or flow of another frame"),
         ("reprojection", tolerances.reprojection, f"{cameras}, or ray length in place of z"),
         ("across_views", tolerances.share, f"{cameras}, or views in different world frames"),
-        ("visible_depth", tolerances.share, "look for hidden tracks called visible"),
+        ("visible_depth", tolerances.visible_share, "look for hidden tracks called visible"),
     )

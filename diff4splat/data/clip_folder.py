@@ -61,6 +61,12 @@ class ClipFolder:
     def __len__(self) -> int:
         return len(self._places)
 
+    def spread(self, most: int | None = None) -> tuple[int, ...]:
+        """Positions of up to ``most`` clips, evenly from the first to the last; None is all."""
+        last = len(self) - 1
+        count = last + 1 if most is None else min(most, last + 1)
+        return tuple(round(place * last / max(count - 1, 1)) for place in range(count))
+
     def positions(self, selection: Selection) -> tuple[int, ...]:
         """Where the wanted clips are, in order.
 

@@ -15,3 +15,8 @@ def to_bytes(rgb: Float[Tensor, "*b"]) -> UInt8[np.ndarray, "*b"]:
 def from_bytes(levels: UInt8[np.ndarray, "*b"]) -> Float[Tensor, "*b"]:
     """float32 in [0, 1]; the inverse of ``to_bytes``."""
     return torch.from_numpy(levels.astype(np.float32)) / 255
+
+
+def unit_rgb(levels: UInt8[Tensor, "*b"]) -> Float[Tensor, "*b"]:
+    """As ``from_bytes``, of a tensor on any device."""
+    return levels.float() / 255

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, masked_mean
+from diff4splat.metrics.masked import hidden_as_zero, masked_mean, mean_or_nan
 
 Alignment = Literal["none", "median", "affine"]
 """Nothing; the ratio of medians; least-squares scale and shift. Each map by itself."""
@@ -54,7 +54,7 @@ def relative_error(
         ShapeError: the shapes differ.
     """
     depth, truth, keep = _flat(depth, truth, valid)
-    return _mean_or_nan((depth - truth).abs() / torch.where(keep, truth, 1.0), keep)
+    return mean_or_nan((depth - truth).abs() / torch.where(keep, truth, 1.0), keep)
 
 
 def share_within(
@@ -74,7 +74,7 @@ def share_within(
     depth, truth, keep = _flat(depth, truth, valid)
     # As products: a depth of 0 is far off then, and nothing is divided by it.
     within = (depth < ratio * truth) & (truth < ratio * depth)
-    return _mean_or_nan(within.to(depth.dtype), keep)
+    return mean_or_nan(within.to(depth.dtype), keep)
 
 
 def align_depth(
@@ -139,7 +139,3 @@ def _centered(depth: Tensor, keep: Tensor) -> Tensor:
     size = masked_mean(depth.abs(), keep)[..., None]
     depth = depth / torch.where(size > 0, size, 1.0)
     return hidden_as_zero(depth - masked_mean(depth, keep)[..., None], keep)
-
-
-def _mean_or_nan(values: Tensor, keep: Tensor) -> Tensor:
-    return torch.where(keep.any(-1), masked_mean(values, keep), math.nan)

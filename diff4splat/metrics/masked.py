@@ -4,6 +4,8 @@ Axes: ``*b`` batch, ``p`` places (pixels, points). What stands in hidden places 
 replaced *before* anything is computed with it, because NaN times a zero gradient is NaN.
 """
 
+import math
+
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -17,3 +19,8 @@ def hidden_as_zero(values: Float[Tensor, "*d"], keep: Bool[Tensor, "*#d"]) -> Fl
 def masked_mean(values: Float[Tensor, "*b p"], keep: Bool[Tensor, "*b p"]) -> Float[Tensor, "*b"]:
     """Mean over kept places; 0 with zero gradient where none is kept."""
     return hidden_as_zero(values, keep).sum(-1) / keep.sum(-1).clamp(min=1)
+
+
+def mean_or_nan(values: Float[Tensor, "*b p"], keep: Bool[Tensor, "*b p"]) -> Float[Tensor, "*b"]:
+    """Mean over kept places; NaN where none is kept: the question does not apply."""
+    return torch.where(keep.any(-1), masked_mean(values, keep), math.nan)

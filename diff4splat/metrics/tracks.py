@@ -13,7 +13,7 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError, ShapeError
 from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, masked_mean
+from diff4splat.metrics.masked import hidden_as_zero, mean_or_nan
 
 
 def track_endpoint_error(
@@ -30,7 +30,7 @@ def track_endpoint_error(
     require_mask(valid, truth.shape[:-1])
     predicted, truth = (hidden_as_zero(part, valid[..., None]) for part in widen(predicted, truth))
     apart = torch.linalg.vector_norm(predicted - truth, dim=-1)
-    return _mean_or_nan(apart, valid)
+    return mean_or_nan(apart, valid)
 
 
 def share_moving(
@@ -46,7 +46,7 @@ def share_moving(
     require_mask(valid, displacement.shape[:-1])
     (displacement,) = widen(displacement)
     length = torch.linalg.vector_norm(hidden_as_zero(displacement, valid[..., None]), dim=-1)
-    return _mean_or_nan((length > threshold).to(length.dtype), valid)
+    return mean_or_nan((length > threshold).to(length.dtype), valid)
 
 
 def sign_agreement(
@@ -78,13 +78,7 @@ def sign_agreement(
     own, true = (
         (hidden_as_zero(part, valid[..., None]) * direction).sum(-1) for part in (predicted, truth)
     )
-    return _mean_or_nan(
-        (own.sign() == true.sign()).to(true.dtype), valid & (true.abs() > threshold)
-    )
-
-
-def _mean_or_nan(values: Tensor, keep: Tensor) -> Tensor:
-    return torch.where(keep.any(-1), masked_mean(values, keep), math.nan)
+    return mean_or_nan((own.sign() == true.sign()).to(true.dtype), valid & (true.abs() > threshold))
 
 
 def _require_threshold(threshold: float) -> None:

@@ -7,13 +7,17 @@ import sys
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import pytest
 import torch
 from PIL import Image
 
-from diff4splat.cli import doctor, installation
+from diff4splat.cli import doctor, installation, worlds
+from diff4splat.cli.console import ConsolePhases
 from diff4splat.cli.main import run
+from diff4splat.data_prep.synthetic.drawing import warm as drawing
+from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.io.scene_file import save_scene
 from diff4splat.paths.camera_path import CameraPath
@@ -22,9 +26,13 @@ from diff4splat.render.raster import backend, warm
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
+from diff4splat.training.recipe import SourceSettings
 
 KERNELS = ("project", "blend")
-ALL_ROWS = {"diff4splat", "python", "platform", "cpu", "memory", "torch", "cuda", "self-test"}
+DRAWING = ("shade", "hide", "read")
+ALL_ROWS = {
+    "diff4splat", "python", "platform", "cpu", "memory", "torch", "cuda", "worlds", "self-test",
+}  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -35,18 +43,30 @@ def _without_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def cold(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """A renderer that says it is not compiled; the list fills when somebody compiles it."""
+    monkeypatch.setattr(warm, "ensure_compiled", lambda: None)
+    return not_compiled(monkeypatch, warm, KERNELS)
+
+
+@pytest.fixture
+def cold_drawing(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The same of what draws worlds."""
+    return not_compiled(monkeypatch, drawing, DRAWING)
+
+
+def not_compiled(
+    monkeypatch: pytest.MonkeyPatch, module: ModuleType, names: tuple[str, ...]
+) -> list[str]:
     compiled: list[str] = []
 
     def compile_all(advance: Callable[[str], None]) -> float:
-        for name in KERNELS:
+        for name in names:
             advance(name)
-        compiled.extend(KERNELS)
+        compiled.extend(names)
         return 0.5
 
-    monkeypatch.setattr(warm, "is_ready", lambda: bool(compiled))
-    monkeypatch.setattr(warm, "kernel_count", lambda: len(KERNELS))
-    monkeypatch.setattr(warm, "warm", compile_all)
-    monkeypatch.setattr(warm, "ensure_compiled", lambda: None)
+    monkeypatch.setattr(module, "is_ready", lambda: bool(compiled))
+    monkeypatch.setattr(module, "kernel_count", lambda: len(names))
+    monkeypatch.setattr(module, "warm", compile_all)
     return compiled
 
 
@@ -92,10 +112,13 @@ def test_a_healthy_installation(capsys: pytest.CaptureFixture) -> None:
 
 
 def test_what_is_not_compiled_is_said_and_not_compiled(
-    cold: list[str], capsys: pytest.CaptureFixture
+    cold: list[str], cold_drawing: list[str], capsys: pytest.CaptureFixture
 ) -> None:
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
+    assert f"will compile on first use (about {worlds.COMPILE_S} s)" in table["worlds"]
+    assert "doctor --warm" in table["worlds"]
+    assert cold_drawing == []
     assert (
         f"will compile on first use (about {installation.COMPILE_S} s)" in table["renderer raster"]
     )
@@ -105,7 +128,7 @@ def test_what_is_not_compiled_is_said_and_not_compiled(
 
 
 def test_a_back_end_that_refuses_says_why(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+    cold_drawing: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     monkeypatch.setattr(backend, "refusal", lambda job: "expected a fast CPU, got a slow one")
     assert run(["doctor"]) == 0
@@ -113,6 +136,7 @@ def test_a_back_end_that_refuses_says_why(
     assert table["renderer raster"] == "refuses: expected a fast CPU, got a slow one"
     assert run(["doctor", "--warm"]) == 2
     assert "renderer raster: expected a fast CPU" in capsys.readouterr().err
+    assert cold_drawing == list(DRAWING)
 
 
 def test_with_a_gpu_every_back_end_is_asked_twice(
@@ -179,20 +203,55 @@ def test_a_package_that_is_missing_comes_with_its_pip_line(
     assert "torch" not in shown
 
 
-def test_warm_compiles_once(cold: list[str], capsys: pytest.CaptureFixture) -> None:
+def test_warm_compiles_once(
+    cold: list[str], cold_drawing: list[str], capsys: pytest.CaptureFixture
+) -> None:
     assert run(["doctor", "--warm"]) == 0
     shown = capsys.readouterr()
-    assert "compiled 2 kernels in" in shown.err
+    assert "renderer raster: compiled 2 kernels in" in shown.err
+    assert "worlds: compiled 3 kernels in" in shown.err
     assert shown.out == ""
     assert cold == list(KERNELS)
+    assert cold_drawing == list(DRAWING)
+    assert run(["doctor"]) == 0
+    assert rows(capsys.readouterr().out)["worlds"] == "ready"
 
 
 def test_warm_says_when_there_was_nothing_to_do(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     monkeypatch.setattr(warm, "warm", lambda advance: 0.1)
+    monkeypatch.setattr(drawing, "warm", lambda advance: 0.1)
     assert run(["doctor", "--warm"]) == 0
-    assert "was already compiled; loaded in" in capsys.readouterr().err
+    shown = capsys.readouterr().err
+    assert "renderer raster: was already compiled; loaded in" in shown
+    assert "worlds: was already compiled; loaded in" in shown
+
+
+def test_warm_says_when_nothing_can_be_kept(
+    cold_drawing: list[str], capsys: pytest.CaptureFixture
+) -> None:
+    nowhere = SimpleNamespace(stats=SimpleNamespace(cache_path=None))
+    doctor.warm_one("worlds", drawing.compile_drawing, [nowhere])
+    assert "not kept, because no folder can be written to" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("kinds", "happens"), [((), ()), (("shards",), ()), (("shards", "worlds"), DRAWING)]
+)
+def test_sources_compile_what_draws_worlds_where_one_of_them_is_worlds(
+    kinds: tuple[str, ...],
+    happens: tuple[str, ...],
+    cold_drawing: list[str],
+    capsys: pytest.CaptureFixture,
+) -> None:
+    phases = ConsolePhases()
+    sources = [SourceSettings(kind=kind, folder="clips") for kind in kinds]
+    worlds.prepare_sources(sources, phases)
+    assert cold_drawing == list(happens)
+    assert ("compile   " in capsys.readouterr().err) == bool(happens)
+    worlds.prepare_sources(sources, phases)
+    assert cold_drawing == list(happens)
 
 
 def test_render_compiles_ahead_in_its_own_phase(
@@ -213,6 +272,33 @@ def test_generate_counts_the_seconds_of_compilation(cold: list[str], tmp_path: P
     assert run([*arguments, "--frames", "2", "--out", str(tmp_path / "out")]) == 0
     assert cold == list(KERNELS)
     assert "compile" in json.loads((tmp_path / "out" / "card.json").read_text())["seconds"]
+
+
+def stopped(*asked: object) -> None:
+    raise ConfigError("stopped before any work")
+
+
+@pytest.mark.parametrize(("source", "happens"), [("worlds", DRAWING), ("shards", ())])
+def test_train_compiles_what_draws_its_worlds_ahead(
+    source: str,
+    happens: tuple[str, ...],
+    cold_drawing: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("diff4splat.training.stage_run.train_stage", stopped)
+    change = f'stages.vae.data.sources=[{{"kind": "{source}", "folder": "clips"}}]'
+    arguments = ["train", "--config", "test", "--stage", "vae", "--set", change]
+    assert run([*arguments, "--out", str(tmp_path)]) == 2
+    assert cold_drawing == list(happens)
+
+
+def test_eval_compiles_what_draws_its_worlds_ahead(
+    cold_drawing: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("diff4splat.training.evaluation.evaluate.evaluate", stopped)
+    assert run(["eval", "--model", "test", "--out", str(tmp_path)]) == 2
+    assert cold_drawing == list(DRAWING)
 
 
 def test_double_precision_compiles_nothing(cold: list[str], tmp_path: Path) -> None:
@@ -263,6 +349,7 @@ def test_a_fresh_machine_compiles_for_good(tmp_path: Path) -> None:
         return done.stderr
 
     first = doctor_says()
-    assert f"compiled {warm.kernel_count()} kernels in" in first
+    assert f"renderer raster: compiled {warm.kernel_count()} kernels in" in first
+    assert f"worlds: compiled {drawing.kernel_count()} kernels in" in first
     assert str(tmp_path) in first
-    assert "was already compiled; loaded in" in doctor_says()
+    assert doctor_says().count("was already compiled; loaded in") == 2

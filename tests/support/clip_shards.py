@@ -12,7 +12,7 @@ from oracles_clips import make_clip
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
-from diff4splat.training.batches.sources import ClipSource
+from diff4splat.training.batches.sources import EndlessClips
 from diff4splat.training.recipe import Recipe, SourceSettings
 
 SIZE_PX, FRAMES = (32, 32), 5
@@ -63,6 +63,6 @@ def changes(stage: str, folder: Path, steps: int = 2, still_share: float = 0.5) 
     return [f"stages.{stage}.steps={steps}", f"stages.{stage}.data.sources={json.dumps([source])}"]
 
 
-def process_and_name(clips: ClipSource, index: int) -> tuple[int, str]:
+def process_and_name(clips: EndlessClips, index: int) -> tuple[int, str]:
     """For worker processes: who read which clip."""
     return os.getpid(), clips.clip(index).note.identifier

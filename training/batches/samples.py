@@ -9,7 +9,7 @@ import torch
 
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
-from diff4splat.training.batches.sources import ClipSource, open_source
+from diff4splat.training.batches.sources import EndlessClips, open_source
 from diff4splat.training.recipe import StageRecipe
 from diff4splat.training.stage import SampleKey
 
@@ -17,7 +17,7 @@ from diff4splat.training.stage import SampleKey
 class ClipSamples:
     """A mixture of sources as samples of one shape."""
 
-    def __init__(self, recipe: StageRecipe, seed: int, sources: Sequence[ClipSource]) -> None:
+    def __init__(self, recipe: StageRecipe, seed: int, sources: Sequence[EndlessClips]) -> None:
         self.recipe = recipe
         self.seed = seed
         self.sources = tuple(sources)

@@ -8,7 +8,7 @@ generation time are in the same unit.
 from dataclasses import replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, View
@@ -33,7 +33,7 @@ def typical_depth(clip: Clip, least_depth_share: float) -> float:
         InputError: fewer than ``least_depth_share`` of its pixels have a depth.
     """
     depth = clip.views[0].depth[0]
-    valid = torch.isfinite(depth) & (depth > 0)
+    valid = valid_depth(depth)
     share = float(valid.float().mean())
     if share < least_depth_share or not bool(valid.any()):
         raise InputError(
@@ -41,6 +41,11 @@ def typical_depth(clip: Clip, least_depth_share: float) -> float:
             f"the first input frame, got {share:.1%}; leave the clip out"
         )
     return float(depth[valid].median())
+
+
+def valid_depth(depth: Float[Tensor, "*b h w"]) -> Bool[Tensor, "*b h w"]:
+    """Where a depth map says something."""
+    return torch.isfinite(depth) & (depth > 0)
 
 
 def rescaled(clip: Clip, factor: float) -> Clip:

@@ -26,7 +26,7 @@ KEPT_BACK = 16
 
 
 @runtime_checkable
-class ClipSource(Protocol):
+class EndlessClips(Protocol):
     """Clips by index, without end."""
 
     def clip(self, index: int) -> Clip:
@@ -94,7 +94,7 @@ class FolderClips:
         return chosen
 
 
-def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> ClipSource:
+def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> EndlessClips:
     """The source that the settings name.
 
     Raises:

@@ -55,7 +55,7 @@ def draw_tracks(
     clip: Clip, target_frames: Int[Tensor, " m"], count: int, generator: torch.Generator
 ) -> TrackTargets:
     """Up to ``count`` points, each at one of the frames in which the input view sees it."""
-    seen = _seen_cells(clip)
+    seen = seen_cells(clip)
     chosen = torch.randperm(len(seen), generator=generator)
     # One cell per point: the first of its frames in random order.
     point = seen[chosen, 0]
@@ -72,7 +72,7 @@ def draw_tracks(
     return TrackTargets(cell=cell, offset=offset, valid=valid)
 
 
-def _seen_cells(clip: Clip) -> Int[Tensor, "s 4"]:
+def seen_cells(clip: Clip) -> Int[Tensor, "s 4"]:
     """(point, frame, row, column) wherever the input view sees a point on its own object."""
     view = clip.views[INPUT_VIEW]
     if clip.tracks is None or view.track_uv is None or view.track_visible is None:

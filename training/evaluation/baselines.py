@@ -16,8 +16,10 @@ from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
 from diff4splat.metrics.image import psnr
 from diff4splat.scene.scene import Scene
+from diff4splat.training.batches.scale import valid_depth
 from diff4splat.training.evaluation.answers import Answer, Look, PointQuery
-from diff4splat.training.evaluation.case import Case, valid_depth
+from diff4splat.training.evaluation.case import Case
+from diff4splat.training.evaluation.columns import PSNR_CAP_DB
 from diff4splat.training.evaluation.homography import plane_depth, warp_plane
 from diff4splat.training.evaluation.protocol import PlaneSearch
 
@@ -124,7 +126,7 @@ def _mean_psnr(case: Case, depth: float) -> float:
     answer = PlanePicture(case, depth)
     seen = [answer.picture(case.camera(pair), pair[1]) for pair in case.judged.pairs]
     truth = torch.stack([case.true_rgb(pair) for pair in case.judged.pairs])
-    return float(psnr(torch.stack(seen), truth).clamp_max(100).mean())
+    return float(psnr(torch.stack(seen), truth).clamp_max(PSNR_CAP_DB).mean())
 
 
 def _first_depths(case: Case) -> Float[Tensor, " n"]:

@@ -8,13 +8,13 @@ clip without depth keeps its own unit, and nothing that needs depth is judged on
 import hashlib
 from dataclasses import dataclass, replace
 
-import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, View
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.evaluation.protocol import Judged, Pair, Protocol, Task
@@ -42,7 +42,7 @@ class Case:
 
     def input_rgb(self, frame: int) -> Float[Tensor, "h w 3"]:
         """A given picture in [0, 1]."""
-        return self.input_view.rgb[frame].float() / 255
+        return unit_rgb(self.input_view.rgb[frame])
 
     def nearest_input(self, frame: int) -> int:
         """The given frame nearest in time."""
@@ -58,7 +58,7 @@ class Case:
 
     def true_rgb(self, pair: Pair) -> Float[Tensor, "h w 3"]:
         """A judged picture in [0, 1]."""
-        return self.clip.views[pair[0]].rgb[pair[1]].float() / 255
+        return unit_rgb(self.clip.views[pair[0]].rgb[pair[1]])
 
     def true_depth(self, pair: Pair) -> Float[Tensor, "h w"]:
         """Z of a judged picture; 0 where there is none."""
@@ -84,11 +84,6 @@ def make_case(clip: Clip, protocol: Protocol, task: Task) -> Case:
     except InputError:
         return Case(clip=clip, task=task, judged=judged, has_depth=False)
     return Case(clip=scaled, task=task, judged=judged, has_depth=True)
-
-
-def valid_depth(depth: Float[Tensor, "*b h w"]) -> Bool[Tensor, "*b h w"]:
-    """Where a depth map says something."""
-    return torch.isfinite(depth) & (depth > 0)
 
 
 def clip_sha256(clip: Clip) -> str:

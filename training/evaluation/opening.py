@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.training.batches.sources import ClipSource as Endless
-from diff4splat.training.batches.sources import open_source
+from diff4splat.training.batches.sources import EndlessClips, open_source
 from diff4splat.training.evaluation.protocol import Protocol
 from diff4splat.training.evaluation.protocol_json import LoadedProtocol
 from diff4splat.training.evaluation.sources import ClipSource
@@ -16,7 +15,7 @@ from diff4splat.training.recipe import DataSettings, SourceSettings
 class FirstWorlds:
     """The part of an endless source that a protocol asks for."""
 
-    worlds: Endless
+    worlds: EndlessClips
     count: int
 
     def __len__(self) -> int:
@@ -39,7 +38,7 @@ def open_clips(loaded: LoadedProtocol) -> ClipSource:
     return FirstWorlds(_worlds(protocol), protocol.source.first + protocol.source.count)
 
 
-def _worlds(protocol: Protocol) -> Endless:
+def _worlds(protocol: Protocol) -> EndlessClips:
     source = protocol.source
     settings = SourceSettings(kind="worlds", split=source.split, still_share=source.still_share)
     data = DataSettings(

@@ -11,8 +11,9 @@ from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.metrics.image import psnr
 from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.metrics.structure import ssim
+from diff4splat.training.batches.scale import valid_depth
 from diff4splat.training.evaluation.answers import Answer, Look
-from diff4splat.training.evaluation.case import Case, valid_depth
+from diff4splat.training.evaluation.case import Case
 from diff4splat.training.evaluation.columns import PSNR_CAP_DB
 from diff4splat.training.evaluation.records import Score, Skip, score
 

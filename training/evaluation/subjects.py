@@ -11,6 +11,7 @@ from torch import Tensor
 
 from diff4splat.data.clip import Clip
 from diff4splat.geometry.camera import Camera
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.picture import Picture
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.pretrained import Model
@@ -90,7 +91,7 @@ def reconstruct_clip(model: Model, clip: Clip) -> Scene:
     """The scene that a model's reconstruction sees in a clip's input view, and in no other."""
     view = clip.views[0]
     path = CameraPath(cameras=view.cameras.to(torch.float32), times_s=clip.times_s.float())
-    return scene_from_video(model, view.rgb.float() / 255, path)
+    return scene_from_video(model, unit_rgb(view.rgb), path)
 
 
 def model_identity(pipeline: Diff4SplatPipeline, settings: str) -> Identity:

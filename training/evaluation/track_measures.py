@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.metrics.tracks import track_endpoint_error
+from diff4splat.training.batches.targets import seen_cells
 from diff4splat.training.evaluation.answers import Answer, PointQuery
 from diff4splat.training.evaluation.case import Case
 from diff4splat.training.evaluation.picture_measures import Entries
@@ -79,14 +80,6 @@ def _end_point_error(predicted: list[Float[Tensor, "_t _n 3"]], followed: list[F
 
 def _seen(case: Case, frame: int) -> tuple[Int[Tensor, " n"], Int[Tensor, "n 2"]]:
     """Points that the input view shows in ``frame`` on their own object, and their pixels."""
-    view = case.input_view
-    points = view.track_visible[frame].nonzero()[:, 0]
-    columns, rows = view.track_uv[frame, points].floor().long().unbind(-1)
-    height, width = view.cameras.size_px
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    points, rows, columns = points[inside], rows[inside], columns[inside]
-    if view.instances is not None:
-        # At an edge the pixel's centre may show another object than the one the point lies on.
-        own = view.instances[frame, rows, columns] == case.clip.tracks.instances[points]
-        points, rows, columns = points[own], rows[own], columns[own]
-    return points, torch.stack([rows, columns], -1)
+    seen = seen_cells(case.clip)
+    seen = seen[seen[:, 1] == frame]
+    return seen[:, 0], seen[:, 2:]

@@ -6,12 +6,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.image import psnr
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.autoencoder import charbonnier, posterior_divergence
 from diff4splat.training.losses.photometric import perceptual_error
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.model_stage import ModelStage, network_video, pictures
+from diff4splat.training.stages.model_stage import ModelStage, network_video, shown_video
 from diff4splat.training.stages.panels import panel
 
 
@@ -29,7 +30,7 @@ class AutoencoderStage(ModelStage):
         terms["divergence"] = posterior_divergence(latent.mean, latent.log_variance)
         total = weights.photometric * terms["pixels"] + weights.divergence * terms["divergence"]
         if weights.perceptual:
-            shown, truth = _frames(decoded), _frames(video)
+            shown, truth = shown_video(decoded), shown_video(video)
             terms["perceptual"] = perceptual_error(shown, truth, self.plan.features)
             total = total + weights.perceptual * terms["perceptual"]
         return terms | {TOTAL: total}
@@ -37,18 +38,13 @@ class AutoencoderStage(ModelStage):
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """PSNR of the decoded video, without noise in the latent."""
-        return {"psnr": psnr(self._decoded(batch), pictures(batch.video)).mean(1)}
+        return {"psnr": psnr(self._decoded(batch), unit_rgb(batch.video)).mean(1)}
 
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """Truth above what is decoded, over time."""
-        truth, decoded = pictures(batch.video)[0], self._decoded(batch)[0]
+        truth, decoded = unit_rgb(batch.video)[0], self._decoded(batch)[0]
         return panel([("truth", list(truth)), ("decoded", list(decoded))])
 
     def _decoded(self, batch: ClipBatch) -> Float[Tensor, "b f h w 3"]:
-        return _frames(self.vae.decode(self.encode(batch))).clamp(0, 1)
-
-
-def _frames(video: Float[Tensor, "b 3 f h w"]) -> Float[Tensor, "b f h w 3"]:
-    """Networks' video as pictures in [0, 1]."""
-    return (video.movedim(1, -1).float() + 1) / 2
+        return shown_video(self.vae.decode(self.encode(batch))).clamp(0, 1)

@@ -17,12 +17,13 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.flow.path import add_noise, clean_from_velocity
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.text_encoder import tokenize
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.level_draws import LevelDraw, draw_levels
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.model_stage import ModelStage, network_rays, pictures
+from diff4splat.training.stages.model_stage import ModelStage, network_rays, shown_video
 from diff4splat.training.stages.panels import Row, panel
 
 UNSAID = "a scene"
@@ -117,13 +118,13 @@ class GeneratorStage(ModelStage):
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """Truth, and what one step from each judged level takes the clean video for."""
         clean = self.encode(batch)
-        rows: list[Row] = [("truth", list(pictures(batch.video)[0]))]
+        rows: list[Row] = [("truth", list(unit_rgb(batch.video[0])))]
         for level in JUDGED_LEVELS:
             video = self._at_level(batch, clean, level)
             guess = clean_from_velocity(video.latent, self.velocity(batch, video), video.level)
             guess = torch.cat([clean[:, :, :1], guess[:, :, 1:]], 2)
-            decoded = self.vae.decode(guess[:1])[0].movedim(0, -1).float()
-            rows.append((f"from level {level:g}", list(((decoded + 1) / 2).clamp(0, 1))))
+            decoded = shown_video(self.vae.decode(guess[:1]))[0].clamp(0, 1)
+            rows.append((f"from level {level:g}", list(decoded)))
         return panel(rows)
 
     def _error_at(self, batch: ClipBatch, clean: Tensor, level: float) -> Float[Tensor, " b"]:

@@ -7,11 +7,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.io.pixels import unit_rgb
+from diff4splat.metrics.depth import depth_pearson
 from diff4splat.metrics.image import psnr
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.depth import depth_correlation
 from diff4splat.training.losses.motion import track_motion
-from diff4splat.training.stages.model_stage import pictures
 from diff4splat.training.stages.prediction import Rendered
 
 Measures = dict[str, Float[Tensor, " b"]]
@@ -20,13 +21,15 @@ Measures = dict[str, Float[Tensor, " b"]]
 def reconstruction_measures(rendered: Rendered, batch: ClipBatch) -> Measures:
     """``psnr``, ``depth_correlation`` and, with motion, ``track_error`` and its share of the truth.
 
-    ``track_share`` is the error over that of standing still: 1 is no better than no motion. Clips
-    without a moving point have NaN there, and means leave them out.
+    ``track_share`` is the error over that of standing still: 1 is no better than no motion. Where a
+    measure does not apply (no moving point, no true depth that varies) it is NaN, and means leave
+    it out; a rendered depth that does not vary counts as uncorrelated.
     """
     truth = batch.target_depth.flatten(1, 2)
-    seen = psnr(rendered.rgb.clamp(0, 1), pictures(batch.target_rgb)).flatten(1).mean(1)
+    seen = psnr(rendered.rgb.clamp(0, 1), unit_rgb(batch.target_rgb)).flatten(1).mean(1)
     correlation = 1 - depth_correlation(rendered.depth.flatten(1, 2), truth, truth > 0)
-    measures = {"psnr": seen, "depth_correlation": correlation}
+    applies = ~depth_pearson(truth, truth, truth > 0).isnan().all(1)
+    measures = {"psnr": seen, "depth_correlation": torch.where(applies, correlation, torch.nan)}
     if rendered.offsets is not None:
         measures |= _track_measures(rendered.offsets, batch)
     return measures

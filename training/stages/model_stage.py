@@ -90,9 +90,9 @@ def network_rays(batch: ClipBatch) -> Float[Tensor, "b 6 f h w"]:
         return plucker_map(batch.cameras).movedim(1, 2)
 
 
-def pictures(pixels: Tensor) -> Tensor:
-    """8-bit pixels to [0, 1]."""
-    return pixels.float() / 255
+def shown_video(video: Float[Tensor, "b 3 f h w"]) -> Float[Tensor, "b f h w 3"]:
+    """A network's video as pictures, channels last; 0 to 1 as far as the network keeps to it."""
+    return (video.movedim(1, -1).float() + 1) / 2
 
 
 def _require_parts(recipe: StageRecipe, parts: Collection[str]) -> tuple[str, ...]:

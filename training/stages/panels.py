@@ -13,9 +13,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.io.depth_colors import colorize, robust_range
-from diff4splat.io.pixels import from_bytes
+from diff4splat.io.pixels import from_bytes, unit_rgb
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.stages.model_stage import pictures
 from diff4splat.training.stages.prediction import Rendered
 
 GAP_PX, LABEL_PX = 2, 14
@@ -55,18 +54,18 @@ def _label(text: str, width: int) -> Float[Tensor, "h width 3"]:
 
 def reconstruction_panel(rendered: Rendered, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
     """Input frames, then truth and prediction of every target, their depths, and motion."""
-    truth = list(pictures(batch.target_rgb[0]).flatten(0, 1))
+    truth = list(unit_rgb(batch.target_rgb[0]).flatten(0, 1))
     shown = list(rendered.rgb[0].clamp(0, 1).flatten(0, 1).cpu())
     places = torch.linspace(0, batch.video.shape[1] - 1, len(truth)).round().long()
     rows: list[Row] = [
-        ("input", list(pictures(batch.video[0, places]))),
+        ("input", list(unit_rgb(batch.video[0, places]))),
         ("truth", truth),
         ("prediction", shown),
         ("true depth", _depth_row(batch.target_depth[0].flatten(0, 1))),
         ("depth", _depth_row(rendered.depth[0].flatten(0, 1))),
     ]
     if rendered.offsets is not None:
-        rows += _motion_rows(rendered.offsets[0], batch)
+        rows += motion_rows(rendered.offsets[0], batch)
     return panel(rows)
 
 
@@ -75,10 +74,10 @@ def _depth_row(depth: Float[Tensor, "k h w"]) -> list[Tensor]:
     return list(colorize(depth.cpu(), robust_range(depth.cpu())))
 
 
-def _motion_rows(offsets: Float[Tensor, "m n 3"], batch: ClipBatch) -> list[Row]:
+def motion_rows(offsets: Float[Tensor, "m n 3"], batch: ClipBatch) -> list[Row]:
     """True and predicted displacement of the tracked points, drawn over the first input frame."""
     truth, valid = batch.track_offset[0], batch.track_valid[0]
-    background = pictures(batch.video[0, 0]).mean(-1, keepdim=True).expand(-1, -1, 3) * 0.5
+    background = unit_rgb(batch.video[0, 0]).mean(-1, keepdim=True).expand(-1, -1, 3) * 0.5
     named = (("true motion", truth), ("motion", offsets))
     return [
         (name, [_arrows(background, batch, offset, valid) for offset in moved])

@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.geometry import quaternion
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.base_scene import PLANE_DEPTH, UNSEEN, plane_base
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.deformation_heads import (
@@ -28,7 +29,6 @@ from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.stages.model_stage import pictures
 
 SETTINGS = RenderSettings(alpha_cutoff=UNSEEN / 10)
 
@@ -116,7 +116,7 @@ def _stack(pairs: list[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
 
 def _picture(batch: ClipBatch, index: int) -> Picture:
     return Picture(
-        rgb=pictures(batch.video[index, 0]), camera=batch.cameras[index][0], focal_source="clip"
+        rgb=unit_rgb(batch.video[index, 0]), camera=batch.cameras[index][0], focal_source="clip"
     )
 
 

@@ -8,6 +8,7 @@ Axes: ``b`` batch, ``m p`` targets, ``h w`` pixels. A weight of 0 leaves the ter
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
@@ -15,7 +16,6 @@ from diff4splat.training.losses.motion import track_motion
 from diff4splat.training.losses.photometric import perceptual_error, squared_error
 from diff4splat.training.recipe import LossWeights
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.model_stage import pictures
 from diff4splat.training.stages.prediction import Rendered
 
 Terms = dict[str, Float[Tensor, " b"]]
@@ -25,7 +25,7 @@ def rendering_terms(
     rendered: Rendered, batch: ClipBatch, weights: LossWeights, features: PerceptualFeatures
 ) -> Terms:
     """Every term by name, and their weighted sum as ``total``."""
-    rgb, truth = rendered.rgb.flatten(1, 2), pictures(batch.target_rgb).flatten(1, 2)
+    rgb, truth = rendered.rgb.flatten(1, 2), unit_rgb(batch.target_rgb).flatten(1, 2)
     depth = rendered.depth.flatten(1, 2)
     true_depth = batch.target_depth.flatten(1, 2)
     valid = true_depth > 0

@@ -63,8 +63,9 @@ class Checkpoints:
             write_tensors(staging, tensors)
             state = self._describe(progress) | {"files": digests(staging, self.processes)}
             self.processes.first_does(lambda: self._publish(staging, target, state))
-        except OutputError:
-            raise
+        except OutputError as error:
+            # People look for the checkpoint, not for the folder it was put together in.
+            raise OutputError(str(error).replace(str(staging), str(target))) from error
         except OSError as error:
             raise output_error(target, error) from error
         finally:

@@ -13,7 +13,7 @@ Outcome = Literal["finished", "signalled", "step_limit", "time_limit"]
 """Why training returned; all but ``finished`` go on with the next call."""
 
 
-def _silent(text: str) -> None:
+def silent(text: str) -> None:
     """Take a note to nobody."""
 
 
@@ -45,7 +45,7 @@ class RunSettings:
     timeout_s: float = 600.0
     """How long processes wait for each other before they give up."""
     phases: Phases = field(default_factory=Phases)
-    note: Callable[[str], None] = _silent
+    note: Callable[[str], None] = silent
     """Takes one line for people; only the first process talks."""
     begin: Callable[[], None] = _nothing
     """Called by the first process once folder and settings are known to fit, before any step."""

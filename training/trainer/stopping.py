@@ -11,7 +11,10 @@ from contextlib import contextmanager
 
 from diff4splat.training.trainer.settings import Outcome, RunSettings
 
-_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+# Windows has no hang-up.
+_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGTERM", "SIGINT", "SIGHUP") if hasattr(signal, name)
+)
 
 
 class StopRequest:

@@ -165,6 +165,7 @@ def _seen(index, x, y, turn, lens, surfaces, materials, lighting, shades):
     open_share = open_sky(
         px, py, pz, face, shades.above, shades.above_chart, shades.reach_m, spin_x, spin_y
     )
+    reached = open_share + (1.0 - open_share) * lighting.handed_on
     up = 0.5 - 0.5 * normal[1]
     gloss = materials.gloss[owner] * clamp(0.7 + 0.6 * (level - 0.5), 0.0, 1.0)
     shine, mirror = _shine(normal, (wx, wy, wz), toward, gloss, facing)
@@ -176,7 +177,7 @@ def _seen(index, x, y, turn, lens, surfaces, materials, lighting, shades):
         albedo = clamp(blend(albedo, materials.colors[owner, 2, at], third) * bright, 0.0, 0.95)
         around = blend(lighting.below[at], lighting.above[at], up)
         # What is hidden from the sky is lit by its neighbours, which share its colour.
-        around *= open_share / (1.0 - 0.5 * albedo * (1.0 - open_share))
+        around *= reached / (1.0 - 0.5 * albedo * (1.0 - reached))
         light = albedo * (sun * lighting.color[at] + around) + sun * shine * lighting.color[at]
         light += mirror * open_share * ambient(ry, lighting, at)
         light = blend(light, lighting.horizon[at], fog)

@@ -27,10 +27,14 @@ class Lighting(NamedTuple):
     haze_per_m: float
     seed: int
     exposure: float
+    handed_on: float
+    """Share of the light from all around that walls return to where things hide it."""
 
 
 _FILL = 1.2
 """Light that surfaces hand on to each other adds to that from all around."""
+_WALLS = 0.45
+"""``handed_on`` in a room; outdoors that light is gone."""
 
 
 def lighting_of(world: World) -> Lighting:
@@ -42,6 +46,8 @@ def lighting_of(world: World) -> Lighting:
     # Colours of a sky are as they shall look, those of light as bright as it is.
     arrays = (light.color, light.toward, _FILL * light.sky, _FILL * light.ground)
     skies = (sky.zenith / exposure, sky.horizon / exposure)
+    # Outdoors the air is never perfectly clear.
+    is_room = sky.haze_per_m == 0 and sky.clouds == 0
     return Lighting(
         *(np.ascontiguousarray(value, np.float64) for value in arrays + skies),
         float(light.softness),
@@ -49,6 +55,7 @@ def lighting_of(world: World) -> Lighting:
         float(sky.haze_per_m),
         int(sky.seed),
         exposure,
+        _WALLS if is_room else 0.0,
     )
 
 

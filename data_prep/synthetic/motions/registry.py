@@ -20,8 +20,6 @@ class Motion:
     """Goes along a heading; captions then say where to."""
     heights_m: tuple[float, float] = (0.0, 100.0)
     """Sizes at which it looks right: small things bounce too fast to be seen."""
-    room: float = 0.0
-    """Space that it needs to every side, in heights of the thing, beyond the travel."""
 
     def suits(self, family: Family) -> bool:
         """Whether the family can do it at some natural size."""
@@ -37,38 +35,37 @@ def _motion(
     *,
     travels: bool = False,
     heights_m: tuple[float, float] = (0.0, 100.0),
-    room: float = 0.0,
 ) -> Motion:
-    return Motion(perform=perform, ability=ability, travels=travels, heights_m=heights_m, room=room)
+    return Motion(perform=perform, ability=ability, travels=travels, heights_m=heights_m)
 
 
 MOTIONS: dict[str, Motion] = {
     "slides": _motion(rigid.slides, "move", travels=True),
     "rolls": _motion(rigid.rolls, "roll", travels=True),
-    "tumbles": _motion(rigid.tumbles, "tumble", travels=True, room=0.3),
+    "tumbles": _motion(rigid.tumbles, "tumble", travels=True),
     "spins": _motion(rigid.spins, "spin"),
     "bounces": _motion(rigid.bounces, "bounce", travels=True, heights_m=(0.2, 1.2)),
     "drops": _motion(rigid.drops, "drop", heights_m=(0.2, 1.2)),
     "hops": _motion(rigid.hops, "hop", travels=True, heights_m=(0.2, 1.4)),
     "rises": _motion(rigid.rises, "rise"),
     "circles": _motion(rigid.circles, "orbit", heights_m=(0.05, 1.0)),
-    "swings": _motion(rigid.swings, "hang", heights_m=(0.1, 0.7), room=1.4),
+    "swings": _motion(rigid.swings, "hang", heights_m=(0.1, 0.7)),
     "walks": _motion(articulated.walks, "walk", travels=True),
     "flies": _motion(articulated.flies, "fly", travels=True),
     "swims": _motion(articulated.swims, "swim", travels=True),
     "slithers": _motion(articulated.slithers, "slither", travels=True),
     "crawls": _motion(articulated.crawls, "crawl", travels=True),
     "drives": _motion(articulated.drives, "drive", travels=True),
-    "reaches": _motion(articulated.reaches, "arm", room=0.4),
-    "turns_sails": _motion(articulated.turns_sails, "wheel", room=0.1),
+    "reaches": _motion(articulated.reaches, "arm"),
+    "turns_sails": _motion(articulated.turns_sails, "wheel"),
     "flutters": _motion(soft.flutters, "flutter"),
-    "squashes": _motion(soft.squashes, "soft", room=0.2),
+    "squashes": _motion(soft.squashes, "soft"),
     "grows": _motion(soft.grows, "soft"),
     "shrinks": _motion(soft.shrinks, "soft"),
     "twists": _motion(soft.twists, "soft"),
-    "bends": _motion(soft.bends, "soft", room=0.5),
-    "wobbles": _motion(soft.wobbles, "soft", room=0.3),
-    "sways": _motion(soft.sways, "sway", room=0.1),
+    "bends": _motion(soft.bends, "soft"),
+    "wobbles": _motion(soft.wobbles, "soft"),
+    "sways": _motion(soft.sways, "sway"),
 }
 
 

@@ -78,11 +78,6 @@ class Shape:
         )
         return Shape(parts=tuple(parts), joints=tuple(joints))
 
-    def joint_number(self, name: str) -> int:
-        """Where a joint stands; 0 when there is none of that name."""
-        names = ["", *(joint.name for joint in self.joints)]
-        return names.index(name) if name in names else 0
-
 
 def one(role: str, surface: Surface, *, smooth: bool = True) -> Shape:
     """A thing of a single part."""

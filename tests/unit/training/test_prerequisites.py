@@ -1,6 +1,7 @@
 """Which stage builds on which, and what it starts with."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -59,10 +60,6 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recipe, Path]:
     for stage in ("vae", "static-low"):
         train_stage(StageRun(recipe=recipe, stage=stage, folder=run))
     return recipe, run
-
-
-def result_of(folder: Path) -> dict:
-    return json.loads((folder / "result.json").read_text())
 
 
 @pytest.mark.parametrize("stage", [name for name, parts in BUILDS_ON.items() if parts])
@@ -169,8 +166,6 @@ def test_another_model_than_the_runs_is_refused(begun: tuple[Recipe, Path]) -> N
 
 def damaged(run: Path, folder: Path) -> Path:
     """A copy of the autoencoder's stage."""
-    import shutil
-
     shutil.copytree(run / "vae", folder / "vae")
     return folder / "vae"
 

@@ -14,7 +14,7 @@ SETTINGS = DrawSettings(samples_per_side=2, tracks=0, flow=False, shadow_px=256)
 GRAY = {"colors": np.full((2, 3), 0.4)}
 
 
-def from_above(objects, toward, softness: float = 0.0, sun: float = 1.0) -> np.ndarray:
+def from_above(objects, toward, softness: float = 0.0, sun: float = 1.0, **changes) -> np.ndarray:
     """Brightness of a picture from 8 m above the origin that shows 8 m × 8 m of the ground."""
     camera = oracle.straight(1, SIZE)
     camera.world_from_camera[0, :3, :3] = oracle.looking_down()
@@ -22,7 +22,7 @@ def from_above(objects, toward, softness: float = 0.0, sun: float = 1.0) -> np.n
     camera.focal_px[:] = SIZE[0]
     light = oracle.light(toward, softness)
     light = replace(light, color=sun * light.color)
-    scene = oracle.world(objects, [camera], 1, light=light)
+    scene = oracle.world(objects, [camera], 1, light=light, **changes)
     return draw_clip(scene, SETTINGS).views[0].rgb[0].float().mean(-1).numpy()
 
 
@@ -80,3 +80,20 @@ def test_things_darken_the_ground_they_stand_on() -> None:
     )
     seen = from_above([gray_ground(), block], (1.0, -3.0, 0.0), sun=0.0)[20:28]
     assert seen[:, 31].mean() < 0.985 * seen[:, 44:].mean()
+
+
+def test_in_a_room_walls_light_what_things_hide_from_the_sky() -> None:
+    sides = [
+        oracle.thing(
+            2 + at, oracle.box((x, -0.3, 0), (1.0, 0.3, 2.0)), oracle.texture("plain", 1.0, **GRAY)
+        )
+        for at, x in enumerate((-1.3, 1.3))
+    ]
+    air, no_air = (
+        from_above([gray_ground(), *sides], (1.0, -3.0, 0.0), sun=0.0, sky=oracle.sky(0.0, haze))
+        for haze in (1e-9, 0.0)
+    )
+    between, far = np.s_[20:28, 23:25], np.s_[20:28, 42:]
+    darker = [float(seen[far].mean() - seen[between].mean()) for seen in (air, no_air)]
+    assert darker[0] > 10
+    assert 0 < darker[1] < 0.75 * darker[0]

@@ -20,7 +20,7 @@ from diff4splat.errors import FileFormatError, InputError
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.batches.sources import (
     KEPT_BACK,
-    ClipSource,
+    EndlessClips,
     open_source,
 )
 from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
@@ -36,12 +36,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_shards(tmp_path_factory.mktemp("shards"), still=STILL, moving=MOVING)
 
 
-def source(folder: Path, still_share: float, seed: int = 0) -> ClipSource:
+def source(folder: Path, still_share: float, seed: int = 0) -> EndlessClips:
     given = SourceSettings(kind="shards", folder=str(folder), still_share=still_share)
     return open_source(given, DATA, seed)
 
 
-def names(clips: ClipSource, indices: range) -> list[str]:
+def names(clips: EndlessClips, indices: range) -> list[str]:
     return [clips.clip(index).note.identifier for index in indices]
 
 
@@ -216,12 +216,12 @@ def test_a_blind_clip_alone_leaves_no_sample(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def worlds() -> ClipSource:
+def worlds() -> EndlessClips:
     return open_source(SourceSettings(kind="worlds", still_share=0.0), DATA, 0)
 
 
 @pytest.mark.parametrize("index", [0, EVALUATION_START, EVALUATION_START + 2**39 + 7])
-def test_every_index_is_one_world(worlds: ClipSource, index: int) -> None:
+def test_every_index_is_one_world(worlds: EndlessClips, index: int) -> None:
     first, again = worlds.clip(index), worlds.clip(index)
     assert first.note == again.note
     assert torch.equal(first.views[1].rgb, again.views[1].rgb)
@@ -231,6 +231,6 @@ def test_every_index_is_one_world(worlds: ClipSource, index: int) -> None:
     assert first.views[0].flow is None
 
 
-def test_neighbours_are_other_worlds(worlds: ClipSource) -> None:
+def test_neighbours_are_other_worlds(worlds: EndlessClips) -> None:
     assert worlds.clip(0).note.identifier != worlds.clip(EVALUATION_START).note.identifier
     assert not torch.equal(worlds.clip(0).views[0].rgb, worlds.clip(EVALUATION_START).views[0].rgb)

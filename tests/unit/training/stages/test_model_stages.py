@@ -8,6 +8,7 @@ from stage_fixtures import STAGES, make_batch, make_stage, shake_heads, stage_re
 
 from diff4splat.errors import ConfigError
 from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.panels import motion_rows
 from diff4splat.training.trainer.parallel import StageModule
 from diff4splat.training.trainer.samples import replacement
 
@@ -132,6 +133,16 @@ def test_panels_are_pictures(name: str) -> None:
     assert panel.shape[-1] == 3 and float(panel.min()) >= 0 and float(panel.max()) <= 1
 
 
+def test_lines_of_one_picture_do_not_show_in_the_next() -> None:
+    batch = make_batch(stage_recipe("dynamic"))
+    still = torch.zeros_like(batch.track_offset[0])
+    before = [picture.clone() for picture in motion_rows(still, batch)[1][1]]
+    moved = replace(batch, track_offset=batch.track_offset + 3.0)
+    truth, own = (row for _, row in motion_rows(still, moved))
+    assert not torch.equal(truth[0], before[0])
+    assert all(torch.equal(one, other) for one, other in zip(own, before, strict=True))
+
+
 @pytest.mark.parametrize("name", STAGES)
 def test_half_precision_networks_keep_geometry_and_losses_in_single(name: str) -> None:
     recipe = stage_recipe(name)
@@ -196,3 +207,13 @@ def test_clips_without_a_caption_run_the_same_networks() -> None:
     stage.text_encoder.register_forward_hook(lambda *_: calls.append(1))
     terms = stage(replace(batch, captions=("",)))
     assert calls and bool(torch.isfinite(terms[TOTAL]).all())
+
+
+def test_measures_leave_out_what_does_not_apply() -> None:
+    recipe = stage_recipe("static-low")
+    batch = make_batch(recipe, (0, 1))
+    flat = batch.target_depth.clone()
+    flat[0] = 5.0
+    measures = make_stage(recipe).measure(replace(batch, target_depth=flat))
+    assert bool(measures["depth_correlation"][0].isnan())
+    assert float(measures["depth_correlation"][1].abs()) < 1
