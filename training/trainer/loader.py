@@ -6,6 +6,7 @@ rather than forked, because rasteriser threads do not survive a fork, and each c
 thread. They ignore Ctrl-C: the trainer decides when to stop.
 """
 
+import atexit
 import os
 import signal
 import time
@@ -92,7 +93,7 @@ def batches(samples: Samples, steps: StepRange, workers: int) -> Iterator[Loaded
         sampler=steps,
         num_workers=workers,
         multiprocessing_context="spawn" if workers else None,
-        worker_init_fn=_ignore_interrupts if workers else None,
+        worker_init_fn=_begin_worker if workers else None,
     )
     with _one_thread():
         ready = iter(loader)
@@ -122,9 +123,12 @@ def _failure(index: int, error: Diff4SplatError) -> Failure:
     return Failure(sample=index, reason=reason, message=message)
 
 
-def _ignore_interrupts(worker: int) -> None:
+def _begin_worker(worker: int) -> None:
     del worker
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A worker that is stopped amid a sample must just go: taken apart while its threads still
+    # compute, it would abort, and the run would report a crash that is none.
+    atexit.register(os._exit, 0)
 
 
 @contextmanager
