@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.geometry import quaternion
+from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.base_scene import PLANE_DEPTH, UNSEEN, plane_base
 from diff4splat.models.config import ModelConfig
@@ -104,7 +105,7 @@ def deformed(gaussians: Gaussians, state: DeformationState) -> Gaussians:
     )
 
 
-def _pictures(gaussians: Gaussians, cameras: object) -> tuple[Tensor, Tensor]:
+def _pictures(gaussians: Gaussians, cameras: Camera) -> tuple[Tensor, Tensor]:
     output = render(gaussians, cameras, outputs=("rgb", "depth"), settings=SETTINGS)
     return output.rgb, output.depth
 
