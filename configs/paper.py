@@ -7,7 +7,15 @@ autoencoder and the video model are ours: the paper starts from pretrained ones.
 
 from dataclasses import replace
 
-from diff4splat.configs.stages import dynamic_data, later, reconstruction_gates, static_data
+from diff4splat.configs.stages import (
+    dynamic_data,
+    dynamic_stage,
+    generator_stage,
+    joint_stage,
+    later,
+    reconstruction_gates,
+    static_stage,
+)
 from diff4splat.models.sizes import paper_size
 from diff4splat.training.recipe import (
     DataSettings,
@@ -35,43 +43,16 @@ def paper_recipe() -> Recipe:
         data=dynamic_data(replace(data, views=1, tracks=0)),
     )
     low = replace(
-        vae,
-        name="static-low",
-        kind="static",
+        static_stage(vae, data),
         steps=40_000,
         global_batch=32,
-        trained=("ldrm",),
         optimizer=OptimizerSettings(learning_rate=1e-5),
-        data=static_data(data),
         gates=reconstruction_gates(psnr=20.0, depth_correlation=0.8),
     )
     high = later(low, "static-high", (512, 512), 1.0)
-    dynamic = replace(
-        high,
-        name="dynamic",
-        kind="dynamic",
-        steps=20_000,
-        trained=("ldrm", "deformation"),
-        data=dynamic_data(replace(high.data, tracks=data.tracks)),
-    )
-    generator = replace(
-        dynamic,
-        name="generator",
-        kind="generator",
-        steps=100_000,
-        trained=("text_encoder", "dit"),
-        level_shift=5.0,
-        gates=(),
-    )
-    joint = replace(
-        dynamic,
-        name="joint",
-        kind="joint",
-        steps=5_000,
-        trained=("text_encoder", "dit", "ldrm", "deformation"),
-        level_shift=5.0,
-        gates=(),
-    )
+    dynamic = replace(dynamic_stage(high, data.tracks), steps=20_000)
+    generator = replace(generator_stage(dynamic), steps=100_000, level_shift=5.0)
+    joint = replace(joint_stage(dynamic), steps=5_000, level_shift=5.0)
     return Recipe(
         name="paper",
         seed=0,

@@ -2,12 +2,19 @@
 
 from dataclasses import replace
 
-from diff4splat.configs.stages import dynamic_data, later, reconstruction_gates, static_data
+from diff4splat.configs.stages import (
+    dynamic_data,
+    dynamic_stage,
+    generator_stage,
+    joint_stage,
+    later,
+    reconstruction_gates,
+    static_stage,
+)
 from diff4splat.models.sizes import small_size
 from diff4splat.training.recipe import (
     DataSettings,
     Gate,
-    LossWeights,
     OptimizerSettings,
     Recipe,
     StageRecipe,
@@ -34,42 +41,20 @@ def small_recipe() -> Recipe:
         gates=(Gate(measure="psnr", bound=26.0),),
     )
     static = replace(
-        vae,
-        name="static-low",
-        kind="static",
-        trained=("ldrm",),
-        data=static_data(data),
+        static_stage(vae, data),
         gates=reconstruction_gates(psnr=18.0, depth_correlation=0.6),
     )
     high = later(static, "static-high", (128, 128), 0.25)
     dynamic = replace(
-        later(high, "dynamic", (128, 128), 1.0),
-        kind="dynamic",
+        dynamic_stage(high, data.tracks),
         steps=10_000,
-        trained=("ldrm", "deformation"),
-        data=dynamic_data(high.data),
         gates=(*high.gates, Gate(measure="track_share", bound=0.8, direction="at_most")),
     )
-    dynamic = replace(dynamic, data=replace(dynamic.data, tracks=data.tracks))
-    generator = replace(
-        dynamic,
-        name="generator",
-        kind="generator",
-        steps=40_000,
-        trained=("text_encoder", "dit"),
-        data=dynamic_data(replace(high.data, views=1, tracks=0)),
-        optimizer=vae.optimizer,
-        gates=(),
-    )
+    generator = replace(generator_stage(dynamic), steps=40_000, optimizer=vae.optimizer)
     joint = replace(
-        dynamic,
-        name="joint",
-        kind="joint",
+        joint_stage(dynamic),
         steps=2_000,
-        trained=("text_encoder", "dit", "ldrm", "deformation"),
         optimizer=replace(dynamic.optimizer, learning_rate=2e-5, warmup_steps=100),
-        losses=LossWeights(),
-        gates=(),
     )
     return Recipe(
         name="small",

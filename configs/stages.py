@@ -27,6 +27,34 @@ def dynamic_data(data: DataSettings) -> DataSettings:
     return replace(data, sources=MIXED)
 
 
+def static_stage(vae: StageRecipe, data: DataSettings) -> StageRecipe:
+    """LDRM alone, on what stands still."""
+    data = static_data(data)
+    return replace(vae, name="static-low", kind="static", trained=("ldrm",), data=data)
+
+
+def dynamic_stage(static: StageRecipe, tracks: int) -> StageRecipe:
+    """Deformation too, on moving and still clips with followed points."""
+    data = dynamic_data(replace(static.data, tracks=tracks))
+    trained = ("ldrm", "deformation")
+    return replace(static, name="dynamic", kind="dynamic", trained=trained, data=data)
+
+
+def generator_stage(dynamic: StageRecipe) -> StageRecipe:
+    """The video model; it looks at the input view alone, so nothing else is read or drawn."""
+    data = replace(dynamic.data, views=1, target_frames=1, tracks=0)
+    trained = ("text_encoder", "dit")
+    return replace(
+        dynamic, name="generator", kind="generator", trained=trained, data=data, gates=()
+    )
+
+
+def joint_stage(dynamic: StageRecipe) -> StageRecipe:
+    """All but the autoencoder."""
+    trained = ("text_encoder", "dit", "ldrm", "deformation")
+    return replace(dynamic, name="joint", kind="joint", trained=trained, gates=())
+
+
 def reconstruction_gates(psnr: float, depth_correlation: float) -> tuple[Gate, ...]:
     """What a static stage must reach."""
     return (

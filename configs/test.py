@@ -2,7 +2,15 @@
 
 from dataclasses import replace
 
-from diff4splat.configs.stages import dynamic_data, later, reconstruction_gates, static_data
+from diff4splat.configs.stages import (
+    dynamic_stage,
+    generator_stage,
+    joint_stage,
+    later,
+    reconstruction_gates,
+    static_data,
+    static_stage,
+)
 from diff4splat.models.sizes import test_size
 from diff4splat.training.recipe import (
     DataSettings,
@@ -31,33 +39,9 @@ def test_recipe() -> Recipe:
         data=static_data(data),
     )
     static = replace(
-        vae,
-        name="static-low",
-        kind="static",
-        trained=("ldrm",),
-        gates=reconstruction_gates(psnr=5.0, depth_correlation=-1.0),
+        static_stage(vae, data), gates=reconstruction_gates(psnr=5.0, depth_correlation=-1.0)
     )
-    dynamic = replace(
-        static,
-        name="dynamic",
-        kind="dynamic",
-        trained=("ldrm", "deformation"),
-        data=dynamic_data(data),
-    )
-    generator = replace(
-        dynamic,
-        name="generator",
-        kind="generator",
-        trained=("text_encoder", "dit"),
-        gates=(),
-        level_shift=5.0,
-    )
-    joint = replace(
-        generator,
-        name="joint",
-        kind="joint",
-        trained=("text_encoder", "dit", "ldrm", "deformation"),
-    )
+    dynamic = replace(dynamic_stage(static, data.tracks), level_shift=5.0)
     return Recipe(
         name="test",
         seed=0,
@@ -67,8 +51,8 @@ def test_recipe() -> Recipe:
             static,
             later(static, "static-high", (64, 64), 0.25),
             dynamic,
-            generator,
-            joint,
+            generator_stage(dynamic),
+            joint_stage(dynamic),
         ),
         trainer=TrainerSettings(checkpoint_every=50, evaluate_every=50, evaluation_samples=2),
     )

@@ -17,7 +17,6 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.metrics.checks import require_alike
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,23 +55,6 @@ def bootstrap_interval(
         low, high = _accelerated_quantiles(values, means, level)
     mean = float(values.mean()) if count else math.nan
     return Interval(mean=mean, low=low, high=high, level=level, count=count)
-
-
-def paired_interval(
-    after: Float[Tensor, " n"],
-    before: Float[Tensor, " n"],
-    level: float = 0.95,
-    resamples: int = 2000,
-    seed: int = 0,
-) -> Interval:
-    """Of the mean of ``after − before`` on the same clips; an effect is clear if 0 lies outside.
-
-    Raises:
-        ShapeError: the lengths differ.
-        ConfigError, InputError: as ``bootstrap_interval``.
-    """
-    require_alike("after", after, before)
-    return bootstrap_interval(after.double() - before.double(), level, resamples, seed)
 
 
 def _resampled_means(values: Tensor, resamples: int, seed: int) -> Tensor:

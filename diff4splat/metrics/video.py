@@ -7,7 +7,6 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.metrics.checks import require_alike, widen
 from diff4splat.metrics.image import psnr
 
 
@@ -19,23 +18,6 @@ def loop_closure_psnr(video: Float[Tensor, "*b t h w c"]) -> Float[Tensor, "*b"]
     """
     _require_frames(video)
     return psnr(video[..., -1, :, :, :], video[..., 0, :, :, :])
-
-
-def change_error(
-    video: Float[Tensor, "*b t h w c"], reference: Float[Tensor, "*b t h w c"]
-) -> Float[Tensor, "*b"]:
-    """Mean absolute difference of the changes from frame to frame: flicker, or missing motion.
-
-    A constant difference of brightness does not count.
-
-    Raises:
-        ShapeError: the shapes differ, fewer than two frames, or no pixel.
-    """
-    require_alike("video", video, reference)
-    _require_frames(video)
-    video, reference = widen(video, reference)
-    apart = video.diff(dim=-4) - reference.diff(dim=-4)
-    return apart.abs().mean((-4, -3, -2, -1))
 
 
 def _require_frames(video: Tensor) -> None:

@@ -50,13 +50,6 @@ def motion(predicted, truth, valid, distance_weight: float, size_weight: float) 
     return total / count if count else 0.0
 
 
-def distribution(predicted, truth, valid) -> float:
-    """Of one element ``n 3``."""
-    index = np.flatnonzero(valid)
-    apart = [abs(predicted[i] @ predicted[j] - truth[i] @ truth[j]) for i in index for j in index]
-    return float(np.mean(apart)) if apart else 0.0
-
-
 def normal_divergence(mean: float, std: float) -> float:
     """KL(N(mean, std²) ‖ N(0, 1)) by quadrature of p log(p / q)."""
     points = np.linspace(mean - 14 * std, mean + 14 * std, 400_001)

@@ -28,8 +28,6 @@ FLATTEST = 1e-3
 """Standard deviation, as a share of the mean depth, below which a map counts as constant."""
 LEAST_MEAN = 1e-6
 """Mean depth below which smoothness is no longer divided by it."""
-EDGE_SHARPNESS = 10.0
-"""How fast edges of the guide switch smoothness off, per unit of RGB (Monodepth uses 1 to 10)."""
 
 
 def depth_correlation(
@@ -62,11 +60,8 @@ def depth_correlation(
 def depth_smoothness(
     rendered: Float[Tensor, "b k h w"],
     valid: Bool[Tensor, "b k h w"] | None = None,
-    guide: Float[Tensor, "b k h w 3"] | None = None,
 ) -> Float[Tensor, " b"]:
     """Total variation of depth over its mean, between valid neighbours; mean over an element.
-
-    ``guide`` is a picture at whose edges depth may jump; without one every jump counts alike.
 
     Raises:
         ShapeError: the shapes differ.
@@ -78,19 +73,13 @@ def depth_smoothness(
     depth = hidden_as_zero(rendered, valid)
     mean = masked_mean(depth.abs().flatten(-2), valid.flatten(-2))[..., None, None]
     depth = depth / mean.clamp(min=LEAST_MEAN)
-    if guide is not None:
-        require_alike("guide", guide[..., 0], rendered)
-        guide = widen(guide)[0].movedim(-1, -3)
-    return _variation(depth, valid, guide, -1) + _variation(depth, valid, guide, -2)
+    return _variation(depth, valid, -1) + _variation(depth, valid, -2)
 
 
-def _variation(depth: Tensor, valid: Tensor, guide: Tensor | None, axis: int) -> Tensor:
+def _variation(depth: Tensor, valid: Tensor, axis: int) -> Tensor:
     """Mean absolute step along one axis."""
     before, after = _neighbours(depth, axis)
     steps = (after - before).abs()
-    if guide is not None:
-        before, after = _neighbours(guide, axis)
-        steps = steps * (-EDGE_SHARPNESS * (after - before).abs().mean(-3)).exp()
     before, after = _neighbours(valid, axis)
     return masked_mean(steps.flatten(1), (before & after).flatten(1))
 

@@ -50,15 +50,3 @@ def draw_levels(uniform: Float[Tensor, " b"], draw: LevelDraw) -> Float[Tensor, 
         return levels
     # The denominator keeps levels 0 and 1 exactly where they are.
     return draw.shift * levels / (draw.shift * levels + (1 - levels))
-
-
-def bell_weights(level: Float[Tensor, " b"]) -> Float[Tensor, " b"]:
-    """exp(−2 (level − ½)²) less its value at both ends, scaled to a mean of 1 over [0, 1].
-
-    The weighting of the public Diff4Splat code: the ends, nearly pure data and pure noise, do not
-    count.
-    """
-    (level,) = widen(level)
-    edge = math.exp(-0.5)
-    mean = math.sqrt(math.pi / 2) * math.erf(math.sqrt(0.5)) - edge
-    return ((-2 * (level - 0.5).square()).exp() - edge).clamp(min=0) / mean

@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import no_autocast, require_alike, require_mask, widen
+from diff4splat.metrics.checks import require_alike, require_mask, widen
 from diff4splat.metrics.masked import hidden_as_zero, masked_mean
 
 
@@ -38,26 +38,6 @@ def track_motion(
     if size_weight:
         loss = loss + size_weight * predicted.abs().sum(-1)
     return masked_mean(loss.flatten(1), valid.flatten(1))
-
-
-def track_distribution(
-    predicted: Float[Tensor, "b *k n 3"],
-    truth: Float[Tensor, "b *k n 3"],
-    valid: Bool[Tensor, "b *k n"] | None = None,
-) -> Float[Tensor, " b"]:
-    """Mean difference of all products Δx_i · Δx_j: do points move together as they should?
-
-    The second motion term of MoVieS (arXiv 2507.10065; weight 10 there, on up to 1000 points drawn
-    by the caller: memory grows with n²). Off by default in Diff4Splat.
-
-    Raises:
-        ShapeError: the shapes differ.
-    """
-    predicted, truth, valid = _known(predicted, truth, valid)
-    with no_autocast(predicted):
-        apart = (predicted @ predicted.mT - truth @ truth.mT).abs()
-    pairs = valid[..., :, None] & valid[..., None, :]
-    return masked_mean(apart.flatten(1), pairs.flatten(1))
 
 
 def _known(predicted: Tensor, truth: Tensor, valid: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:

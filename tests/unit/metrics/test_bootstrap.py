@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from diff4splat.errors import ConfigError, InputError, ShapeError
-from diff4splat.metrics.bootstrap import bootstrap_interval, paired_interval
+from diff4splat.errors import ConfigError, InputError
+from diff4splat.metrics.bootstrap import bootstrap_interval
 
 
 def skewed(count: int, seed: int = 0) -> torch.Tensor:
@@ -80,17 +80,6 @@ def test_too_few_values_say_so(count: int) -> None:
     assert interval.mean == 2 if count else math.isnan(interval.mean)
 
 
-def test_pairs_remove_what_clips_share() -> None:
-    hard = 10 * skewed(20)
-    better = hard + 0.5 + 0.1 * torch.randn(20, dtype=torch.float64)
-    paired = paired_interval(better, hard, resamples=200)
-    assert 0.3 < paired.low < paired.mean < paired.high < 0.7
-    alone = bootstrap_interval(better, resamples=200)
-    assert alone.low < float(hard.mean()) < alone.high
-    mirrored = paired_interval(hard, better, resamples=200)
-    assert mirrored.mean == pytest.approx(-paired.mean)
-
-
 @pytest.mark.usefixtures("as_shipped")
 def test_settings_and_values() -> None:
     values = torch.ones(3)
@@ -100,5 +89,3 @@ def test_settings_and_values() -> None:
         bootstrap_interval(values, resamples=0)
     with pytest.raises(InputError, match="expected finite numbers, got NaN or infinity; leave"):
         bootstrap_interval(torch.tensor([1.0, math.nan]))
-    with pytest.raises(ShapeError, match=r"after: expected \(3,\), got \(2,\)"):
-        paired_interval(values[:2], values)

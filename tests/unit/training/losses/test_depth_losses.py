@@ -151,21 +151,10 @@ def test_invalid_pixels_are_no_neighbours() -> None:
     assert not gradient.any()
 
 
-def test_edges_of_the_guide_allow_jumps() -> None:
-    depth, guide = torch.ones(1, 1, 4, 6), torch.zeros(1, 1, 4, 6, 3)
-    depth[..., 3:] = 2.0
-    plain = depth_smoothness(depth)
-    torch.testing.assert_close(depth_smoothness(depth, guide=guide), plain)
-    guide[..., 3:, :] = 1.0
-    assert float(depth_smoothness(depth, guide=guide)) == pytest.approx(
-        float(plain) * np.exp(-10), rel=1e-5
-    )
-
-
 def test_smoothness_gradient() -> None:
-    depth, guide = depths(1, 2, 3, 4).requires_grad_(), torch.rand(1, 2, 3, 4, 3, dtype=F64)
+    depth = depths(1, 2, 3, 4).requires_grad_()
     valid = torch.rand(1, 2, 3, 4) < 0.8
-    assert torch.autograd.gradcheck(lambda d: depth_smoothness(d, valid, guide), depth)
+    assert torch.autograd.gradcheck(lambda d: depth_smoothness(d, valid), depth)
 
 
 @pytest.mark.usefixtures("as_shipped")
@@ -177,5 +166,3 @@ def test_shapes_must_agree() -> None:
         depth_correlation(one, one, one)
     with pytest.raises(ShapeError, match=r"valid: expected \(1, 1, 2, 2\) bool, got \(2, 1"):
         depth_smoothness(one, two.bool())
-    with pytest.raises(ShapeError, match=r"guide: expected \(1, 1, 2, 2\), got \(2, 1, 2, 2\)"):
-        depth_smoothness(one, guide=torch.zeros(2, 1, 2, 2, 3))

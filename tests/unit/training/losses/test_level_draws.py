@@ -9,7 +9,7 @@ from scipy import stats
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.levels import shift_levels
-from diff4splat.training.losses.level_draws import LevelDraw, bell_weights, draw_levels
+from diff4splat.training.losses.level_draws import LevelDraw, draw_levels
 
 F64 = torch.float64
 INSIDE = torch.linspace(0, 1, 101, dtype=F64)
@@ -57,13 +57,3 @@ def test_levels_rise_and_stay_inside(kind: str, dtype: torch.dtype) -> None:
 def test_what_is_no_distribution(settings_: dict[str, object], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         LevelDraw(**settings_)
-
-
-def test_the_bell_has_mean_one_and_empty_ends() -> None:
-    level = torch.linspace(0, 1, 100_001, dtype=F64)
-    weights = bell_weights(level)
-    assert float(weights.mean()) == pytest.approx(1, abs=1e-4)
-    assert weights[[0, -1]].tolist() == pytest.approx([0, 0], abs=1e-12)
-    assert int(weights.argmax()) == 50_000
-    ratio = (math.exp(-2 * 0.25**2) - math.exp(-0.5)) / (1 - math.exp(-0.5))
-    assert float(weights[25_000] / weights[50_000]) == pytest.approx(ratio)

@@ -9,8 +9,8 @@ from diff4splat.metrics.features.load import load_features
 from diff4splat.training.losses.autoencoder import charbonnier, posterior_divergence
 from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
 from diff4splat.training.losses.flow_matching import flow_matching
-from diff4splat.training.losses.level_draws import LevelDraw, bell_weights, draw_levels
-from diff4splat.training.losses.motion import track_distribution, track_motion
+from diff4splat.training.losses.level_draws import LevelDraw, draw_levels
+from diff4splat.training.losses.motion import track_motion
 from diff4splat.training.losses.photometric import perceptual_error, squared_error
 
 LOSSES: dict[str, Callable[[torch.Tensor, torch.Tensor], torch.Tensor]] = {
@@ -18,9 +18,8 @@ LOSSES: dict[str, Callable[[torch.Tensor, torch.Tensor], torch.Tensor]] = {
     "squared": squared_error,
     "perceptual": lambda own, true: perceptual_error(own, true, load_features(None)),
     "depth": lambda own, true: depth_correlation(own[..., 0], true[..., 0]),
-    "smoothness": lambda own, true: depth_smoothness(own[..., 0], guide=true),
+    "smoothness": lambda own, true: depth_smoothness(own[..., 0]),
     "motion": track_motion,
-    "distribution": track_distribution,
     "divergence": posterior_divergence,
     "charbonnier": charbonnier,
 }
@@ -39,4 +38,4 @@ def test_losses_stay_on_their_device(name: str) -> None:
 def test_levels_stay_on_their_device() -> None:
     uniform = torch.empty(3, device="meta")
     levels = draw_levels(uniform, LevelDraw(kind="logit_normal", shift=3.0))
-    assert {levels.device.type, bell_weights(levels).device.type} == {"meta"}
+    assert levels.device.type == "meta"

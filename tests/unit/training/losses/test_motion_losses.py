@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diff4splat.errors import ShapeError
-from diff4splat.training.losses.motion import track_distribution, track_motion
+from diff4splat.training.losses.motion import track_motion
 
 F64 = torch.float64
 
@@ -54,59 +54,33 @@ def test_the_size_term_pulls_to_standstill_and_can_be_switched_off() -> None:
         assert predicted.grad[0, 0].tolist() == expected
 
 
-@pytest.mark.parametrize("loss_of", [track_motion, track_distribution])
 @pytest.mark.parametrize("points", [0, 3])
-def test_no_tracks_cost_nothing(loss_of, points: int) -> None:
+def test_no_tracks_cost_nothing(points: int) -> None:
     predicted = torch.randn(2, points, 3, requires_grad=True)
     truth = torch.full((2, points, 3), float("nan"))
-    loss = loss_of(predicted, truth, torch.zeros(2, points, dtype=torch.bool))
+    loss = track_motion(predicted, truth, torch.zeros(2, points, dtype=torch.bool))
     loss.sum().backward()
     assert loss.tolist() == [0, 0]
     assert not predicted.grad.any()
 
 
-@pytest.mark.parametrize("loss_of", [track_motion, track_distribution])
 @pytest.mark.parametrize("size", [1e-30, 1e-3, 1e8])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_extreme_motions_stay_finite(loss_of, size: float, dtype: torch.dtype) -> None:
+def test_extreme_motions_stay_finite(size: float, dtype: torch.dtype) -> None:
     predicted = (size * torch.randn(1, 4, 3)).to(dtype).requires_grad_()
     truth = (size * torch.randn(1, 4, 3)).to(dtype)
-    loss = loss_of(predicted, truth)
+    loss = track_motion(predicted, truth)
     loss.sum().backward()
     assert loss.dtype == torch.float32
     assert loss.isfinite().all()
     assert predicted.grad.isfinite().all()
 
 
-def test_distribution_against_loops() -> None:
-    predicted, truth = torch.randn(2, 2, 5, 3, dtype=F64)
-    valid = torch.rand(2, 5) < 0.7
-    expected = [
-        oracle.distribution(predicted[b].numpy(), truth[b].numpy(), valid[b].numpy())
-        for b in range(2)
-    ]
-    np.testing.assert_allclose(track_distribution(predicted, truth, valid), expected, rtol=1e-12)
-
-
-def test_the_distribution_does_not_see_a_turn_of_everything() -> None:
-    truth = torch.randn(1, 6, 3, dtype=F64)
-    turn, _ = torch.linalg.qr(torch.randn(3, 3, dtype=F64))
-    assert float(track_distribution(truth @ turn, truth)) == pytest.approx(0, abs=1e-12)
-
-
-def test_mixed_precision_does_not_narrow_the_products() -> None:
-    predicted, truth = torch.randn(2, 1, 8, 3)
-    plain = track_distribution(predicted, truth)
-    with torch.autocast("cpu", dtype=torch.bfloat16):
-        assert torch.equal(track_distribution(predicted, truth), plain)
-
-
-@pytest.mark.parametrize("loss_of", [track_motion, track_distribution])
-def test_gradients(loss_of) -> None:
+def test_gradients() -> None:
     predicted, truth = torch.randn(2, 2, 4, 3, dtype=F64)
     valid = torch.tensor([[True, True, False, True]] * 2)
     predicted.requires_grad_()
-    assert torch.autograd.gradcheck(lambda p: loss_of(p, truth, valid), predicted)
+    assert torch.autograd.gradcheck(lambda p: track_motion(p, truth, valid), predicted)
 
 
 @pytest.mark.usefixtures("as_shipped")
