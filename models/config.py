@@ -5,15 +5,17 @@ The JSON form lists every field, so that a stored model never changes when a def
 
 import hashlib
 import json
-from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
+from dataclasses import MISSING, Field, asdict, dataclass, field, fields, is_dataclass
 from typing import TypeVar
 
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.models.config_parts import (
+    DETAIL_TOKEN_PX,
     TIME_STRIDE,
     TOKEN_PATCH,
     ActivationConfig,
     DeformationConfig,
+    DetailConfig,
     DitConfig,
     LdrmConfig,
     TextConfig,
@@ -27,6 +29,7 @@ Config = TypeVar("Config")
 __all__ = [
     "ActivationConfig",
     "DeformationConfig",
+    "DetailConfig",
     "DitConfig",
     "LdrmConfig",
     "ModelConfig",
@@ -51,6 +54,7 @@ class ModelConfig:
     ldrm: LdrmConfig
     deformation: DeformationConfig
     activation: ActivationConfig
+    detail: DetailConfig = field(default_factory=DetailConfig)
 
     def __post_init__(self) -> None:
         named = isinstance(self.name, str) and self.name != ""
@@ -63,6 +67,13 @@ class ModelConfig:
             self.latent_grid(self.frames, self.size_px)
         except InputError as error:
             raise ConfigError(f"ModelConfig {error}") from error
+        sight = self.detail.used or self.ldrm.reads == "latents"
+        require(sight, "LdrmConfig.reads", "latents where there is no detail decoder", "frames")
+        whole = not self.detail.used or self.ldrm.grid_stride == 1
+        require(whole, "LdrmConfig.grid_stride", "1 with a detail decoder", self.ldrm.grid_stride)
+        fits = not self.detail.used or self.token_px == DETAIL_TOKEN_PX
+        expected = f"tokens of {DETAIL_TOKEN_PX} px with a detail decoder"
+        require(fits, "ModelConfig.vae", expected, self.token_px)
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)
@@ -116,18 +127,20 @@ class ModelConfig:
 def _build(kind: type[Config], data: object, where: str) -> Config:
     if not isinstance(data, dict):
         raise ConfigError(f"{where}: expected an object, got {type(data).__name__}")
-    known = {field.name: field for field in fields(kind)}
+    known = {entry.name: entry for entry in fields(kind)}
     for key in data:
         if key not in known:
             raise ConfigError(f"{where}: expected the keys {sorted(known)}, got {key!r}")
-    missing = [
-        name for name, field in known.items() if name not in data and field.default is MISSING
-    ]
+    missing = [name for name in known if name not in data and _is_needed(known[name])]
     if missing:
         raise ConfigError(f"{where}: expected the key {missing[0]!r}, got none")
     return kind(
         **{key: _value(known[key].type, value, f"{where}.{key}") for key, value in data.items()}
     )
+
+
+def _is_needed(entry: Field) -> bool:
+    return entry.default is MISSING and entry.default_factory is MISSING
 
 
 def _value(kind: object, value: object, where: str) -> object:

@@ -14,6 +14,8 @@ TIME_STRIDE = 4
 """Video frames per latent frame after the first (paper); fixed, files depend on it."""
 TOKEN_PATCH = 2
 """Latent pixels per token side, in the video model and in LDRM (paper)."""
+DETAIL_TOKEN_PX = 16
+"""Pixels per token side that the detail decoder's three resolutions lead down to."""
 GAUSSIAN_SPLIT = (3, 3, 4, 1, 1)
 """RGB, scale, quaternion, opacity, ray distance: K_g = 12 as in Wonderland, not in the paper."""
 DEFORMATION_SPLIT = (3, 4, 3)
@@ -61,9 +63,13 @@ class VaeConfig:
     """Pixels per side folded into channels before the first convolution (2 in Wan 2.2)."""
     blocks: int = 1
     """Residual blocks per resolution (2 in Wan 2.1)."""
+    linear_code: bool = False
+    """Convolutions correct a linear code instead of doing all (ours; docs/adr/0014)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "latent_channels", "pixel_patch", "blocks")
+        known = isinstance(self.linear_code, bool)
+        require(known, "VaeConfig.linear_code", "true or false", self.linear_code)
         enough = isinstance(self.widths, tuple) and len(self.widths) >= 3
         require(
             enough, "VaeConfig.widths", "at least 3 widths, for two halvings of time", self.widths
@@ -75,6 +81,10 @@ class VaeConfig:
                 "whole numbers above 0",
                 width,
             )
+        most = 3 * TIME_STRIDE * self.space_stride**2
+        fits = not self.linear_code or self.latent_channels <= most
+        expected = f"at most the {most} values of a block with a linear code"
+        require(fits, "VaeConfig.latent_channels", expected, self.latent_channels)
 
     @property
     def space_stride(self) -> int:
@@ -153,6 +163,8 @@ class LdrmConfig:
     """Latent channels are first projected to 64 (paper)."""
     grid_stride: Literal[1, 2] = 1
     """1: a Gaussian per pixel (paper); 2: one per 2 by 2 pixels (Wonderland, high resolution)."""
+    reads: Literal["latents", "frames"] = "latents"
+    """Latents (paper), or the pictures themselves: for comparison only."""
 
     def __post_init__(self) -> None:
         require_counts(
@@ -160,6 +172,43 @@ class LdrmConfig:
         )
         require_heads(self, smallest=6)
         require(self.grid_stride in (1, 2), "LdrmConfig.grid_stride", "1 or 2", self.grid_stride)
+        known = self.reads in ("latents", "frames")
+        require(known, "LdrmConfig.reads", "latents or frames", self.reads)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetailConfig:
+    """Decoder with pictures beside tokens (ours, docs/adr/0015); a width of 0 leaves it out."""
+
+    width: int = 0
+    """Channels at a quarter of the resolution; two thirds more at each of two coarser ones."""
+    match_channels: int = 16
+    """Features that are compared between frames."""
+    depths: int = 24
+    """Depths at which they are compared; 0 leaves the comparison out."""
+    range: tuple[float, float] = (1.0, 60.0)
+    """Nearest and farthest compared depth, in units of which the plane stands at 4."""
+    surroundings: int = 16
+    """Cells of a quarter resolution that continue the first picture beyond its borders, a multiple
+    of 4: part of the layer is seen four times coarser; 0 leaves the layer out."""
+
+    def __post_init__(self) -> None:
+        require_counts(self, "match_channels")
+        for name in ("width", "depths", "surroundings"):
+            value = getattr(self, name)
+            whole = isinstance(value, int) and not isinstance(value, bool) and value >= 0
+            require(whole, f"DetailConfig.{name}", "a whole number of at least 0", value)
+        coarse = self.surroundings % 4 == 0
+        require(coarse, "DetailConfig.surroundings", "a multiple of 4", self.surroundings)
+        pair = isinstance(self.range, tuple) and len(self.range) == 2
+        pair = pair and all(isinstance(depth, int | float) for depth in self.range)
+        ordered = pair and 0 < self.range[0] < self.range[1] < math.inf
+        require(ordered, "DetailConfig.range", "two rising depths above 0", self.range)
+
+    @property
+    def used(self) -> bool:
+        """Whether there is such a decoder."""
+        return self.width > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,6 +13,7 @@ from torch import nn
 
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.deformation import DeformationNetwork
+from diff4splat.models.detail.deformation import DetailDeformation
 from diff4splat.models.ldrm import Ldrm
 from diff4splat.models.text_encoder import TextEncoder
 from diff4splat.models.video_dit import VideoDiT
@@ -28,7 +29,7 @@ class Networks:
     """None when there is no prompt."""
     dit: VideoDiT
     ldrm: Ldrm
-    deformation: DeformationNetwork
+    deformation: DeformationNetwork | DetailDeformation
 
     def parts(self) -> list[tuple[str, nn.Module]]:
         """(name, network) of the parts that exist."""
@@ -70,8 +71,13 @@ def create_networks(
         text_encoder=build("text_encoder", lambda: TextEncoder(config.text)) if with_text else None,
         dit=build("dit", lambda: VideoDiT(config)),
         ldrm=build("ldrm", lambda: Ldrm(config)),
-        deformation=build("deformation", lambda: DeformationNetwork(config)),
+        deformation=build("deformation", lambda: _deformation(config)),
     )
+
+
+def _deformation(config: ModelConfig) -> DeformationNetwork | DetailDeformation:
+    """On tokens (paper), or on the detail decoder's features where there is one."""
+    return (DetailDeformation if config.detail.used else DeformationNetwork)(config)
 
 
 def create_text_encoder(

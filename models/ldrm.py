@@ -9,9 +9,11 @@ length:
     tokens ─ transposed convolution 4×16×16 (zero at first), drop 3 frames ─ 12 channels per pixel
 
 The zero layer makes a fresh model answer exactly 0, which the heads read as "the base scene".
-"""
+With a detail decoder (``detail/``) the last line is another:
 
-from dataclasses import dataclass
+    tokens, decoded pictures, cameras ─ decoder ─┬─ 12 channels per pixel of the key frames
+                                                 └─ 12 channels per cell around the first picture
+"""
 
 import torch
 from jaxtyping import Float
@@ -25,17 +27,10 @@ from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.blocks.transformer_block import TransformerBlock
 from diff4splat.models.camera_adapter import PLUCKER_CHANNELS
 from diff4splat.models.config import ModelConfig
-from diff4splat.models.config_parts import GAUSSIAN_SPLIT, TIME_STRIDE, TOKEN_PATCH
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReconstructionMaps:
-    """Raw attributes of one Gaussian per grid cell, and the tokens they came from."""
-
-    gaussians: Float[Tensor, "b 12 f hh ww"]
-    """Channels RGB 3, scale 3, quaternion 4, opacity 1, ray distance 1; zero is the base scene."""
-    tokens: Float[Tensor, "b d t h2 w2"]
-    """Canonical latent for the deformation network."""
+from diff4splat.models.config_parts import GAUSSIAN_SPLIT, TIME_STRIDE, TOKEN_PATCH, LdrmConfig
+from diff4splat.models.detail.branch import DetailBranch
+from diff4splat.models.detail.sight import Sight
+from diff4splat.models.maps import ReconstructionMaps
 
 
 class Ldrm(nn.Module):
@@ -46,8 +41,11 @@ class Ldrm(nn.Module):
         ldrm = config.ldrm
         self.config = ldrm
         self.token_px = config.token_px
-        self.latent_embedding = nn.Linear(config.vae.latent_channels, ldrm.embed_channels)
-        self.latent_tokens = nn.Linear(ldrm.embed_channels * TOKEN_PATCH**2, ldrm.width)
+        if ldrm.reads == "latents":
+            self.latent_embedding = nn.Linear(config.vae.latent_channels, ldrm.embed_channels)
+            self.latent_tokens = nn.Linear(ldrm.embed_channels * TOKEN_PATCH**2, ldrm.width)
+        else:
+            self.frame_tokens = nn.Linear(3 * TIME_STRIDE * self.token_px**2, ldrm.width)
         self.latent_norm = nn.LayerNorm(ldrm.width, eps=EPSILON)
         self.pose_tokens = nn.Linear(PLUCKER_CHANNELS * TIME_STRIDE * self.token_px**2, ldrm.width)
         self.pose_norm = nn.LayerNorm(ldrm.width, eps=EPSILON)
@@ -59,41 +57,58 @@ class Ldrm(nn.Module):
             ]
         )
         self.norm_out = nn.LayerNorm(ldrm.width, eps=EPSILON)
-        side = self.token_px // ldrm.grid_stride
-        self.to_gaussians = zero_(
-            nn.ConvTranspose3d(
-                *(ldrm.width, sum(GAUSSIAN_SPLIT)),
-                kernel_size=(TIME_STRIDE, side, side),
-                stride=(TIME_STRIDE, side, side),
-            )
-        )
+        self.detail = DetailBranch(config) if config.detail.used else None
+        if self.detail is None:
+            self.to_gaussians = _to_pixels(ldrm, self.token_px // ldrm.grid_stride)
 
     def forward(
-        self, latent: Float[Tensor, "b c t h w"], camera: Float[Tensor, "b 6 f hh ww"]
+        self,
+        latent: Float[Tensor, "b c t h w"],
+        camera: Float[Tensor, "b 6 f hh ww"],
+        sight: Sight | None = None,
     ) -> ReconstructionMaps:
         """Raw maps; ``camera`` is the Plücker map of the video frames relative to the first camera.
 
+        ``sight`` is looked at by the detail decoder only.
+
         Raises:
-            ShapeError: latent and rays do not belong to the same video.
+            ShapeError: latent and rays do not belong to the same video, or a sight is missing.
         """
-        tokens = self._merge_tokens(self._latent_tokens(latent), self._pose_tokens(camera))
+        tokens = self._tokens(latent, camera, sight)
+        if self.detail is not None:
+            return self.detail(tokens, _require_sight(sight))
+        # Latent i holds frames 4 i − 3 … 4 i: three of the first pack lie before the video.
+        gaussians = self.to_gaussians(tokens)[:, :, TIME_STRIDE - 1 :]
+        return ReconstructionMaps(
+            gaussians=gaussians.to(latent.dtype), tokens=tokens.to(latent.dtype)
+        )
+
+    def _tokens(
+        self, latent: Tensor, camera: Tensor, sight: Sight | None
+    ) -> Float[Tensor, "b d t h2 w2"]:
+        """Normalised tokens after all blocks."""
+        if self.config.reads == "latents":
+            content = self._latent_tokens(latent)
+        else:
+            content = self._frame_tokens(_require_sight(sight))
+        tokens = self._merge_tokens(content, self._pose_tokens(camera))
         grid = tuple(tokens.shape[1:4])
         rope = rope_tables(grid, self.config.width // self.config.heads, tokens.device)
         tokens = tokens.flatten(1, 3)
         for block in self.blocks:
             tokens = block(tokens, rope)
-        maps = self.norm_out(tokens).transpose(1, 2).unflatten(2, grid)
-        # Latent i holds frames 4 i − 3 … 4 i: three of the first pack lie before the video.
-        gaussians = self.to_gaussians(maps)[:, :, TIME_STRIDE - 1 :]
-        return ReconstructionMaps(
-            gaussians=gaussians.to(latent.dtype), tokens=maps.to(latent.dtype)
-        )
+        return self.norm_out(tokens).transpose(1, 2).unflatten(2, grid)
 
     def _latent_tokens(self, latent: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b t h2 w2 d"]:
         embedded = self.latent_embedding(latent.movedim(1, -1)).movedim(-1, 1)
         return self.latent_norm(
             self.latent_tokens(patchify(embedded, (1, TOKEN_PATCH, TOKEN_PATCH)))
         )
+
+    def _frame_tokens(self, sight: Sight) -> Float[Tensor, "b t h2 w2 d"]:
+        patch = (TIME_STRIDE, self.token_px, self.token_px)
+        packs = patchify(fill_first_pack(sight.rgb * 2 - 1), patch)
+        return self.latent_norm(self.frame_tokens(packs))
 
     def _pose_tokens(self, camera: Float[Tensor, "b 6 f hh ww"]) -> Float[Tensor, "b t h2 w2 d"]:
         # The first frame fills its pack of four, so pose and latent tokens cover the same frames.
@@ -107,3 +122,19 @@ class Ldrm(nn.Module):
                 f"got {tuple(pose.shape[:4])}; make both from the same frames and picture size"
             )
         return self.merge(torch.cat([latent, pose], -1))
+
+
+def _to_pixels(config: LdrmConfig, side_px: int) -> nn.ConvTranspose3d:
+    """The layer from a token to the pixels of its four frames; zero when fresh."""
+    block = (TIME_STRIDE, side_px, side_px)
+    layer = nn.ConvTranspose3d(config.width, sum(GAUSSIAN_SPLIT), kernel_size=block, stride=block)
+    return zero_(layer)
+
+
+def _require_sight(sight: Sight | None) -> Sight:
+    if sight is None:
+        raise ShapeError(
+            "LDRM: expected decoded pictures with their cameras for the detail decoder, got none; "
+            "hand over a Sight"
+        )
+    return sight

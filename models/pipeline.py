@@ -6,6 +6,9 @@ Axes: ``b c t h w`` inside networks, pictures ``h w 3`` outside; this file is wh
     prompt ── text encoder ┼─ sample ─ latents ─┐
     path ──── Plücker maps ┴────────────────────┼─ reconstruct ─ prune ─ deform ─ match ─ Scene
     picture on a plane ─────────────────────────┘
+
+A model of which some parts are trained, but not the video model, shows the picture on its plane,
+standing still: see ``Model.runs_video_model``.
 """
 
 from dataclasses import dataclass, replace
@@ -17,21 +20,26 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.geometry.rays import plucker_map, relative_to_first
-from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
+from diff4splat.models.base_only import base_canonical, base_motion, leave_out_video
+from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
 from diff4splat.models.input_colors import InputGrid, match_input_view
 from diff4splat.models.latent_sampling import Conditions, sample_video
+from diff4splat.models.latents_to_scene import VideoLatent, canonical_scene
 from diff4splat.models.picture import Picture, load_picture
 from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
 from diff4splat.models.prompt import require_prompt
-from diff4splat.models.reconstruction import Canonical, deform, prune_cells, reconstruct
+from diff4splat.models.reconstruction import Canonical, deform
 from diff4splat.models.settings import GenerationSettings, require_seed
 from diff4splat.models.still import drop_still_tracks
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.scene import Provenance, Scene
+
+BASE_SIDE_PX = 256
+"""Picture side where no network runs: nothing then asks for the size that they were made for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,11 +61,14 @@ class Diff4SplatPipeline:
 
     @classmethod
     def from_pretrained(cls, name_or_folder: str | Path) -> "Diff4SplatPipeline":
-        """A model folder, or the name of a size with random weights (then marked untrained).
+        """A model folder, or the name of a size: its shipped weights, else random ones.
+
+        Scenes are marked untrained until every part of the model is trained.
 
         Raises:
             ConfigError: no such size, or it does not fit into this machine's memory.
             CheckpointError: the folder's weights do not belong to its configuration.
+            FileFormatError: a file is damaged.
         """
         return cls(load_model(name_or_folder))
 
@@ -86,7 +97,8 @@ class Diff4SplatPipeline:
         Args:
             image: a photograph's file, or a prepared ``Picture``.
             path: cameras, or presets such as ``spiral+forward``; becomes the suggested path.
-            prompt: what happens; None leaves the text encoder and the guidance pass out.
+            prompt: what happens; None leaves the text encoder and the guidance pass out. Says
+                nothing to a model whose video model is left out.
             seed: of the noise that the video starts from.
             settings: sampling, guidance and pruning.
             log: collects seconds and what was left out.
@@ -110,7 +122,10 @@ class Diff4SplatPipeline:
         """At a size that the model can take, in single precision."""
         config = self.model.config
         if not isinstance(image, Picture):
-            image = load_picture(Path(image), max(config.size_px), multiple_px=config.token_px)
+            side_px = max(config.size_px)
+            if not self.model.runs_video_model:
+                side_px = max(side_px, BASE_SIDE_PX)
+            image = load_picture(Path(image), side_px, multiple_px=config.token_px)
         config.latent_grid(config.frames, image.camera.size_px)
         return replace(image, rgb=image.rgb.float(), camera=image.camera.to(torch.float32))
 
@@ -118,18 +133,38 @@ class Diff4SplatPipeline:
         device = self.model.device
         context = context_path(request.path, self.model.config.frames).to(device)
         request = replace(request, picture=request.picture.to(device))
-        conditions = self._conditions(request, context, log)
-        latent = self._sample(request, conditions, log)
-        canonical = self._reconstruct(request, context, conditions.plucker, latent, log)
+        build = self._from_video if self.model.runs_video_model else self._from_picture
+        canonical, motion = build(request, context, log)
         scene = Scene(
             gaussians=canonical.gaussians,
-            motion=self._motion(canonical, context, log),
+            motion=motion,
             path=request.path,
             provenance=self._provenance(request),
         )
         scene = self._match_colors(scene, canonical, request, log)
         camera, still_px = request.picture.camera, request.settings.still_px
         return drop_still_tracks(scene, camera, still_px, log).to(torch.device("cpu"))
+
+    def _from_video(
+        self, request: Request, context: CameraPath, log: RunLog
+    ) -> tuple[Canonical, Motion]:
+        """What the networks make of the picture."""
+        latent = self._sample(request, self._conditions(request, context, log), log)
+        video = VideoLatent(latent=latent, picture=request.picture, cameras=context.cameras)
+        with log.phases.phase("reconstruct"):
+            canonical = canonical_scene(self.model, video, request.settings.min_opacity, log)
+        return canonical, self._motion(canonical, context, log)
+
+    def _from_picture(
+        self, request: Request, context: CameraPath, log: RunLog
+    ) -> tuple[Canonical, Motion]:
+        """The base scene, without any network."""
+        config, settings = self.model.config, request.settings
+        if request.prompt is not None:
+            require_prompt(request.prompt, config.text.max_bytes)
+        leave_out_video(request.prompt, settings.steps, log)
+        canonical = base_canonical(request.picture, context, config, settings.min_opacity, log)
+        return canonical, base_motion(context)
 
     def _conditions(self, request: Request, context: CameraPath, log: RunLog) -> Conditions:
         text = self._text_states(request.prompt, log)
@@ -159,23 +194,7 @@ class Diff4SplatPipeline:
         if video.calls.saved:
             why = "no prompt" if conditions.text is None else settings.why_unguided
             log.left_out("guidance pass", why, f"{video.calls.saved} network calls")
-        log.left_out("video decoder", "the scene is decoded from latents", "decoding every frame")
         return video.latent
-
-    def _reconstruct(
-        self,
-        request: Request,
-        context: CameraPath,
-        plucker: Float[Tensor, "1 6 f h w"],
-        latent: Float[Tensor, "1 c t h2 w2"],
-        log: RunLog,
-    ) -> Canonical:
-        config = self.model.config
-        with log.phases.phase("reconstruct"):
-            base = plane_base(request.picture, context.cameras, config.ldrm.grid_stride)
-            maps = self.model.networks.ldrm(latent, plucker)
-            whole = reconstruct(maps, base, config.activation)
-            return prune_cells(whole, request.settings.min_opacity, log)
 
     def _motion(self, canonical: Canonical, context: CameraPath, log: RunLog) -> Motion:
         units = DeformationUnits(length_unit=PLANE_DEPTH, activation=self.model.config.activation)
@@ -187,7 +206,7 @@ class Diff4SplatPipeline:
         grid = InputGrid(
             picture=request.picture,
             stride=self.model.config.ldrm.grid_stride,
-            cells=canonical.cells,
+            cells=canonical.every_cell,
         )
         return match_input_view(scene, grid, request.settings.color_steps, log)
 

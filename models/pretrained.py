@@ -1,35 +1,48 @@
-"""A model as it is loaded and saved: configuration, networks, and whether anybody trained it.
+"""A model as it is loaded and saved: configuration, networks, and which of them are trained.
 
-config.json  provenance.json  {vae,text_encoder,dit,ldrm,deformation}.safetensors
+config.json  provenance.json  {vae,text_encoder,dit,ldrm,deformation}.safetensors  [SHA256SUMS]
+
+A name is looked for as a folder first, then among the weights that ship, then among the sizes.
 """
 
-import json
 import os
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
 
-from diff4splat.errors import CheckpointError, ConfigError
-from diff4splat.io.atomic import write_text
+from diff4splat.errors import ConfigError
+from diff4splat.models.checksums import SUMS_FILE, require_whole
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.factory import (
+    PARTS,
     Networks,
     create_networks,
     create_text_encoder,
     parameter_counts,
 )
+from diff4splat.models.provenance import (
+    NOT_STATED,
+    ModelProvenance,
+    read_provenance,
+    write_provenance,
+)
+from diff4splat.models.shipped import shipped_folder
 from diff4splat.models.sizes import SIZES, size_by_name
-from diff4splat.models.weights import (
+from diff4splat.models.weight_files import (
+    CONFIG_FILE,
     load_config,
     load_networks,
     load_text_encoder,
+    part_file,
     save_networks,
     weights_sha256,
 )
 
-PROVENANCE_FILE = "provenance.json"
 BYTES_PER_WEIGHT = 4
+RECONSTRUCTION = frozenset({"vae", "ldrm", "deformation"})
+"""Parts between a true video and its scene."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +54,34 @@ class Model:
     folder: Path | None = None
     """Where the weights lie; None for random ones."""
     weights_sha256: str = "none"
-    untrained: bool = True
+    trained: frozenset[str] = frozenset()
+    """Names of the parts that are trained to their end."""
+    license: str = NOT_STATED
+    origin: str = NOT_STATED
+
+    @property
+    def untrained(self) -> bool:
+        """Whether anything that generation needs is not trained."""
+        return not self.trained.issuperset(PARTS)
+
+    @property
+    def reconstructs(self) -> bool:
+        """Whether everything between a true video and its scene is trained."""
+        return self.trained.issuperset(RECONSTRUCTION)
+
+    @property
+    def runs_video_model(self) -> bool:
+        """Whether generation samples a video and reconstructs it, or shows the base scene.
+
+        An untrained video model gives noise, and trained heads would make a scene of it. So where
+        some parts are trained but not the video model, it and the heads stay out of generation.
+        Where nothing is trained everything runs: fresh heads answer zero to any video, which is
+        the base scene too, and heads that somebody set by hand are seen. A detail decoder would
+        show decoded noise, so with one the video model must be trained.
+        """
+        if "dit" in self.trained:
+            return True
+        return not self.trained and not self.config.detail.used
 
     @property
     def device(self) -> torch.device:
@@ -50,42 +90,68 @@ class Model:
 
 
 def load_model(name_or_folder: str | Path) -> Model:
-    """A model folder, or a size with random weights; without the text encoder.
+    """A model folder, or a size with its shipped or else random weights; no text encoder.
+
+    Parts that the provenance does not call trained may have no file: they are random then.
 
     Raises:
         ConfigError: neither a folder nor a size, or more than this machine's memory.
         CheckpointError: weights and configuration do not belong together.
+        FileFormatError: a file is damaged.
     """
-    folder = Path(name_or_folder)
-    if not _is_folder(folder):
+    folder = checked_folder(name_or_folder)
+    if folder is None:
         config = size_by_name(str(name_or_folder))
         _require_memory(config)
         return Model(config=config, networks=create_networks(config, with_text=False))
-    config, networks = load_networks(folder, with_text=False)
+    provenance = read_provenance(folder)
+    config, networks = load_networks(folder, with_text=False, may_lack=provenance.may_lack)
     return Model(
         config=config,
         networks=networks,
         folder=folder,
         weights_sha256=weights_sha256(folder),
-        untrained=_is_untrained(folder),
+        trained=provenance.trained,
+        license=provenance.license,
+        origin=provenance.origin,
     )
+
+
+def checked_folder(name_or_folder: str | Path, names: Collection[str] | None = None) -> Path | None:
+    """The folder that ``load_model`` reads; None where weights would be random, or for no size.
+
+    Shipped folders have checksums, others may; with ``names`` only those files are compared.
+
+    Raises:
+        FileFormatError: a file is damaged.
+    """
+    given = Path(name_or_folder)
+    shipped = None if _is_folder(given) else shipped_folder(str(name_or_folder))
+    if shipped is not None:
+        require_whole(shipped, "install diff4splat again", names)
+        return shipped
+    if not _is_folder(given):
+        return None
+    if (given / SUMS_FILE).is_file():
+        require_whole(given, "fetch the model again", names)
+    return given
 
 
 def find_config(name_or_folder: str | Path) -> ModelConfig:
     """The configuration alone, without any weights.
 
     Raises:
-        ConfigError, CheckpointError: as ``load_model``.
+        ConfigError, CheckpointError, FileFormatError: as ``load_model``.
     """
-    folder = Path(name_or_folder)
-    return load_config(folder) if _is_folder(folder) else size_by_name(str(name_or_folder))
+    folder = checked_folder(name_or_folder, (CONFIG_FILE,))
+    return size_by_name(str(name_or_folder)) if folder is None else load_config(folder)
 
 
 def with_text_encoder(model: Model) -> Model:
     """The same model with its text encoder; the other networks are shared."""
     if model.networks.text_encoder is not None:
         return model
-    if model.folder is None:
+    if model.folder is None or _has_no_text_encoder(model.folder):
         encoder = create_text_encoder(model.config)
     else:
         encoder = load_text_encoder(model.folder, model.config)
@@ -93,10 +159,13 @@ def with_text_encoder(model: Model) -> Model:
 
 
 def save_model(model: Model, folder: Path) -> None:
-    """Write a folder that ``load_model`` reads, text encoder included."""
+    """Write a folder that ``load_model`` reads, text encoder included, without checksums."""
     complete = with_text_encoder(model)
-    provenance = {"format": "diff4splat-model", "version": 1, "untrained": model.untrained}
-    write_text(folder / PROVENANCE_FILE, json.dumps(provenance, indent=2) + "\n")
+    write_provenance(
+        ModelProvenance(trained=model.trained, license=model.license, origin=model.origin), folder
+    )
+    # Checksums of what lay there before would call the new files damaged.
+    (folder / SUMS_FILE).unlink(missing_ok=True)
     save_networks(complete.networks, model.config, folder)
 
 
@@ -107,18 +176,9 @@ def _is_folder(folder: Path) -> bool:
         return False  # longer than any name
 
 
-def _is_untrained(folder: Path) -> bool:
-    """What the provenance file says; a model without one counts as untrained."""
-    file = folder / PROVENANCE_FILE
-    if not file.is_file():
-        return True
-    try:
-        return bool(json.loads(file.read_text(encoding="utf-8"))["untrained"])
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise CheckpointError(
-            f"{file}: expected a JSON object with 'untrained', got something else; "
-            "fetch the model again"
-        ) from error
+def _has_no_text_encoder(folder: Path) -> bool:
+    lacking = "text_encoder" in read_provenance(folder).may_lack
+    return lacking and not part_file(folder, "text_encoder").is_file()
 
 
 def _require_memory(config: ModelConfig) -> None:

@@ -20,8 +20,11 @@ from diff4splat.models.deformation_heads import (
     keyframe_motion,
     raw_scales,
 )
+from diff4splat.models.detail.deformation import DetailDeformation
+from diff4splat.models.detail.scene import canonical_gaussians
+from diff4splat.models.detail.sight import Sight
 from diff4splat.models.heads import PixelBase, activate
-from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.protocol import Motion
@@ -37,8 +40,15 @@ class Canonical:
 
     gaussians: Gaussians
     cells: Int[Tensor, " m"]
-    """Where each lies in the grid."""
+    """Where each lies in the grid; Gaussians behind the first m belong to no cell and stand."""
     maps: ReconstructionMaps
+
+    @property
+    def every_cell(self) -> Int[Tensor, " n"]:
+        """The cell of every Gaussian; those without one get the number after the last."""
+        grid = self.maps.gaussians[0, 0].numel()
+        without = self.cells.new_full((len(self.gaussians) - len(self.cells),), grid)
+        return torch.cat([self.cells, without])
 
 
 def reconstruct(maps: ReconstructionMaps, base: PixelBase, config: ActivationConfig) -> Canonical:
@@ -46,6 +56,17 @@ def reconstruct(maps: ReconstructionMaps, base: PixelBase, config: ActivationCon
     gaussians = activate(maps.gaussians[0].float(), base, config)
     cells = torch.arange(len(gaussians), device=gaussians.means.device)
     return Canonical(gaussians=gaussians, cells=cells, maps=maps)
+
+
+def reconstruct_detailed(
+    maps: ReconstructionMaps, sight: Sight, config: ActivationConfig, log: RunLog
+) -> Canonical:
+    """Gaussians of key frames and surroundings; pixels that earlier frames show are left out."""
+    found = canonical_gaussians(maps, sight, config)
+    if found.doubled:
+        why, saved = "an earlier key frame shows the same points", f"{found.doubled:,} Gaussians"
+        log.left_out("doubled pixels", why, saved)
+    return Canonical(gaussians=found.gaussians, cells=found.cells, maps=maps)
 
 
 def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canonical:
@@ -68,13 +89,13 @@ def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canoni
         )
     return Canonical(
         gaussians=canonical.gaussians.select(kept),
-        cells=canonical.cells[kept],
+        cells=canonical.cells[kept[: len(canonical.cells)]],
         maps=canonical.maps,
     )
 
 
 def deform(
-    network: DeformationNetwork,
+    network: DeformationNetwork | DetailDeformation,
     canonical: Canonical,
     key_times_s: Float[Tensor, " k"],
     units: DeformationUnits,

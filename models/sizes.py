@@ -7,6 +7,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config import (
     ActivationConfig,
     DeformationConfig,
+    DetailConfig,
     DitConfig,
     LdrmConfig,
     ModelConfig,
@@ -40,14 +41,15 @@ def small_size() -> ModelConfig:
     """Under 20 million weights: runs on two CPU cores in seconds, and can be trained there."""
     return ModelConfig(
         name="small",
-        frames=17,
-        size_px=(256, 256),
-        vae=VaeConfig(latent_channels=16, widths=(32, 64, 96), pixel_patch=2),
+        frames=9,
+        size_px=(64, 64),
+        vae=VaeConfig(latent_channels=64, widths=(32, 64, 96), pixel_patch=2, linear_code=True),
         text=TextConfig(width=128, blocks=3, heads=4, feedforward_width=256),
         dit=DitConfig(width=256, blocks=8, heads=4, feedforward_width=768, camera_width=64),
-        ldrm=LdrmConfig(width=160, heads=4, feedforward_width=640),
-        deformation=DeformationConfig(width=128),
+        ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
+        deformation=DeformationConfig(width=64, blocks=3, octaves=3),
         activation=ActivationConfig(),
+        detail=DetailConfig(width=48),
     )
 
 

@@ -9,12 +9,13 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.errors import ShapeError
-from diff4splat.geometry.rays import plucker_map, relative_to_first
-from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
+from diff4splat.geometry.rays import relative_to_first
+from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.deformation_heads import DeformationUnits
+from diff4splat.models.latents_to_scene import VideoLatent, canonical_scene
 from diff4splat.models.picture import Picture
 from diff4splat.models.pretrained import Model
-from diff4splat.models.reconstruction import deform, prune_cells, reconstruct
+from diff4splat.models.reconstruction import deform
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.still import drop_still_tracks
 from diff4splat.paths.camera_path import CameraPath
@@ -45,12 +46,12 @@ def scene_from_video(
     cameras = relative_to_first(path.cameras.to(torch.float32)).to(model.device)
     shown = video.to(model.device).float()
     with log.phases.phase("reconstruct"):
-        latent = model.networks.vae.encode(shown.movedim(-1, 0)[None] * 2 - 1).mean
-        maps = model.networks.ldrm(latent, plucker_map(cameras).movedim(0, 1)[None])
-        picture = Picture(rgb=shown[0], camera=cameras[0], focal_source="video")
-        base = plane_base(picture, cameras, model.config.ldrm.grid_stride)
-        whole = reconstruct(maps, base, model.config.activation)
-        canonical = prune_cells(whole, settings.min_opacity, log)
+        seen = VideoLatent(
+            latent=model.networks.vae.encode(shown.movedim(-1, 0)[None] * 2 - 1).mean,
+            picture=Picture(rgb=shown[0], camera=cameras[0], focal_source="video"),
+            cameras=cameras,
+        )
+        canonical = canonical_scene(model, seen, settings.min_opacity, log)
     units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.config.activation)
     times_s = path.times_s.float().to(model.device)
     scene = Scene(
@@ -67,7 +68,7 @@ def _provenance(model: Model) -> Provenance:
         generator=f"diff4splat {__version__} reconstruction",
         model=model.config.name,
         weights_sha256=model.weights_sha256,
-        untrained=model.untrained,
+        untrained=not model.reconstructs,
     )
 
 

@@ -13,12 +13,16 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.errors import ShapeError
+from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.config_parts import TIME_STRIDE, VaeConfig
+from diff4splat.models.linear_code import LinearCode
 from diff4splat.models.vae_decoder import VaeDecoder
 from diff4splat.models.vae_encoder import VaeEncoder
 
 LOG_VARIANCE_RANGE = (-30.0, 20.0)
 """Clamp that keeps exp() finite in float32 and half precision losses (Stable Diffusion)."""
+FIRST_LOG_VARIANCE = -6.0
+"""Of latents around a linear code of variance 1: noise that costs no more than the code itself."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +45,7 @@ class VideoVae(nn.Module):
         self.config = config
         self.encoder = VaeEncoder(config)
         self.decoder = VaeDecoder(config)
+        self.code = _linear_code(config, self.encoder, self.decoder)
         self.register_buffer("latent_mean", torch.zeros(config.latent_channels))
         self.register_buffer("latent_std", torch.ones(config.latent_channels))
 
@@ -52,6 +57,8 @@ class VideoVae(nn.Module):
         """
         self._require_shape(video)
         mean, log_variance = self.encoder(video).chunk(2, 1)
+        if self.code is not None:
+            mean = mean + self.code.encode(video)
         shift, std = self._statistics()
         return LatentDistribution(
             mean=(mean - shift) / std,
@@ -71,7 +78,9 @@ class VideoVae(nn.Module):
         A pure function: chunks in a row give the frames that one pass gives.
         """
         shift, std = self._statistics()
-        return self.decoder(latent * std + shift, caches)
+        raw = latent * std + shift
+        video, caches = self.decoder(raw, caches)
+        return (video if self.code is None else video + self.code.decode(raw)), caches
 
     def initial_caches(self, latent: Float[Tensor, "b c t h w"]) -> tuple[Tensor, ...]:
         """The caches to begin a video of this latent's size with."""
@@ -100,3 +109,15 @@ class VideoVae(nn.Module):
                 f"video size: expected sides that are multiples of {stride} px, "
                 f"got {height} by {width}; crop or pad"
             )
+
+
+def _linear_code(config: VaeConfig, encoder: VaeEncoder, decoder: VaeDecoder) -> LinearCode | None:
+    """The code, if asked for; convolutions then start as no correction at all."""
+    if not config.linear_code:
+        return None
+    zero_(encoder.conv_out)
+    zero_(decoder.conv_out)
+    torch.nn.init.constant_(
+        encoder.conv_out.conv.bias[config.latent_channels :], FIRST_LOG_VARIANCE
+    )
+    return LinearCode(config)

@@ -57,6 +57,11 @@ def write_statistics(statistics: Statistics, folder: Path) -> None:
     write_tensors(content, folder / FILE)
 
 
+def has_statistics(folder: Path) -> bool:
+    """Whether the autoencoder's stage came to a stop there."""
+    return (folder / FILE).is_file()
+
+
 def read_statistics(folder: Path) -> Statistics:
     """What ``write_statistics`` wrote.
 

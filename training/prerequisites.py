@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import Networks, create_networks
-from diff4splat.training.latent_statistics import read_statistics
+from diff4splat.training.latent_statistics import has_statistics, read_statistics
 from diff4splat.training.recipe import Recipe, StageRecipe
 from diff4splat.training.stages.factory import STAGES
 from diff4splat.training.trainer.checkpoint_files import read_checkpoint
@@ -76,12 +76,21 @@ def trained_networks(recipe: Recipe, folder: Path) -> tuple[Networks, frozenset[
     Raises:
         CheckpointError, FileFormatError: as ``starting_networks``.
     """
-    begun = [stage for stage in recipe.stages if (folder / stage.name / RESULT_FILE).is_file()]
+    begun = [stage for stage in recipe.stages if _has_weights(stage, folder / stage.name)]
     finished = [stage for stage in begun if read_result(folder / stage.name).finished]
     sources = {part: stage for stage in begun for part in stage.trained}
     networks = create_networks(recipe.model, seed=recipe.seed)
     done = frozenset(part for stage in finished for part in stage.trained)
     return _filled(networks, sources, folder), done
+
+
+def _has_weights(stage: StageRecipe, place: Path) -> bool:
+    """Whether a stage came so far that others can use what it has learnt.
+
+    An autoencoder that learns beside another stage has no statistics yet.
+    """
+    usable = "vae" not in stage.trained or has_statistics(place)
+    return usable and (place / RESULT_FILE).is_file()
 
 
 def _filled(networks: Networks, sources: Mapping[str, StageRecipe], folder: Path) -> Networks:

@@ -10,11 +10,13 @@ from typing import Literal
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config import ModelConfig
+from diff4splat.models.config_parts import TIME_STRIDE
 
-StageKind = Literal["vae", "static", "dynamic", "generator", "joint"]
+StageKind = Literal["vae", "sight", "static", "dynamic", "generator", "joint"]
 Precision = Literal["float32", "bfloat16"]
 Parallel = Literal["none", "ddp", "fsdp2"]
 Direction = Literal["at_least", "at_most"]
+RECONSTRUCTING = ("sight", "static", "dynamic", "joint")
 
 
 def _require(holds: bool, what: str, expected: str, got: object) -> None:
@@ -34,6 +36,8 @@ class LossWeights:
     """λ_p, LPIPS beside the squared error (paper)."""
     depth: float = 0.5
     """λ_geo, 1 − Pearson on rendered depth (paper)."""
+    depth_log: float = 0.0
+    """|log depth − log truth| of the Gaussians themselves at their own pixels (after MoVieS)."""
     smoothness: float = 0.1
     """Total variation of rendered depth; part of L_geo, its weight is not in the paper (ours)."""
     motion: float = 2.0
@@ -105,12 +109,21 @@ class DataSettings:
     sources: tuple[SourceSettings, ...] = (SourceSettings(),)
     size_px: tuple[int, int] = (128, 128)
     frames: int = 17
+    """Of the input video."""
+    input_stride: int = 1
+    """Clip frames per input frame; those between are seen by targets alone (unseen times)."""
+    augment: bool = False
+    """Other input views, mirrored and backwards clips; only for stages without text."""
+    crop_px: tuple[int, int] = (0, 0)
+    """Random window (height, width) cut out of pictures of ``size_px``; 0 takes the whole."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4
     """Supervised (view, time) pairs per sample and step."""
     tracks: int = 512
     """Tracked points per clip."""
+    track_stride: int = 1
+    """Input frames from one to the next whose pixels carry Gaussians, and so can be followed."""
     workers: int = 1
     """Processes that make samples; 0 makes them in the training process."""
     least_depth_share: float = 0.01
@@ -119,15 +132,23 @@ class DataSettings:
     def __post_init__(self) -> None:
         weight = sum(source.weight for source in self.sources)
         _require(weight > 0, "data.sources", "some with a weight above 0", f"{len(self.sources)}")
-        for name in ("frames", "views", "target_frames"):
+        for name in ("frames", "input_stride", "track_stride", "views", "target_frames"):
             value = getattr(self, name)
             _require(value >= 1, f"data.{name}", "at least 1", value)
         for name in ("tracks", "workers"):
             value = getattr(self, name)
             _require(value >= 0, f"data.{name}", "at least 0", value)
         _require(min(self.size_px) >= 8, "data.size_px", "sides of at least 8", self.size_px)
+        cuts = zip(self.crop_px, self.size_px, strict=True)
+        fits = max(self.crop_px) == 0 or all(0 < part <= whole for part, whole in cuts)
+        _require(fits, "data.crop_px", "0, or sides that size_px has room for", self.crop_px)
         share = self.least_depth_share
         _require(0 <= share <= 1, "data.least_depth_share", "0 to 1", share)
+
+    @property
+    def clip_frames(self) -> int:
+        """Frames of a clip from the first input frame to the last."""
+        return 1 + (self.frames - 1) * self.input_stride
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,6 +176,8 @@ class StageRecipe:
     optimizer: OptimizerSettings = field(default_factory=OptimizerSettings)
     data: DataSettings = field(default_factory=DataSettings)
     gates: tuple[Gate, ...] = ()
+    true_pictures: bool = False
+    """The detail decoder sees the clip's pictures instead of decoded ones: a shorter step."""
     text_dropout: float = 0.1
     """Share of steps without text, for guidance (public code of the paper: 0.1)."""
     level_shift: float = 1.0
@@ -188,6 +211,8 @@ class TrainerSettings:
     most_skips_in_a_row: int = 20
     """Steps without a finite gradient before the run gives up."""
     most_skips_share: float = 0.01
+    outlier_factor: float = 50.0
+    """A loss this many times its running median is not learnt from; 0 learns from everything."""
     spike_factor: float = 5.0
     """A loss this many times its running median is a spike; 0 switches the watch off."""
     spikes_before_rollback: int = 3
@@ -215,6 +240,20 @@ class Recipe:
     def __post_init__(self) -> None:
         names = [stage.name for stage in self.stages]
         _require(len(set(names)) == len(names) > 0, "stages", "different names", ", ".join(names))
+        for stage in self.stages:
+            self._require_fit(stage)
+
+    def _require_fit(self, stage: StageRecipe) -> None:
+        """Stages that see need a detail decoder; with one, only key frames have Gaussians."""
+        what, detail = f"stage {stage.name}", self.model.detail.used
+        seen = stage.kind != "sight" or (detail and stage.true_pictures)
+        _require(seen, what, "a detail decoder and true_pictures for its kind", "neither or one")
+        told = stage.data.augment and stage.kind in ("generator", "joint")
+        _require(not told, f"{what}: data.augment", "false where captions are read", "true")
+        stride, framed = stage.data.track_stride, detail and stage.kind in RECONSTRUCTING
+        fits = not framed or stride == TIME_STRIDE
+        key_frames = f"{TIME_STRIDE} with a detail decoder"
+        _require(fits, f"{what}: data.track_stride", key_frames, stride)
 
     def stage(self, name: str) -> StageRecipe:
         """The stage of that name.

@@ -15,6 +15,7 @@ from diff4splat.models.pretrained import Model, save_model
 from diff4splat.report.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latent_statistics import CLIPS, measure_statistics, write_statistics
+from diff4splat.training.linear_start import start_from_components
 from diff4splat.training.prerequisites import (
     continued_stage,
     last_checkpoint,
@@ -70,6 +71,8 @@ def train_stage(asked: StageRun) -> StageResult:
         seed=recipe.seed,
         features=load_features(asked.features),
     )
+    if "vae" in stage_recipe.trained and networks.vae.code is not None:
+        start_from_components(networks.vae, samples, asked.phases)
     stage = create_stage(networks, plan)
     result = run_stage(stage, samples, stage_recipe, _settings(asked, plan))
     if is_first_process():
@@ -102,9 +105,7 @@ def _hand_over(asked: StageRun, stage: StageRecipe, samples: ClipSamples) -> Non
     if "vae" in stage.trained:
         _measure_latents(asked, stage, samples)
     networks, trained = trained_networks(asked.recipe, asked.folder)
-    model = Model(
-        config=asked.recipe.model, networks=networks, untrained=not trained.issuperset(PARTS)
-    )
+    model = Model(config=asked.recipe.model, networks=networks, trained=trained)
     save_model(model, asked.folder / MODEL_FOLDER)
     missing = ", ".join(part for part in PARTS if part not in trained)
     state = f"not trained to the end: {missing}" if missing else "every part is trained"

@@ -17,11 +17,11 @@ class Evaluate:
     """Measure a model on held-out clips, with trivial baselines in the same table."""
 
     model: str = "small"
-    """A model folder, or the name of a size with random weights: test, small."""
-    protocol: str = "held_out_v1"
+    """A model folder, or a size (test, small): its shipped weights, else random ones."""
+    protocol: str = "held_out_v2"
     """Name of a protocol that ships, or a JSON file of your own."""
     task: Literal["generation", "reconstruction", "text"] = "generation"
-    """From the first picture; from the whole input video; or does the text decide what moves."""
+    """From the first picture; from the input video; or does the text decide what moves."""
     out: Path = Path("evaluation")
     """Folder for the results."""
     items: int | None = None
@@ -73,6 +73,7 @@ class Evaluate:
 
     def subject(self) -> "Subject":
         """The model in the role that the task asks for."""
+        from dataclasses import replace
         from functools import partial
 
         from diff4splat.models.pipeline import Diff4SplatPipeline
@@ -88,7 +89,9 @@ class Evaluate:
         pipeline = Diff4SplatPipeline.from_pretrained(self.model)
         if self.task != "reconstruction":
             return Generator(pipeline=pipeline, settings=settings)
-        identity = model_identity(pipeline, "reconstruction")
+        identity = replace(
+            model_identity(pipeline, "reconstruction"), untrained=not pipeline.model.reconstructs
+        )
         return Reconstructor(
             reconstruct=partial(reconstruct_clip, pipeline.model), identity=identity
         )

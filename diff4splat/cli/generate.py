@@ -36,7 +36,7 @@ class Generate:
     seed: int = 0
     """One seed gives one scene, bit for bit on one machine."""
     model: str = "small"
-    """A model folder, or the name of a size with random weights: test, small."""
+    """A model folder, or a size (test, small): its shipped weights, else random ones."""
     resolution: int | None = None
     """Side of a square with as many pixels as the picture will have; if left out, the model's."""
     fov: float | None = None

@@ -1,4 +1,4 @@
-"""``diff4splat inspect``: what a network size holds, or what a scene file contains."""
+"""``diff4splat inspect``: what a network size holds, what a model knows, what a scene contains."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +11,26 @@ from diff4splat.errors import ConfigError
 
 @dataclass(frozen=True, kw_only=True)
 class Inspect:
-    """Show the contents of a scene file, or the parameter counts of a network size."""
+    """Show a scene file, the parameter counts of a network size, or which parts are trained."""
 
     scene: Annotated[Path | None, tyro.conf.Positional] = None
     """A scene file."""
     config: str | None = None
     """A network size: test, small or paper. Nothing is allocated, whatever the size."""
+    model: str | None = None
+    """A model folder or the name of a size: which parts are trained, hash, licence and origin."""
 
     def run(self) -> None:
         """Print a table to standard output."""
-        if (self.scene is None) == (self.config is None):
-            raise ConfigError("inspect: expected a scene file or --config NAME, one of the two")
-        lines = scene_lines(self.scene) if self.config is None else size_lines(self.config)
-        print("\n".join(lines))
+        asked = ((self.scene, scene_lines), (self.config, size_lines), (self.model, model_lines))
+        given = [(value, lines) for value, lines in asked if value is not None]
+        if len(given) != 1:
+            raise ConfigError(
+                "inspect: expected one of a scene file, --config NAME and --model NAME, "
+                f"got {len(given)}"
+            )
+        ((value, lines),) = given
+        print("\n".join(lines(value)))
 
 
 def size_lines(name: str) -> list[str]:
@@ -38,6 +45,27 @@ def size_lines(name: str) -> list[str]:
         f"{'network':<{width}}  {'parameters':>16}",
         *rows,
         f"{'total':<{width}}  {sum(counts.values()):>16,}",
+    ]
+
+
+def model_lines(name: str) -> list[str]:
+    """Parts with their state, where the weights lie, their hash, licence and origin."""
+    from diff4splat.models.factory import parameter_counts
+    from diff4splat.models.model_facts import model_facts
+
+    facts = model_facts(name)
+    counts = parameter_counts(facts.config)
+    rows = [f"{part:<16}{count:>16,}  {facts.states[part]}" for part, count in counts.items()]
+    told = {
+        "weights": facts.place,
+        "weights_sha256": facts.weights_sha256,
+        "license": facts.provenance.license,
+        "origin": facts.provenance.origin,
+    }
+    return [
+        f"{'network':<16}{'parameters':>16}  state",
+        *rows,
+        *(f"{key:<16}{value}" for key, value in told.items()),
     ]
 
 

@@ -12,6 +12,7 @@ from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
+from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareSynthetic
 from diff4splat.cli.render import Render
@@ -34,6 +35,7 @@ Command = (
     | Annotated[Report, subcommand("report", description="Error against run time.")]
     | Annotated[Prepare, subcommand("prepare", description="Clips to train on: make, check.")]
     | Annotated[Train, subcommand("train")]
+    | Annotated[Pack, subcommand("pack")]
     | Annotated[Evaluate, subcommand("eval")]
     | Annotated[Doctor, subcommand("doctor")]
 )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
@@ -60,7 +60,7 @@ class Camera:
     def __len__(self) -> int:
         return self.batch_shape[0]
 
-    def __getitem__(self, index: int | slice) -> "Camera":
+    def __getitem__(self, index: int | slice | Int[Tensor, " m"]) -> "Camera":
         return replace(
             self,
             focal_px=self.focal_px[index],

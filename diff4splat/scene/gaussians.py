@@ -45,8 +45,8 @@ class Gaussians:
         """Highest spherical-harmonic degree, 0 for plain colour."""
         return BAND_SIZES.index(self.sh.shape[1])
 
-    def select(self, index: Bool[Tensor, " n"] | Int[Tensor, " m"]) -> "Gaussians":
-        """The Gaussians under a mask or at indices."""
+    def select(self, index: Bool[Tensor, " n"] | Int[Tensor, " m"] | slice) -> "Gaussians":
+        """The Gaussians under a mask or at indices; those of a slice share storage."""
         return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
     def to(self, target: torch.device | torch.dtype) -> "Gaussians":

@@ -15,7 +15,7 @@ from diff4splat.geometry.rays import camera_rays, pixel_centers, plucker_map, wo
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.deformation import DeformationNetwork
 from diff4splat.models.deformation_heads import DeformationUnits
-from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.reconstruction import Canonical, deform

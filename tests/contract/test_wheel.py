@@ -1,13 +1,16 @@
 """What would be installed: every module of every folder, and nothing at the top level but ours."""
 
 import runpy
+import shutil
 from pathlib import Path
 
 import pytest
 import setuptools
+from setuptools.dist import Distribution
 
 ROOT = Path(__file__).parents[2]
 MOUNTED = ("models", "data_prep", "training", "configs")
+SHIPPED = ("config.json", "provenance.json", "vae.safetensors", "SHA256SUMS", "CARD.md")
 
 
 def packages(monkeypatch: pytest.MonkeyPatch) -> tuple[set[str], dict[str, str]]:
@@ -38,6 +41,35 @@ def test_every_folder_with_modules_is_a_package(monkeypatch: pytest.MonkeyPatch)
 def test_nothing_else_lands_in_site_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _ = packages(monkeypatch)
     assert {name.split(".")[0] for name in found} == {"diff4splat"}
+
+
+def test_weights_and_protocols_are_installed_as_data(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path)
+    weights, protocols = "models/weights/small", "training/evaluation/protocols"
+    expected = {f"{weights}/{name}" for name in SHIPPED} | {f"{protocols}/held_out_v1.json"}
+    modules = [f"{name}/__init__.py" for name in ("diff4splat", *MOUNTED, "training/evaluation")]
+    for name in [*expected, *modules, f"{protocols}/__init__.py"]:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert data_files(tmp_path, monkeypatch) == expected
+
+
+def data_files(project: Path, monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    """Everything but modules that setuptools would install, by its place in the project."""
+    handed = {}
+    monkeypatch.setattr(setuptools, "setup", handed.update)
+    monkeypatch.chdir(project)
+    runpy.run_path("setup.py")
+    distribution = Distribution(handed)
+    distribution.parse_config_files()
+    assert distribution.include_package_data is False  # else folders of data count as packages
+    build = distribution.get_command_obj("build_py")
+    build.ensure_finalized()
+    listed = build.data_files
+    return {str(Path(folder, name)) for _, folder, _, names in listed for name in names}
 
 
 def has_modules(folder: Path) -> bool:

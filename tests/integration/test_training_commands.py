@@ -57,7 +57,7 @@ def test_every_stage_is_trained(course: Path, capsys: pytest.CaptureFixture[str]
         assert len(rows(course / stage, "step")) == 2
         assert len(list((course / stage / "panels").glob("*.png"))) == 1
     provenance = json.loads((course / "model" / "provenance.json").read_text())
-    assert provenance["untrained"] is False
+    assert provenance["trained"] == ["vae", "text_encoder", "dit", "ldrm", "deformation"]
 
 
 def test_the_trained_model_makes_a_scene(

@@ -7,6 +7,7 @@ from oracles_clips import make_clip
 from torch import Tensor
 
 from diff4splat.configs.recipes import recipe_by_name
+from diff4splat.models.config import ModelConfig
 from diff4splat.models.factory import create_networks
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
@@ -37,9 +38,9 @@ def stage_recipe(name: str, **losses: float) -> StageRecipe:
     return replace(recipe, losses=replace(recipe.losses, **losses))
 
 
-def make_stage(recipe: StageRecipe, seed: int = 0) -> ModelStage:
+def make_stage(recipe: StageRecipe, seed: int = 0, model: ModelConfig | None = None) -> ModelStage:
     """The stage with random networks."""
-    model = recipe_by_name("test").model
+    model = model or recipe_by_name("test").model
     plan = StagePlan(model=model, recipe=recipe, seed=seed, features=SquaredDifference())
     return create_stage(create_networks(model), plan)
 

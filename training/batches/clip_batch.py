@@ -24,6 +24,8 @@ class ClipBatch:
     video: UInt8[Tensor, "b f h w 3"]
     cameras: Camera
     """Batch shape (b, f); the first of each sample is the identity."""
+    depth: Float[Tensor, "b g h w"]
+    """z of the input frames whose pixels carry Gaussians; 0 where there is none."""
     target_rgb: UInt8[Tensor, "b m p h w 3"]
     target_depth: Float[Tensor, "b m p h w"]
     """z; 0 where there is none."""

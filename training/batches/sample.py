@@ -12,6 +12,7 @@ from torch import Tensor
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, stack_cameras
+from diff4splat.training.batches.augment import augmented
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.scale import normalized
@@ -37,16 +38,18 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
     """
     generator = origin.key.generator()
     _require_views(clip, settings.views)
-    clip = resized(cut(clip, settings.frames, generator), settings.size_px)
+    clip = resized(cut(clip, settings.clip_frames, generator), settings.size_px)
+    clip = augmented(clip, settings, generator)
     clip = normalized(clip, settings.least_depth_share)
     targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
-    tracks = draw_tracks(clip, targets.frames, settings.tracks, generator)
-    view = clip.views[INPUT_VIEW]
+    tracks = draw_tracks(clip, targets.frames, settings, generator)
+    view, shown = clip.views[INPUT_VIEW], slice(None, None, settings.input_stride)
     return ClipBatch(
         sample_index=torch.tensor([origin.key.sample]),
         source=(origin.source,),
-        video=view.rgb[None],
-        cameras=stack_cameras([view.cameras]).to(torch.float32),
+        video=view.rgb[None, shown],
+        cameras=stack_cameras([view.cameras[shown]]).to(torch.float32),
+        depth=view.depth[None, shown][:, :: settings.track_stride].float(),
         target_rgb=_pictures(clip, targets, "rgb")[None],
         target_depth=_pictures(clip, targets, "depth").float()[None],
         target_cameras=stack_cameras([_target_cameras(clip, targets)]).to(torch.float32),

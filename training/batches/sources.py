@@ -128,7 +128,7 @@ def world_clips(settings: SourceSettings, data: DataSettings, seed: int) -> "Wor
         seed=seed,
         split=settings.split,
         still_share=settings.still_share,
-        frames=data.frames,
+        frames=data.clip_frames,
         size_px=data.size_px,
         views=data.views,
     )

@@ -15,6 +15,8 @@ from diff4splat.data.clip import Clip
 from diff4splat.training.recipe import DataSettings
 
 INPUT_VIEW = 0
+LEAST_MOTION = 0.02
+"""Way of a point, in units of which the plane stands at 4, that counts as motion."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,24 +54,43 @@ def draw_targets(
 
 
 def draw_tracks(
-    clip: Clip, target_frames: Int[Tensor, " m"], count: int, generator: torch.Generator
+    clip: Clip,
+    target_frames: Int[Tensor, " m"],
+    settings: DataSettings,
+    generator: torch.Generator,
 ) -> TrackTargets:
-    """Up to ``count`` points, each at one of the frames in which the input view sees it."""
-    seen = seen_cells(clip)
+    """Points, each at one of the input frames in which the input view sees it."""
+    count, seen = settings.tracks, seen_cells(clip)
+    seen = seen[seen[:, 1] % (settings.input_stride * settings.track_stride) == 0]
     chosen = torch.randperm(len(seen), generator=generator)
     # One cell per point: the first of its frames in random order.
     point = seen[chosen, 0]
     first = _first_of_each(point)
-    seen = seen[chosen[first]][:count]
+    seen = _balanced(seen[chosen[first]], clip, count)
     offset = torch.zeros(len(target_frames), count, 3)
     cell = torch.zeros(count, 3, dtype=torch.long)
     valid = torch.arange(count) < len(seen)
     if len(seen):
         cell[: len(seen)] = seen[:, 1:]
+        cell[:, 0] //= settings.input_stride
         positions = clip.tracks.positions
         here = positions[seen[:, 1], seen[:, 0]]
         offset[:, : len(seen)] = positions[target_frames][:, seen[:, 0]] - here
     return TrackTargets(cell=cell, offset=offset, valid=valid)
+
+
+def _balanced(seen: Int[Tensor, "u 4"], clip: Clip, count: int) -> Int[Tensor, "s 4"]:
+    """Up to ``count`` rows; points that move come first, for at most half of them.
+
+    Most points of most clips stand still, and the median of their displacements, which a distance
+    is minimised by, would be nothing at all.
+    """
+    if not len(seen):
+        return seen
+    positions = clip.tracks.positions[:, seen[:, 0]]
+    moves = (positions - positions[:1]).norm(dim=-1).amax(0) > LEAST_MOTION
+    first = moves & (moves.cumsum(0) <= count // 2)
+    return torch.cat([seen[first], seen[~first & ~moves], seen[~first & moves]])[:count]
 
 
 def seen_cells(clip: Clip) -> Int[Tensor, "s 4"]:
@@ -78,7 +99,7 @@ def seen_cells(clip: Clip) -> Int[Tensor, "s 4"]:
     if clip.tracks is None or view.track_uv is None or view.track_visible is None:
         return torch.zeros(0, 4, dtype=torch.long)
     frame, point = view.track_visible.nonzero(as_tuple=True)
-    column, row = view.track_uv[frame, point].long().unbind(-1)
+    column, row = view.track_uv[frame, point].floor().long().unbind(-1)
     height, width = view.cameras.size_px
     inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
     if view.instances is not None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import torch
 
-from diff4splat.data.clip import Clip
+from diff4splat.data.clip import Clip, Tracks
 from diff4splat.errors import InputError
 from diff4splat.training.batches.targets import INPUT_VIEW
 
@@ -26,7 +26,7 @@ def cut(clip: Clip, frames: int, generator: torch.Generator) -> Clip:
     if clip.frames == frames:
         return clip
     first = int(torch.randint(clip.frames - frames + 1, (), generator=generator))
-    return _from_first_camera(_frames(clip, slice(first, first + frames)))
+    return from_first_camera(_frames(clip, slice(first, first + frames)))
 
 
 def _frames(clip: Clip, window: slice) -> Clip:
@@ -45,11 +45,16 @@ def _frames(clip: Clip, window: slice) -> Clip:
     )
     tracks = clip.tracks
     if tracks is not None:
-        tracks = replace(tracks, positions=tracks.positions[window])
+        tracks = replace(unplaced(tracks), positions=tracks.positions[window])
     return replace(clip, times_s=clip.times_s[window], views=views, tracks=tracks)
 
 
-def _from_first_camera(clip: Clip) -> Clip:
+def unplaced(tracks: Tracks) -> Tracks:
+    """The same points; where they were chosen is no longer said, as that may have been cut off."""
+    return replace(tracks, found_at=torch.full_like(tracks.found_at, -1))
+
+
+def from_first_camera(clip: Clip) -> Clip:
     """The clip in the world of its first input camera."""
     first_from_world = clip.views[INPUT_VIEW].cameras.camera_from_world[0]
     views = tuple(

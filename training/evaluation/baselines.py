@@ -1,9 +1,9 @@
 """Answers that need no model. A system that does not beat them has learnt nothing of the clip.
 
 Axes: ``h w`` pixels, ``n`` points, ``t`` times. All see what the system under test sees: the first
-picture, or for reconstruction the whole input video, of which each judged time gets the nearest
-frame. The best plane chooses its depth by looking at the truth: an oracle, a bound on what one
-constant depth can do.
+picture, or for reconstruction the given frames of the input video, of which each judged time gets
+the nearest. The best plane chooses its depth by looking at the truth: an oracle, a bound on what
+one constant depth can do.
 """
 
 from dataclasses import dataclass

@@ -17,14 +17,15 @@ class Column:
 
     key: str
     title: str
-    better: Literal["higher", "lower"]
+    better: Literal["higher", "lower", "neither"]
+    """Neither: it says something of the clips, not of the rows."""
     meaning: str
     tasks: tuple[Task, ...] = ("generation", "reconstruction")
 
     @property
     def sign(self) -> int:
-        """Times a difference, above 0 means better."""
-        return 1 if self.better == "higher" else -1
+        """Times a difference, above 0 means better; 0 where nothing is."""
+        return {"higher": 1, "lower": -1, "neither": 0}[self.better]
 
 
 COLUMNS = (
@@ -33,6 +34,18 @@ COLUMNS = (
         title="PSNR [dB]",
         better="higher",
         meaning=f"colour of the judged pictures, capped at {PSNR_CAP_DB:g} per picture",
+    ),
+    Column(
+        key="covisible_psnr",
+        title="PSNR seen [dB]",
+        better="higher",
+        meaning="PSNR over the pixels whose surface the input shows, as true depth tells",
+    ),
+    Column(
+        key="covisible_share",
+        title="seen",
+        better="neither",
+        meaning="share of such pixels in the judged pictures; it depends on the clips alone",
     ),
     Column(key="ssim", title="SSIM", better="higher", meaning="structure of the judged pictures"),
     Column(

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Bool
+from torch import Tensor
 
 from diff4splat.data.clip import Clip
 from diff4splat.errors import ConfigError, InputError
@@ -12,6 +14,7 @@ from diff4splat.training.evaluation.baselines import BASELINES, ZERO_MOTION, mak
 from diff4splat.training.evaluation.camera_measures import pose_entries
 from diff4splat.training.evaluation.case import Case, clip_sha256, make_case
 from diff4splat.training.evaluation.columns import SYSTEM
+from diff4splat.training.evaluation.covisibility import covisible
 from diff4splat.training.evaluation.picture_measures import Entries, picture_entries
 from diff4splat.training.evaluation.protocol import Protocol, Task
 from diff4splat.training.evaluation.records import ItemResult, Score, Skip
@@ -46,6 +49,15 @@ class Setup:
             )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Truth:
+    """What all rows of an item are held against, computed once."""
+
+    followed: list[Followed]
+    seen: Bool[Tensor, "p h w"] | None
+    """Which pixels of the judged pictures the input shows."""
+
+
 @torch.no_grad()
 def measure_item(item: int, clip: Clip, setup: Setup) -> ItemResult:
     """All rows of one item.
@@ -71,8 +83,8 @@ def _text(case: Case, setup: Setup) -> Entries:
 
 def _pictures(case: Case, setup: Setup) -> Entries:
     scene = setup.subject.answer(case, setup.protocol.seed)
-    followed = followed_points(case, setup.protocol)
-    entries = _answered(SYSTEM, case, SceneAnswer(scene), followed, setup)
+    truth = _Truth(followed=followed_points(case, setup.protocol), seen=covisible(case))
+    entries = _answered(SYSTEM, case, SceneAnswer(scene), truth, setup)
     entries += scene_entries(SYSTEM, case, scene, setup.protocol)
     entries += pose_entries(SYSTEM, scene, check_path(setup.protocol.pose, case))
     for name in BASELINES:
@@ -81,12 +93,10 @@ def _pictures(case: Case, setup: Setup) -> Entries:
         except InputError as error:
             entries.append(Skip(row=name, key="psnr", why=str(error)))
             continue
-        entries += _answered(name, case, answer, followed, setup)
+        entries += _answered(name, case, answer, truth, setup)
     return entries
 
 
-def _answered(
-    row: str, case: Case, answer: Answer, followed: list[Followed], setup: Setup
-) -> Entries:
-    pictures = picture_entries(row, case, answer, setup.features)
-    return pictures + track_entries(row, case, answer, followed)
+def _answered(row: str, case: Case, answer: Answer, truth: _Truth, setup: Setup) -> Entries:
+    pictures = picture_entries(row, case, answer, truth.seen, setup.features)
+    return pictures + track_entries(row, case, answer, truth.followed)

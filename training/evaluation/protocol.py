@@ -97,6 +97,8 @@ class Protocol:
     planes: PlaneSearch
     bootstrap: Intervals
     seed: int
+    input_stride: int = 1
+    """Reconstruction is given every so many-th frame of the input view, from the first on."""
 
     def __post_init__(self) -> None:
         for what, fine, expected in _rules(self):
@@ -106,8 +108,23 @@ class Protocol:
     @property
     def digest(self) -> str:
         """Sixteen hexadecimal digits that change whenever anything does."""
-        text = json.dumps(asdict(self), sort_keys=True)
+        text = json.dumps(self.record(), sort_keys=True)
         return hashlib.sha256(f"{VERSION}{text}".encode()).hexdigest()[:16]
+
+    def record(self) -> dict[str, object]:
+        """Plain values, as they are digested and written."""
+        values = asdict(self)
+        # Protocols were published before there were strides: theirs is 1, and said by leaving it
+        # out, so that their files and digests stay what they were.
+        if self.input_stride == 1:
+            del values["input_stride"]
+        return values
+
+    def input_frames(self, task: Task) -> tuple[int, ...]:
+        """Frames of the input view that are given; one picture unless a video is reconstructed."""
+        if task != "reconstruction":
+            return (0,)
+        return tuple(range(0, self.frames, self.input_stride))
 
     def judged(self, task: Task) -> Judged:
         """Pictures and points of a task; text cases are generated."""
@@ -143,6 +160,11 @@ def _rules(protocol: Protocol) -> list[tuple[str, bool, str]]:
             "frame",
             set(protocol.track_frames) <= set(known),
             f"track_frames below {protocol.frames}",
+        ),
+        (
+            "stride",
+            1 <= protocol.input_stride <= protocol.frames,
+            f"input_stride from 1 to {protocol.frames}",
         ),
         ("limit", 0 <= protocol.still_px < float("inf"), "still_px of at least 0"),
         ("path", all(check.frames >= 2 for check in checks), "loop and pose of at least 2 frames"),

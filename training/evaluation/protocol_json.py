@@ -1,7 +1,10 @@
-"""Protocols as JSON: every key must be there, none may be unknown, and numbers keep their kind."""
+"""Protocols as JSON: no key may be missing or unknown, and numbers keep their kind.
+
+Only ``input_stride`` may be left out; it is 1 then.
+"""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
@@ -72,6 +75,6 @@ def parse_protocol(text: str, where: str) -> Protocol:
 
 
 def protocol_json(protocol: Protocol) -> str:
-    """Every key, as indented JSON."""
-    record = {"format": FORMAT, "version": VERSION, **asdict(protocol)}
+    """Every key that decides anything, as indented JSON."""
+    record = {"format": FORMAT, "version": VERSION, **protocol.record()}
     return json.dumps(record, indent=2) + "\n"

@@ -12,6 +12,7 @@ from pathlib import Path
 from diff4splat import __version__
 from diff4splat.errors import FileFormatError
 from diff4splat.io.atomic import write_text
+from diff4splat.training.evaluation.columns import columns_of
 from diff4splat.training.evaluation.measuring import Setup
 from diff4splat.training.evaluation.records import ItemResult, read_item
 
@@ -27,6 +28,8 @@ def run_key(setup: Setup) -> str:
         "subject": asdict(setup.subject.identity),
         "features": None if setup.features is None else setup.features.name,
         "captioner": setup.captioner.__qualname__,
+        # Items from before a column was added have no value for it.
+        "columns": [column.key for column in columns_of(setup.task)],
         "diff4splat": __version__,
     }
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]

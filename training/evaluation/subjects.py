@@ -76,19 +76,19 @@ class Generator:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reconstructor:
-    """Any function from a whole clip's input view to a scene; it must not look at other views."""
+    """Any function from the given part of a clip (``Case.input_clip``) to a scene."""
 
     reconstruct: Callable[[Clip], Scene]
     identity: Identity
 
     def answer(self, case: Case, seed: int) -> Scene:
-        """Reconstruct; nothing is drawn, so the seed is not needed."""
+        """Reconstruct; the truth is not handed on, and nothing is drawn, so no seed is needed."""
         del seed
-        return self.reconstruct(case.clip)
+        return self.reconstruct(case.input_clip)
 
 
 def reconstruct_clip(model: Model, clip: Clip) -> Scene:
-    """The scene that a model's reconstruction sees in a clip's input view, and in no other."""
+    """The scene that a model's reconstruction sees in a clip's input view."""
     view = clip.views[0]
     path = CameraPath(cameras=view.cameras.to(torch.float32), times_s=clip.times_s.float())
     return scene_from_video(model, unit_rgb(view.rgb), path)

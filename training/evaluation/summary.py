@@ -137,7 +137,7 @@ def _difference(
     items: tuple[ItemResult, ...], column: Column, cells: tuple[Cell, ...], protocol: Protocol
 ) -> Difference | None:
     rivals = [cell for cell in cells if cell.key == column.key and cell.row != SYSTEM]
-    if not rivals:
+    if not rivals or column.better == "neither":
         return None
     best = max(rivals, key=lambda cell: column.sign * cell.mean.value).row
     values = gains(items, column, best)

@@ -16,6 +16,7 @@ from diff4splat.training.evaluation.runner import Outcome
 from diff4splat.training.evaluation.summary import Mean, Summary
 
 FORMAT = "diff4splat-evaluation-results 1"
+ARROWS = {"higher": "↑", "lower": "↓", "neither": ""}
 
 
 def to_json(outcome: Outcome, summary: Summary) -> str:
@@ -26,7 +27,7 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
         "diff4splat": __version__,
         "machine": asdict(this_machine()),
         "task": setup.task,
-        "protocol": asdict(setup.protocol) | {"digest": setup.protocol.digest},
+        "protocol": setup.protocol.record() | {"digest": setup.protocol.digest},
         "subject": asdict(setup.subject.identity),
         "features": None if setup.features is None else setup.features.name,
         "asked": outcome.asked,
@@ -90,11 +91,11 @@ def _head(outcome: Outcome) -> list[str]:
 
 def _table(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
     percent = f"{outcome.setup.protocol.bootstrap.coverage:.0%}"
-    arrows = [f"{c.title} {'↑' if c.better == 'higher' else '↓'}" for c in columns]
+    titles = [f"{c.title} {ARROWS[c.better]}".rstrip() for c in columns]
     lines = [
         f"Means over items with {percent} bootstrap intervals.",
         "",
-        _line(["", *arrows]),
+        _line(["", *titles]),
         _line(["---", *["---:"] * len(columns)]),
     ]
     for row in (SYSTEM, *BASELINES):

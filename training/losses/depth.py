@@ -57,6 +57,21 @@ def depth_correlation(
     return masked_mean(1 - correlation, known)
 
 
+def depth_log_error(
+    depth: Float[Tensor, "b k h w"], truth: Float[Tensor, "b k h w"]
+) -> Float[Tensor, " b"]:
+    """Mean |log depth − log truth| over an element's pixels with a positive, finite truth.
+
+    Raises:
+        ShapeError: the shapes differ.
+    """
+    require_alike("depth", depth, truth)
+    valid = (truth > 0) & truth.isfinite()
+    depth, truth = widen(depth, torch.where(valid, truth, 1.0))
+    error = (depth.log() - truth.log()).abs()
+    return masked_mean(error.flatten(1), valid.flatten(1))
+
+
 def depth_smoothness(
     rendered: Float[Tensor, "b k h w"],
     valid: Bool[Tensor, "b k h w"] | None = None,

@@ -9,11 +9,12 @@ from diff4splat.training.stages.autoencoder import AutoencoderStage
 from diff4splat.training.stages.generator import GeneratorStage
 from diff4splat.training.stages.joint import JointStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
-from diff4splat.training.stages.reconstruction import DynamicStage, StaticStage
+from diff4splat.training.stages.reconstruction import DynamicStage, SightStage, StaticStage
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
     {
         "vae": AutoencoderStage,
+        "sight": SightStage,
         "static": StaticStage,
         "dynamic": DynamicStage,
         "generator": GeneratorStage,

@@ -12,8 +12,10 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.rays import plucker_map
+from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.models.config import ModelConfig
+from diff4splat.models.detail.sight import Sight
 from diff4splat.models.factory import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import StageRecipe
@@ -59,6 +61,22 @@ class ModelStage(Stage):
     def encode(self, batch: ClipBatch) -> Float[Tensor, "b c t h2 w2"]:
         """Standardised latents of the input video, by the frozen autoencoder."""
         return self.vae.encode(network_video(batch)).mean
+
+    @torch.no_grad()
+    def sight(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Sight | None:
+        """What the detail decoder sees: decoded pictures behind the first one, which is true.
+
+        None where the model has no such decoder. Recipes may show the true pictures instead of
+        decoding, which takes longer than all else in a step.
+        """
+        if not self.plan.model.detail.used:
+            return None
+        truth = unit_rgb(batch.video).movedim(-1, 1)
+        if self.plan.recipe.true_pictures:
+            return Sight(rgb=truth, cameras=batch.cameras)
+        decoded = (self.vae.decode(latent).float() + 1) / 2
+        rgb = torch.cat([truth[:, :, :1], decoded[:, :, 1:].clamp(0, 1)], 2)
+        return Sight(rgb=rgb, cameras=batch.cameras)
 
     def draw(self, batch: ClipBatch, purpose: str) -> list[torch.Generator]:
         """One generator per sample, the same on any number of processes."""

@@ -17,18 +17,22 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.base_scene import PLANE_DEPTH, UNSEEN, plane_base
 from diff4splat.models.config import ModelConfig
+from diff4splat.models.config_parts import TIME_STRIDE
 from diff4splat.models.deformation_heads import (
     DeformationState,
     DeformationUnits,
     deformation_state,
     raw_scales,
 )
-from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.detail.sight import Sight
+from diff4splat.models.detail.stabilise import key_depth
+from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
-from diff4splat.models.reconstruction import Canonical, reconstruct
+from diff4splat.models.reconstruction import Canonical, reconstruct, reconstruct_detailed
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
-from diff4splat.scene.gaussians import Gaussians
+from diff4splat.report.run_log import RunLog
+from diff4splat.scene.gaussians import Gaussians, concatenate
 from diff4splat.training.batches.clip_batch import ClipBatch
 
 SETTINGS = RenderSettings(alpha_cutoff=UNSEEN / 10)
@@ -42,18 +46,23 @@ class Rendered:
     depth: Float[Tensor, "b m p h w"]
     offsets: Float[Tensor, "b m n 3"] | None
     """Of the tracked points; None where no deformation network ran."""
+    own_depth: Float[Tensor, "b k h w"] | None = None
+    """z of the key frames' own pixels, before any rendering; only with a detail decoder."""
 
 
 def canonical_scenes(
-    maps: ReconstructionMaps, batch: ClipBatch, model: ModelConfig
+    maps: ReconstructionMaps, batch: ClipBatch, model: ModelConfig, sight: Sight | None = None
 ) -> list[Canonical]:
-    """One set of Gaussians per sample, around its first input picture."""
+    """One set of Gaussians per sample, around its first input picture, or around its ``sight``."""
     scenes = []
     for index in range(len(batch)):
+        own = maps.sample(index)
+        if sight is not None:
+            scenes.append(
+                reconstruct_detailed(own, sight.sample(index), model.activation, RunLog())
+            )
+            continue
         base = plane_base(_picture(batch, index), batch.cameras[index], model.ldrm.grid_stride)
-        own = ReconstructionMaps(
-            gaussians=maps.gaussians[index : index + 1], tokens=maps.tokens[index : index + 1]
-        )
         scenes.append(reconstruct(own, base, model.activation))
     return scenes
 
@@ -80,10 +89,18 @@ def moving_pictures(
         targets = batch.target_cameras[index]
         flat = [_pictures(state, targets[time]) for time, state in enumerate(moved)]
         shown.append(_stack(flat))
-        cells = _cell_index(batch.track_cell[index], batch, model.ldrm.grid_stride)
-        offsets.append(torch.stack([state.offsets[cells] for state in states]))
+        cells = _cell_index(batch.track_cell[index], batch, model)
+        raw = torch.stack([maps[index].flatten(1)[:3, cells] for maps in deformations])
+        offsets.append(raw.float().mT * PLANE_DEPTH)
     rgb, depth = _stack(shown)
     return Rendered(rgb=rgb, depth=depth, offsets=torch.stack(offsets))
+
+
+def with_depth(rendered: Rendered, maps: ReconstructionMaps, model: ModelConfig) -> Rendered:
+    """The same with the depth that the maps themselves claim."""
+    if not model.detail.used:
+        return rendered
+    return replace(rendered, own_depth=key_depth(maps.gaussians[:, -1], model.activation))
 
 
 def deformed_state(
@@ -91,18 +108,24 @@ def deformed_state(
 ) -> DeformationState:
     """How all Gaussians differ from the canonical ones at one time."""
     units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.activation)
-    raw_scale = raw_scales(scene.maps.gaussians[0].float())
+    raw_scale = raw_scales(scene.maps.gaussians[0].float())[scene.cells]
     return deformation_state(raw.float(), raw_scale, scene.cells, units)
 
 
 def deformed(gaussians: Gaussians, state: DeformationState) -> Gaussians:
-    """The Gaussians at that time: mean + offset, quaternion ⊗ rotation, scale · exp(offset)."""
-    return replace(
-        gaussians,
-        means=gaussians.means + state.offsets,
-        quats=quaternion.multiply(gaussians.quats, state.rotations),
-        scales=gaussians.scales * state.log_scale_offsets.exp(),
+    """The Gaussians at that time: mean + offset, quaternion ⊗ rotation, scale · exp(offset).
+
+    Those behind the last of ``state`` stand still.
+    """
+    count = len(state.offsets)
+    moved, still = gaussians.select(slice(count)), gaussians.select(slice(count, None))
+    moved = replace(
+        moved,
+        means=moved.means + state.offsets,
+        quats=quaternion.multiply(moved.quats, state.rotations),
+        scales=moved.scales * state.log_scale_offsets.exp(),
     )
+    return concatenate([moved, still]) if len(still) else moved
 
 
 def _pictures(gaussians: Gaussians, cameras: Camera) -> tuple[Tensor, Tensor]:
@@ -121,8 +144,12 @@ def _picture(batch: ClipBatch, index: int) -> Picture:
     )
 
 
-def _cell_index(cell: Int[Tensor, "n 3"], batch: ClipBatch, grid_stride: int) -> Int[Tensor, " n"]:
+def _cell_index(
+    cell: Int[Tensor, "n 3"], batch: ClipBatch, model: ModelConfig
+) -> Int[Tensor, " n"]:
     """(frame, row, column) of input pixels to places in the flattened grid of Gaussians."""
+    grid_stride = model.ldrm.grid_stride
     height, width = (side // grid_stride for side in batch.video.shape[2:4])
     frame, row, column = cell.unbind(-1)
+    frame = frame // (TIME_STRIDE if model.detail.used else 1)
     return (frame * height + row // grid_stride) * width + column // grid_stride

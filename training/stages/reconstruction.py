@@ -13,15 +13,18 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.errors import ConfigError
+from diff4splat.models.factory import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stages.measures import reconstruction_measures
-from diff4splat.training.stages.model_stage import ModelStage, network_rays
+from diff4splat.training.stages.model_stage import ModelStage, StagePlan, network_rays
 from diff4splat.training.stages.panels import reconstruction_panel
 from diff4splat.training.stages.prediction import (
     Rendered,
     canonical_scenes,
     moving_pictures,
     still_pictures,
+    with_depth,
 )
 from diff4splat.training.stages.terms import rendering_terms
 
@@ -38,9 +41,11 @@ class StaticStage(ModelStage):
 
     def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
         """Pictures of the canonical scenes at the targets."""
-        maps = self.ldrm(latent, network_rays(batch))
+        sight = self.sight(batch, latent)
+        maps = self.ldrm(latent, network_rays(batch), sight)
         with torch.autocast(latent.device.type, enabled=False):
-            return still_pictures(canonical_scenes(maps, batch, self.plan.model), batch)
+            scenes = canonical_scenes(maps, batch, self.plan.model, sight)
+            return with_depth(still_pictures(scenes, batch), maps, self.plan.model)
 
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
@@ -53,6 +58,29 @@ class StaticStage(ModelStage):
         return reconstruction_panel(self.render(batch, self.encode(batch)), batch)
 
 
+class SightStage(StaticStage):
+    """The same from pictures and cameras alone, before there is an autoencoder: latents are 0.
+
+    Most of a detail decoder needs none, so this stage can run while the autoencoder learns.
+    """
+
+    parts = ("ldrm",)
+
+    def __init__(self, networks: Networks, plan: StagePlan) -> None:
+        super().__init__(networks, plan)
+        if not (plan.recipe.true_pictures and plan.model.detail.used):
+            raise ConfigError(
+                f"stage {plan.recipe.name}: expected true_pictures and a model with a detail "
+                "decoder, since nothing is encoded or decoded here; set both or leave it out"
+            )
+
+    def encode(self, batch: ClipBatch) -> Float[Tensor, "b c t h2 w2"]:
+        """Zeros in the shape of the latents."""
+        model, size_px = self.plan.model, batch.cameras.size_px
+        grid = model.latent_grid(batch.video.shape[1], size_px)
+        return torch.zeros(len(batch), model.vae.latent_channels, *grid, device=batch.video.device)
+
+
 class DynamicStage(StaticStage):
     """The same with the deformation network: targets at any time, and the motion loss."""
 
@@ -60,9 +88,11 @@ class DynamicStage(StaticStage):
 
     def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
         """Pictures of the moved scenes at the targets, one query time after the other."""
-        maps = self.ldrm(latent, network_rays(batch))
+        sight = self.sight(batch, latent)
+        maps = self.ldrm(latent, network_rays(batch), sight)
         times = batch.target_time.unbind(1)
         deformations = [self.deformation(maps.tokens, time) for time in times]
         with torch.autocast(latent.device.type, enabled=False):
-            scenes = canonical_scenes(maps, batch, self.plan.model)
-            return moving_pictures(scenes, deformations, batch, self.plan.model)
+            scenes = canonical_scenes(maps, batch, self.plan.model, sight)
+            rendered = moving_pictures(scenes, deformations, batch, self.plan.model)
+            return with_depth(rendered, maps, self.plan.model)

@@ -11,7 +11,7 @@ from torch import Tensor
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
+from diff4splat.training.losses.depth import depth_correlation, depth_log_error, depth_smoothness
 from diff4splat.training.losses.motion import track_motion
 from diff4splat.training.losses.photometric import perceptual_error, squared_error
 from diff4splat.training.recipe import LossWeights
@@ -40,6 +40,9 @@ def rendering_terms(
     if weights.depth * weights.smoothness:
         terms["smoothness"] = depth_smoothness(depth, valid)
         weighted["smoothness"] = weights.depth * weights.smoothness
+    if weights.depth_log and rendered.own_depth is not None:
+        terms["depth_log"] = depth_log_error(rendered.own_depth, batch.depth)
+        weighted["depth_log"] = weights.depth_log
     if weights.motion and rendered.offsets is not None:
         terms["motion"] = _motion(rendered.offsets, batch, weights)
         weighted["motion"] = weights.motion

@@ -1,7 +1,8 @@
 """What to do when losses or gradients go wrong; decided from values that all processes share.
 
-Skip: without a finite loss and gradient norm there is no update and no averaging; the step still
-counts in schedule and data, so the run ends where it would have. Spike: a loss far above its
+Skip: without a finite loss and gradient norm, or with a loss of a different order, there is no
+update and no averaging; the step still counts in schedule and data, so the run ends where it would
+have. Spike: a loss far above its
 running median. Several in a row: go back to the last good checkpoint and leave that data out.
 """
 
@@ -27,6 +28,19 @@ def skip_reason(loss: float, norm: float) -> str | None:
     if not math.isfinite(loss):
         return "loss is not finite"
     return None if math.isfinite(norm) else "gradient is not finite"
+
+
+def outlier_reason(progress: Progress, loss: float, settings: TrainerSettings) -> str | None:
+    """Why a finite loss must not update anything either: no data is ``factor`` times as hard.
+
+    Clipping bounds such a step but does not give it a direction. It counts as a spike: several in
+    a row mean that the weights are spoilt, not the data.
+    """
+    if not is_spike(progress, loss, settings.outlier_factor):
+        return None
+    progress.spikes += 1
+    progress.spikes_in_a_row += 1
+    return "loss is an outlier"
 
 
 def record_skip(progress: Progress, reason: str) -> None:

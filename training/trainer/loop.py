@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from diff4splat.training.trainer.divergence import (
+    outlier_reason,
     record_loss,
     record_skip,
     require_few_skips,
@@ -85,7 +86,9 @@ def finish_step(training: TrainingRun) -> None:
 def _learn(training: TrainingRun, report: StepReport, norm: float) -> None:
     """Update weights and averages, or count why not."""
     progress, parameters = training.progress, trained_parameters(training.parallel.stage).values()
-    if reason := skip_reason(report.total, norm):
+    settings = training.run.trainer
+    reason = skip_reason(report.total, norm) or outlier_reason(progress, report.total, settings)
+    if reason:
         record_skip(progress, reason)
         training.journal.skip(progress.step, report, reason)
         return

@@ -1,5 +1,6 @@
-"""The harness is a folder, not a package: ``python benchmarks/renderers`` puts it on the path.
+"""Benchmarks are not installed: what their commands put on the path is put there.
 
+The harness of renderers is a folder, not a package; ``ablations`` is a package beside it.
 Shapes are checked here as those of the library are.
 """
 
@@ -9,6 +10,6 @@ from pathlib import Path
 import jaxtyping
 
 HARNESS = Path(__file__).parents[3] / "benchmarks" / "renderers"
-sys.path.insert(0, str(HARNESS))
-SHAPED = ("brute_force", "comparison", "sampling", "scenes", "torch_backward")
+sys.path[:0] = [str(HARNESS), str(HARNESS.parent)]
+SHAPED = ("ablations", "brute_force", "comparison", "sampling", "scenes", "torch_backward")
 jaxtyping.install_import_hook(SHAPED, "beartype.beartype")

@@ -7,6 +7,7 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.models.config import (
     ActivationConfig,
     DeformationConfig,
+    DetailConfig,
     DitConfig,
     LdrmConfig,
     ModelConfig,
@@ -29,6 +30,9 @@ OTHER_VALUES = {
     "buckets": 64,
     "grid_stride": 2,
     "width": 48,
+    "surroundings": 8,
+    "linear_code": True,
+    "range": [2.0, 9.0],
 }
 """Valid values where doubling the old one is not."""
 
@@ -45,7 +49,7 @@ def test_json_lists_every_field() -> None:
     assert all(leaf in data[part] for part, leaf in LEAVES)
 
 
-@pytest.mark.parametrize(("part", "leaf"), LEAVES)
+@pytest.mark.parametrize(("part", "leaf"), [pair for pair in LEAVES if pair != ("ldrm", "reads")])
 def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
     data = json.loads(test_size().to_json())
     old = data[part][leaf]
@@ -53,6 +57,12 @@ def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
     changed = ModelConfig.from_json(json.dumps(data))
     assert changed.fingerprint() != test_size().fingerprint()
     assert len(changed.fingerprint()) == 12 and int(changed.fingerprint(), 16) >= 0
+
+
+def test_models_stored_before_there_were_details_have_none() -> None:
+    data = json.loads(test_size().to_json())
+    del data["detail"], data["vae"]["linear_code"], data["ldrm"]["reads"]
+    assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
 
 def test_fingerprint_is_stable() -> None:
@@ -95,6 +105,20 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
         (DitConfig, {"blocks": True}, "DitConfig.blocks: expected a whole number"),
         (DitConfig, {"frequency_width": 15}, "DitConfig.frequency_width: expected an even number"),
         (LdrmConfig, {"grid_stride": 3}, "LdrmConfig.grid_stride: expected 1 or 2"),
+        (LdrmConfig, {"reads": "sounds"}, "LdrmConfig.reads: expected latents or frames"),
+        (VaeConfig, {"linear_code": 1}, "VaeConfig.linear_code: expected true or false"),
+        (
+            VaeConfig,
+            {"linear_code": True, "latent_channels": 769},
+            "latent_channels: expected at most the 768 values of a block",
+        ),
+        (DetailConfig, {"width": -1}, "DetailConfig.width: expected a whole number of at least 0"),
+        (DetailConfig, {"depths": True}, "DetailConfig.depths: expected a whole number"),
+        (DetailConfig, {"match_channels": 0}, "match_channels: expected a whole number"),
+        (DetailConfig, {"surroundings": 6}, "surroundings: expected a multiple of 4, got 6"),
+        (DetailConfig, {"range": (2.0, 1.0)}, "DetailConfig.range: expected two rising depths"),
+        (DetailConfig, {"range": ("1", "2")}, "DetailConfig.range: expected two rising depths"),
+        (DetailConfig, {"range": None}, "DetailConfig.range: expected two rising depths"),
         (VaeConfig, {"widths": (4, 8)}, "VaeConfig.widths: expected at least 3 widths"),
         (VaeConfig, {"widths": (4, 8, -1)}, "VaeConfig.widths: expected whole numbers"),
         (TextConfig, {"max_bytes": 0}, "TextConfig.max_bytes: expected a whole number"),
@@ -157,6 +181,26 @@ def test_grid_stride_needs_large_enough_tokens() -> None:
     ldrm = dataclasses.replace(config.ldrm, grid_stride=2)
     with pytest.raises(ConfigError, match="expected tokens of a multiple of 16 px, got 8"):
         dataclasses.replace(config, vae=vae, ldrm=ldrm)
+
+
+def test_frames_are_read_by_a_detail_decoder_alone() -> None:
+    config, detail = test_size(), DetailConfig(width=6)
+    ldrm = dataclasses.replace(config.ldrm, reads="frames")
+    with pytest.raises(ConfigError, match="expected latents where there is no detail decoder"):
+        dataclasses.replace(config, ldrm=ldrm)
+    both = dataclasses.replace(config, ldrm=ldrm, detail=detail)
+    assert ModelConfig.from_json(both.to_json()) == both
+    assert both.fingerprint() != dataclasses.replace(config, detail=detail).fingerprint()
+
+
+def test_details_need_whole_pixels_and_tokens_of_sixteen() -> None:
+    config, detail = test_size(), DetailConfig(width=6)
+    halves = dataclasses.replace(config.ldrm, grid_stride=2)
+    with pytest.raises(ConfigError, match="grid_stride: expected 1 with a detail decoder"):
+        dataclasses.replace(config, ldrm=halves, detail=detail)
+    vae = dataclasses.replace(config.vae, pixel_patch=4)
+    with pytest.raises(ConfigError, match="expected tokens of 16 px with a detail decoder, got 32"):
+        dataclasses.replace(config, vae=vae, detail=detail)
 
 
 def test_unknown_size_lists_the_known() -> None:

@@ -8,7 +8,7 @@ from diff4splat.geometry.camera import pinhole
 from diff4splat.models.base_scene import PLANE_DEPTH, plane_base
 from diff4splat.models.deformation import DeformationNetwork
 from diff4splat.models.deformation_heads import DeformationUnits
-from diff4splat.models.ldrm import ReconstructionMaps
+from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
 from diff4splat.models.reconstruction import Canonical, deform, prune_cells, reconstruct
 from diff4splat.models.sizes import size_by_name

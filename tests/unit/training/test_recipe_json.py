@@ -24,7 +24,9 @@ def test_every_recipe_survives_its_json(name: str) -> None:
 @pytest.mark.parametrize("name", RECIPES)
 def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     names = [stage.name for stage in recipe_by_name(name).stages]
-    assert names == ["vae", "static-low", "static-high", "dynamic", "generator", "joint"]
+    # Small has one size, so one static stage, and its detail decoder learns to see before it.
+    middle = ["sight", "static-low"] if name == "small" else ["static-low", "static-high"]
+    assert names == ["vae", *middle, "dynamic", "generator", "joint"]
 
 
 def test_the_paper_recipe_is_the_papers() -> None:
@@ -105,6 +107,31 @@ def test_stages_that_do_not_exist_are_refused() -> None:
         recipe_by_name("small").stage("last")
     with pytest.raises(ConfigError, match="--config: expected one of test, small, paper"):
         recipe_by_name("large")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("stages.vae.data.crop_px=[64,0]", r"data.crop_px: expected 0, or sides that size_px"),
+        ("stages.vae.data.crop_px=[64,256]", r"data.crop_px: expected .* got \(64, 256\)"),
+        ("stages.vae.data.input_stride=0", "data.input_stride: expected at least 1, got 0"),
+        ("stages.sight.true_pictures=false", "stage sight: expected a detail decoder and"),
+        ("stages.joint.data.augment=true", "stage joint: data.augment: expected false"),
+        (
+            "stages.dynamic.data.track_stride=1",
+            "dynamic: .* expected 4 with a detail",
+        ),
+        ("model.detail.width=0", "stage sight: expected a detail decoder and"),
+    ],
+)
+def test_detail_needs_what_it_sees_by(change: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        changed(recipe_by_name("small"), [change])
+
+
+def test_clips_reach_from_the_first_input_frame_to_the_last() -> None:
+    data = recipe_by_name("small").stage("dynamic").data
+    assert (data.frames, data.input_stride, data.clip_frames) == (9, 2, 17)
 
 
 def test_a_global_batch_is_made_of_micro_batches() -> None:

@@ -41,6 +41,7 @@ class Run:
     recipe: Recipe
     folder: Path
     untrained: tuple[bool, ...]
+    trained: tuple[frozenset[str], ...]
     notes: tuple[str, ...]
     vae: tuple[dict[str, torch.Tensor], ...]
 
@@ -53,12 +54,14 @@ def shards(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def course(shards: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
     recipe, folder = reading(shards), tmp_path_factory.mktemp("run")
-    untrained, notes, vae = [], [], []
+    untrained, trained, notes, vae = [], [], [], []
     for stage in STAGES:
         train_stage(StageRun(recipe=recipe, stage=stage, folder=folder, note=notes.append))
-        untrained.append(load_model(folder / MODEL_FOLDER).untrained)
+        model = load_model(folder / MODEL_FOLDER)
+        untrained.append(model.untrained)
+        trained.append(model.trained)
         vae.append(load_file(folder / MODEL_FOLDER / "vae.safetensors"))
-    return Run(recipe, folder, tuple(untrained), tuple(notes), tuple(vae))
+    return Run(recipe, folder, tuple(untrained), tuple(trained), tuple(notes), tuple(vae))
 
 
 def stored(course: Run, stage: str, kind: str = "averaged") -> dict[str, dict[str, torch.Tensor]]:
@@ -71,6 +74,13 @@ def test_the_model_counts_as_untrained_until_every_part_is_trained(course: Run) 
     assert wrote[0].endswith("text_encoder, dit, ldrm, deformation")
     assert wrote[3].endswith("text_encoder, dit")
     assert all(note.endswith("every part is trained") for note in wrote[4:])
+
+
+def test_the_model_says_which_parts_are_trained(course: Run) -> None:
+    static, generator = {"vae", "ldrm"}, {"dit", "text_encoder"}
+    moving = static | {"deformation"}
+    everything = moving | generator
+    assert course.trained == ({"vae"}, static, static, moving, everything, everything)
 
 
 def test_later_stages_say_what_they_took_over(course: Run) -> None:

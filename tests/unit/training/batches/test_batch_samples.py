@@ -16,7 +16,7 @@ from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.batches.scale import normalized
-from diff4splat.training.batches.targets import draw_targets, draw_tracks
+from diff4splat.training.batches.targets import LEAST_MOTION, draw_targets, draw_tracks
 from diff4splat.training.batches.window import cut
 from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
 from diff4splat.training.stage import SampleKey
@@ -83,7 +83,7 @@ def test_track_offsets_lead_to_where_the_point_is_seen_then() -> None:
     clip = normalized(make_clip(static=False, tracks=20))
     generator = torch.Generator().manual_seed(0)
     frames = torch.tensor([0, 4])
-    tracks = draw_tracks(clip, frames, 8, generator)
+    tracks = draw_tracks(clip, frames, DATA, generator)
     positions, uv = clip.tracks.positions, clip.views[0].track_uv
     for point in tracks.valid.nonzero()[:, 0].tolist():
         frame, row, column = tracks.cell[point].tolist()
@@ -190,3 +190,21 @@ def test_moving_a_batch_keeps_everything() -> None:
     one = sample(make_clip(tracks=20))
     moved = one.to(torch.device("cpu"))
     assert moved.captions == one.captions and isinstance(moved.cameras, Camera)
+
+
+def test_half_of_the_points_move_where_enough_do() -> None:
+    clip = normalized(make_clip(static=False, tracks=60))
+    settings = replace(DATA, tracks=8)
+    frames = torch.arange(clip.frames)
+    tracks = draw_tracks(clip, frames, settings, torch.Generator().manual_seed(0))
+    moving = tracks.offset[:, tracks.valid].norm(dim=-1).amax(0) > LEAST_MOTION / 2
+    assert tracks.valid.all() and 3 <= int(moving.sum()) <= 5
+
+
+def test_only_input_frames_that_carry_gaussians_are_followed_from() -> None:
+    settings = replace(DATA, frames=5, input_stride=2, track_stride=2, tracks=16)
+    one = sample(make_clip(frames=9, tracks=40), settings)
+    assert one.video.shape[1] == 5 and one.depth.shape[1] == 3
+    assert set(one.track_cell[0, one.track_valid[0], 0].tolist()) <= {0, 2, 4}
+    steps = one.target_time * 8
+    torch.testing.assert_close(steps, steps.round())

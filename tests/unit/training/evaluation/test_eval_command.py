@@ -16,7 +16,7 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.training.evaluation.case import make_case
-from diff4splat.training.evaluation.protocol_json import protocol_json
+from diff4splat.training.evaluation.protocol_json import protocol_json, protocol_names
 from diff4splat.training.evaluation.sources import ListedClips
 from diff4splat.training.evaluation.subjects import Generator
 
@@ -72,13 +72,17 @@ def test_text_is_asked_of_the_same_model(protocol_file: Path, tmp_path: Path) ->
     assert {cell["key"] for cell in stored["table"]} == {"text_right", "text_both", "text_still"}
 
 
+def test_the_newest_protocol_is_the_default() -> None:
+    assert Evaluate().protocol == protocol_names()[-1]
+
+
 def test_reconstruction_sees_the_whole_input_video(
     protocol_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen = []
 
     def reconstruct_clip(model: object, clip: object) -> object:
-        seen.append(clip.frames)
+        seen.append((clip.frames, len(clip.views)))
         return wall_and_patch()
 
     monkeypatch.setattr(
@@ -87,7 +91,7 @@ def test_reconstruction_sees_the_whole_input_video(
     Evaluate(
         model="test", protocol=str(protocol_file), task="reconstruction", out=tmp_path / "out"
     ).run()
-    assert set(seen) == {FRAMES}
+    assert set(seen) == {(FRAMES, 1)}
 
 
 @pytest.mark.parametrize(

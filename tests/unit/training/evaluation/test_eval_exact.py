@@ -155,6 +155,21 @@ def test_reconstruction_gets_the_frame_nearest_in_time() -> None:
     assert shown.depth is None
 
 
+@pytest.mark.parametrize("row", [NEAREST, MEAN_PLANE])
+def test_baselines_are_given_no_more_frames_than_the_system(row: str) -> None:
+    protocol = replace(tiny_protocol(), input_stride=2)
+    case = make_case(filmed(wall_and_patch(SHIFT)), protocol, "reconstruction")
+    seen = make_baseline(row, case, protocol.planes).look(case.camera((1, 3)), 0.75, 3)
+    hidden = case.input_view.rgb.clone()
+    hidden[[1, 3]] = 0
+    views = (replace(case.input_view, rgb=hidden), *case.clip.views[1:])
+    blind = replace(case, clip=replace(case.clip, views=views))
+    again = make_baseline(row, blind, protocol.planes).look(case.camera((1, 3)), 0.75, 3)
+    assert torch.equal(seen.rgb, again.rgb)
+    if row == NEAREST:
+        assert torch.equal(seen.rgb, case.input_rgb(2))
+
+
 def test_without_depth_pictures_are_judged_and_the_rest_is_counted() -> None:
     clip = filmed(wall_and_patch(SHIFT))
     views = tuple(replace(view, depth=torch.zeros_like(view.depth)) for view in clip.views)

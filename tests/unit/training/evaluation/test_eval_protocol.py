@@ -16,10 +16,8 @@ from diff4splat.training.evaluation.protocol_json import (
     protocol_names,
 )
 
-HELD_OUT_V1 = "4d9505753cb2eb8a"
-"""Results were published under it: a better protocol gets a new name."""
-
-
+SHIPPED = {"held_out_v1": "4d9505753cb2eb8a", "held_out_v2": "3ded81828293712c"}
+"""Results are published under them: a better protocol gets a new name."""
 SOURCE = json.loads(protocol_json(tiny_protocol()))["source"]
 
 
@@ -27,9 +25,39 @@ def changed(**changes: object) -> str:
     return json.dumps(json.loads(protocol_json(tiny_protocol())) | changes)
 
 
-def test_the_shipped_protocol_never_changes() -> None:
-    assert protocol_names() == ("held_out_v1",)
-    assert load_protocol("held_out_v1").protocol.digest == HELD_OUT_V1
+def test_shipped_protocols_never_change() -> None:
+    assert protocol_names() == tuple(SHIPPED)
+    assert {name: load_protocol(name).protocol.digest for name in SHIPPED} == SHIPPED
+
+
+def test_the_first_one_gives_every_frame_and_does_not_say_so() -> None:
+    first = load_protocol("held_out_v1").protocol
+    assert first.input_frames("reconstruction") == tuple(range(17))
+    assert "input_stride" not in protocol_json(first)
+    said = json.loads(protocol_json(first)) | {"input_stride": 1}
+    assert parse_protocol(json.dumps(said), "here").digest == SHIPPED["held_out_v1"]
+
+
+def test_the_second_one_judges_views_and_times_that_are_not_given() -> None:
+    first, second = (load_protocol(name).protocol for name in SHIPPED)
+    given = second.input_frames("reconstruction")
+    assert given == (0, 2, 4, 6, 8, 10, 12, 14, 16)
+    judged = second.reconstruction
+    assert all(view in (1, 2) and frame not in given for view, frame in judged.pairs)
+    assert len(set(judged.pairs)) == 12
+    assert set(judged.source_frames) <= set(given)
+    between = [frame for frame in second.track_frames if frame not in given]
+    assert len(between) > len(second.track_frames) / 2
+    # The clips, and what is asked of one picture, are the same.
+    assert (second.source, second.generation) == (first.source, first.generation)
+    assert second.input_frames("generation") == second.input_frames("text") == (0,)
+
+
+def test_a_stride_changes_the_digest_and_comes_back() -> None:
+    protocol = replace(tiny_protocol(), input_stride=3)
+    assert protocol.input_frames("reconstruction") == (0, 3)
+    assert parse_protocol(protocol_json(protocol), "here") == protocol
+    assert protocol.digest != tiny_protocol().digest
 
 
 def test_a_file_comes_back_as_it_was_written(tmp_path: Path) -> None:
@@ -94,6 +122,8 @@ def test_a_missing_key_is_named() -> None:
         ({"reconstruction": Judged(pairs=((0, 1),), source_frames=(9,))}, "frames 0 to 4"),
         ({"track_frames": (7,)}, "track_frames below 5"),
         ({"still_px": -1.0}, "still_px of at least 0"),
+        ({"input_stride": 0}, "input_stride from 1 to 5"),
+        ({"input_stride": 6}, "input_stride from 1 to 5"),
         ({"text_cases": 99}, "text_cases from 0 to source.count"),
     ],
 )
@@ -104,7 +134,7 @@ def test_values_out_of_range_are_refused(change: dict[str, object], says: str) -
 
 
 def test_unknown_names_say_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"expected held_out_v1 or a \.json file, got 'held'"):
+    with pytest.raises(ConfigError, match=r"held_out_v1, held_out_v2 or a \.json file, got 'held'"):
         load_protocol("held")
     with pytest.raises(FileFormatError, match="no such file"):
         load_protocol(str(tmp_path / "none.json"))

@@ -13,6 +13,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.errors import FileFormatError, InputError, OutputError
 from diff4splat.metrics.features.load import load_features
 from diff4splat.report.phases import Phases
+from diff4splat.training.evaluation.columns import columns_of
 from diff4splat.training.evaluation.evaluate import OUTPUT_FILES, Evaluation, Extent, evaluate
 from diff4splat.training.evaluation.measuring import Setup
 from diff4splat.training.evaluation.sources import ListedClips
@@ -52,6 +53,7 @@ def test_a_run_leaves_its_files_and_nothing_else(
     stored = json.loads((tmp_path / "results.json").read_text())
     assert stored["format"] == "diff4splat-evaluation-results 1"
     assert stored["protocol"]["digest"] == setup.protocol.digest
+    assert stored["protocol"]["track_frames"] == [0, 2, 4]
     assert [item["clip"] for item in stored["items"]] == ["clip-0", "clip-1", "clip-2"]
     assert not stored["subset"]
     assert (tmp_path / "results.md").read_text() == found.markdown
@@ -98,6 +100,15 @@ def test_another_protocol_or_model_measures_anew(setup: Setup) -> None:
     ]
     assert len({run_key(one) for one in (setup, *others)}) == 5
     assert run_key(setup) == run_key(replace(setup))
+
+
+def test_items_from_before_a_column_was_added_are_measured_anew(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = run_key(setup)
+    fewer = columns_of(setup.task)[:-1]
+    monkeypatch.setattr("diff4splat.training.evaluation.store.columns_of", lambda task: fewer)
+    assert run_key(setup) != now
 
 
 def test_an_interrupt_costs_one_item(

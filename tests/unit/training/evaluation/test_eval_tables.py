@@ -151,7 +151,17 @@ def test_items_come_back_unchanged() -> None:
 
 def test_every_column_has_one_key_and_one_direction() -> None:
     assert len({column.key for column in COLUMNS}) == len(COLUMNS)
-    assert {column.sign for column in COLUMNS} == {-1, 1}
+    assert {column.sign for column in COLUMNS} == {-1, 0, 1}
+
+
+def test_what_is_neither_better_nor_worse_has_no_arrow_and_no_winner() -> None:
+    run = outcome(item(0, psnr=(22.0, 20.0), covisible_share=(0.5, 0.5)))
+    summary = summarize(run)
+    assert summary.difference("covisible_share") is None
+    table = to_markdown(run, summary)
+    assert "|  | PSNR [dB] ↑ | seen |\n" in table
+    assert "| nearest frame | 20 | 0.5 |\n" in table
+    assert "| seen | nearest frame |" not in table
 
 
 @pytest.mark.parametrize("values", [[], [0.0], [-1.0, 2.0, 0.5] * 40])

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import oracles_losses as oracle
 import pytest
@@ -6,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diff4splat.errors import ShapeError
-from diff4splat.training.losses.depth import FLATTEST, depth_correlation, depth_smoothness
+from diff4splat.training.losses.depth import (
+    FLATTEST,
+    depth_correlation,
+    depth_log_error,
+    depth_smoothness,
+)
 
 F64 = torch.float64
 
@@ -166,3 +173,26 @@ def test_shapes_must_agree() -> None:
         depth_correlation(one, one, one)
     with pytest.raises(ShapeError, match=r"valid: expected \(1, 1, 2, 2\) bool, got \(2, 1"):
         depth_smoothness(one, two.bool())
+
+
+def test_log_error_is_the_mean_over_known_pixels() -> None:
+    depth = torch.tensor([[[[1.0, 2.0], [3.0, 5.0]]]], dtype=torch.float64)
+    truth = torch.tensor([[[[2.0, 2.0], [0.0, torch.inf]]]], dtype=torch.float64)
+    torch.testing.assert_close(
+        depth_log_error(depth, truth), torch.tensor([math.log(2) / 2], dtype=torch.float64)
+    )
+
+
+def test_log_error_without_truth_is_zero_with_a_zero_gradient() -> None:
+    depth = torch.ones(2, 1, 2, 2, requires_grad=True)
+    error = depth_log_error(depth, torch.zeros(2, 1, 2, 2))
+    error.sum().backward()
+    assert not error.any() and not depth.grad.any()
+
+
+def test_log_error_has_the_right_gradient() -> None:
+    depth = torch.rand(1, 2, 3, 3, dtype=torch.float64) + 1
+    truth = torch.rand(1, 2, 3, 3, dtype=torch.float64) + 3
+    assert torch.autograd.gradcheck(
+        lambda one: depth_log_error(one, truth), depth.requires_grad_(True)
+    )

@@ -11,6 +11,7 @@ from diff4splat.training.trainer.divergence import (
     DivergenceError,
     after_rollback,
     is_spike,
+    outlier_reason,
     record_loss,
     record_skip,
     require_few_skips,
@@ -116,3 +117,13 @@ def test_progress_without_a_key_is_refused() -> None:
     del found["spikes"]
     with pytest.raises(FileFormatError, match="spikes"):
         Progress.from_json(found)
+
+
+def test_an_outlier_is_not_learnt_from_and_counts_as_a_spike() -> None:
+    progress, settings = Progress(), TrainerSettings(outlier_factor=50.0)
+    for _ in range(LEAST_HISTORY):
+        record_loss(progress, 1.0, 5.0)
+    assert outlier_reason(progress, 49.0, settings) is None
+    assert "outlier" in outlier_reason(progress, 51.0, settings)
+    assert (progress.spikes, progress.spikes_in_a_row) == (1, 1)
+    assert outlier_reason(progress, 1e9, TrainerSettings(outlier_factor=0.0)) is None

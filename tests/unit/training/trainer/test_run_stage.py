@@ -143,7 +143,12 @@ def test_a_run_that_never_is_finite_gives_up(tmp_path) -> None:
 def test_spikes_in_a_row_go_back_and_leave_their_data_out(tmp_path) -> None:
     toy = Toy(steps=40, micro_batch=4)
     far = ToySamples(far_at=frozenset(range(4 * 31, 4 * 34)))
-    settings = {"checkpoint_every": 10, "spikes_before_rollback": 3, "spike_factor": 50.0}
+    settings = {
+        "checkpoint_every": 10,
+        "spikes_before_rollback": 3,
+        "spike_factor": 50.0,
+        "outlier_factor": 0.0,
+    }
     whole, result = train(tmp_path / "whole", toy, far, **settings)
     (back,) = rows(tmp_path / "whole", "rollback")
     assert (back["step"], back["from_step"]) == (30, 33)

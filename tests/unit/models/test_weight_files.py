@@ -8,7 +8,7 @@ from safetensors.torch import load_file, save_file
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError, OutputError
 from diff4splat.models.factory import create_networks
 from diff4splat.models.sizes import test_size as tiny_size
-from diff4splat.models.weights import (
+from diff4splat.models.weight_files import (
     load_config,
     load_networks,
     part_file,

@@ -3,10 +3,12 @@
     config.json  {vae,text_encoder,dit,ldrm,deformation}.safetensors
 
 Reading is strict: every key and every shape must be the one the configuration asks for. Weights
-may be stored in half precision; they are read into float32.
+may be stored in half precision; they are read into float32. Whether a part may be absent is for
+provenance.py to say.
 """
 
 import hashlib
+from collections.abc import Collection
 from pathlib import Path
 
 import torch
@@ -26,15 +28,21 @@ SHOWN = 3
 
 
 def save_networks(
-    networks: Networks, config: ModelConfig, folder: Path, dtype: torch.dtype = torch.float32
+    networks: Networks,
+    config: ModelConfig,
+    folder: Path,
+    dtype: torch.dtype = torch.float32,
+    only: Collection[str] = PARTS,
 ) -> None:
-    """Write every part in ``dtype``, and the configuration last: a folder with one is complete.
+    """Write the parts in ``dtype``, and the configuration last: a folder with one is complete.
 
     Raises:
         CheckpointError: a weight is NaN or infinite, in ``dtype``.
         OutputError: the folder cannot be written.
     """
     for name, part in networks.parts():
+        if name not in only:
+            continue
         tensors = {
             key: value.detach().cpu().to(dtype).contiguous()
             for key, value in part.state_dict().items()
@@ -45,8 +53,12 @@ def save_networks(
     write_text(folder / CONFIG_FILE, config.to_json())
 
 
-def load_networks(folder: Path, with_text: bool = True) -> tuple[ModelConfig, Networks]:
+def load_networks(
+    folder: Path, with_text: bool = True, may_lack: Collection[str] = ()
+) -> tuple[ModelConfig, Networks]:
     """The configuration and its networks, on the CPU in float32.
+
+    Parts in ``may_lack`` that have no file get the random weights of ``create_networks``.
 
     Raises:
         CheckpointError: a file is absent, or keys or shapes do not belong to the configuration.
@@ -54,9 +66,11 @@ def load_networks(folder: Path, with_text: bool = True) -> tuple[ModelConfig, Ne
         ConfigError: the configuration is not valid.
     """
     config = load_config(folder)
-    networks = create_networks(config, "meta", with_text=with_text)
+    drawn = {name for name in may_lack if not part_file(folder, name).is_file()}
+    networks = create_networks(config, with_text=with_text, needed=drawn)
     for name, part in networks.parts():
-        _fill(part, _read(part_file(folder, name)), name)
+        if name not in drawn:
+            _fill(part, _read(part_file(folder, name)), name)
     return config, networks
 
 

@@ -1,0 +1,47 @@
+"""What the command takes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from diff4splat.configs.recipes import find_recipe, with_clips
+from diff4splat.training.recipe import Recipe
+from diff4splat.training.recipe_json import changed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Train variants of the reconstruction at equal compute and judge them on the same clips.
+
+    The same command goes on after any stop; what is trained or judged is not done again.
+    """
+
+    run: Path
+    """Folder of a training run whose autoencoder (stage vae) is over; all start from it."""
+    out: Path
+    """Folder for all variants, ablations.md, ablations.json and ablations.png."""
+    clips: Path | None = None
+    """Folder of shards to learn from; if left out, worlds are drawn meanwhile."""
+    config: str = "small"
+    """Recipe: a name or a JSON file; stages static-low and dynamic are taken from it."""
+    set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
+    """Changes of the recipe for all variants, such as trainer.precision=bfloat16."""
+    static_steps: int = 300
+    """Of static-low in the full variant."""
+    dynamic_steps: int = 300
+    """Of dynamic in the full variant, at the size of static-low."""
+    items: int = 24
+    """Held-out clips to judge on: the first so many of the protocol."""
+    only: tuple[str, ...] = ()
+    """Names of variants to train and judge now; the full one always is."""
+
+    def recipe(self) -> Recipe:
+        """The recipe that variants change.
+
+        Raises:
+            ConfigError: no such recipe or key.
+        """
+        recipe = changed(find_recipe(self.config), [one for given in self.set for one in given])
+        return recipe if self.clips is None else with_clips(recipe, self.clips)

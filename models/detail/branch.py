@@ -1,0 +1,45 @@
+"""Everything after the tokens when there is a detail decoder: features, raw maps, motion cues.
+
+Axes: ``b`` batch, ``k`` key frames, ``e`` width of a token, ``h4 w4`` token grid, ``h w`` cells of
+4 pixels, ``d`` channels for the deformation network.
+
+    tokens, sight ─ decoder ─┬─ pixel head ─── raw maps ─ depth ─ stabilised neighbours ─┐
+                             ├─ surroundings                                             │
+                             └──────────────────────────── features ─────────────────────┴─ motion
+"""
+
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.config import ModelConfig
+from diff4splat.models.detail.decoder import DetailDecoder, widths
+from diff4splat.models.detail.heads import PixelHead, SurroundingsHead
+from diff4splat.models.detail.sight import Sight
+from diff4splat.models.detail.stabilise import motion_cues
+from diff4splat.models.maps import ReconstructionMaps
+
+
+class DetailBranch(nn.Module):
+    """Raw maps of the key frames and of the surroundings."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        width = widths(config.detail.width)[0]
+        self.activation = config.activation
+        self.decoder = DetailDecoder(config)
+        self.pixels = PixelHead(width)
+        margin = config.detail.surroundings
+        self.surroundings = SurroundingsHead(width, margin) if margin else None
+
+    def forward(self, tokens: Float[Tensor, "b e k h4 w4"], sight: Sight) -> ReconstructionMaps:
+        """``tokens`` of the answer are what the deformation network looks at."""
+        batch = len(tokens)
+        features = self.decoder(tokens, sight)
+        raw = self.pixels(features).unflatten(0, (batch, -1))
+        features = features.unflatten(0, (batch, -1))
+        around = None if self.surroundings is None else self.surroundings(features[:, 0])
+        return ReconstructionMaps(
+            gaussians=raw.transpose(1, 2),
+            tokens=motion_cues(features, raw[:, :, -1], sight, self.activation),
+            surroundings=around,
+        )

@@ -1,0 +1,88 @@
+"""Deformation from the detail decoder's features: one query time per call (MoVieS's time input).
+
+Axes: ``b`` batch, ``d`` channels of features and motion cues, ``k`` key frames, ``n`` = b k,
+``h w`` cells of 4 pixels, ``h4 w4`` pixels, ``e`` width of the condition. Times are fractions of
+the clip. The answer is multiplied by (query time − own time): a Gaussian is where its own frame saw
+it, and what the network says is how fast it leaves.
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.blocks.modulation import ZeroModulation
+from diff4splat.models.blocks.norm import ChannelRmsNorm
+from diff4splat.models.blocks.time_embedding import EmbeddingMlp, octave_embedding
+from diff4splat.models.config import ModelConfig
+from diff4splat.models.config_parts import DEFORMATION_SPLIT
+from diff4splat.models.detail.decoder import widths
+from diff4splat.models.detail.layers import CELL_PX, NEIGHBOURS, convex_enlarge
+from diff4splat.models.detail.stabilise import CUES
+
+CHANNELS = sum(DEFORMATION_SPLIT)
+
+
+class TimeConvBlock(nn.Module):
+    """Convolutional residual, shifted, scaled and gated by the time; the identity when fresh."""
+
+    def __init__(self, width: int, condition_width: int) -> None:
+        super().__init__()
+        self.norm = ChannelRmsNorm(width)
+        self.modulation = ZeroModulation(condition_width, width, 3)
+        self.conv_1 = nn.Conv2d(width, width, 3, padding=1)
+        self.conv_2 = nn.Conv2d(width, width, 3, padding=1)
+
+    def forward(
+        self, features: Float[Tensor, "n c h w"], condition: Float[Tensor, "n e"]
+    ) -> Float[Tensor, "n c h w"]:
+        """One condition per key frame."""
+        shift, scale, gate = self.modulation(condition)[..., None, None].unbind(-4)
+        quiet = self.norm(features) * (1 + scale) + shift
+        hidden = torch.nn.functional.silu(self.conv_1(torch.nn.functional.silu(quiet)))
+        return features + gate * self.conv_2(hidden)
+
+
+class DetailDeformation(nn.Module):
+    """Raw offset, rotation and scale correction of every key-frame pixel at one time."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        own = config.deformation
+        self.octaves = own.octaves
+        self.enter = nn.Conv2d(widths(config.detail.width)[0] + CUES, own.width, 3, padding=1)
+        self.time_mlp = EmbeddingMlp(4 * own.octaves, own.width)
+        self.blocks = nn.ModuleList(
+            [TimeConvBlock(own.width, own.width) for _ in range(own.blocks)]
+        )
+        self.norm = ChannelRmsNorm(own.width)
+        self.weights = nn.Conv2d(own.width, NEIGHBOURS * CELL_PX**2, 1)
+        self.head = zero_(nn.Conv2d(own.width, CHANNELS, 3, padding=1))
+
+    @property
+    def is_identity(self) -> bool:
+        """True while the last layer is exactly zero: nothing moves, so leave the network out."""
+        return not any(bool(parameter.any()) for parameter in self.head.parameters())
+
+    def forward(
+        self, tokens: Float[Tensor, "b d k h w"], time: Float[Tensor, " b"]
+    ) -> Float[Tensor, "b 10 k h4 w4"]:
+        """Channels offset 3, rotation 4, scale offset 3; zero means "does not move"."""
+        batch, _, keys = tokens.shape[:3]
+        own = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
+        condition = self._condition(time, own)
+        features = self.enter(tokens.transpose(1, 2).flatten(0, 1))
+        for block in self.blocks:
+            features = block(features, condition)
+        features = torch.nn.functional.silu(self.norm(features))
+        motion = convex_enlarge(self.head(features), self.weights(features))
+        motion = motion.unflatten(0, (batch, keys))
+        elapsed = (time[:, None] - own)[..., None, None, None]
+        return (elapsed.to(motion.dtype) * motion).transpose(1, 2).to(tokens.dtype)
+
+    def _condition(
+        self, time: Float[Tensor, " b"], own: Float[Tensor, " k"]
+    ) -> Float[Tensor, "n e"]:
+        query = octave_embedding(time, self.octaves)[:, None].expand(-1, len(own), -1)
+        source = octave_embedding(own, self.octaves)[None].expand(len(time), -1, -1)
+        return self.time_mlp(torch.cat([query, source], -1)).flatten(0, 1)

@@ -1,0 +1,79 @@
+"""Raw maps with their pictures to canonical Gaussians: key frames, then surroundings.
+
+Axes: ``k`` key frames, ``h w`` pixels, ``n`` = k h w cells, ``m`` of them kept. Every key frame's
+pixel starts with the colour that the decoded video has there (input-frame colour skip; a departure
+from the paper, whose colours come from tokens alone), on a plane before its own camera.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.geometry.camera import Camera
+from diff4splat.geometry.depth import distance_from_depth
+from diff4splat.models.base_scene import OPAQUE, PLANE_DEPTH
+from diff4splat.models.config_parts import ActivationConfig
+from diff4splat.models.detail.coverage import covered
+from diff4splat.models.detail.layers import CELL_PX
+from diff4splat.models.detail.sight import Sight
+from diff4splat.models.detail.stabilise import key_depth
+from diff4splat.models.detail.surroundings import surroundings_base
+from diff4splat.models.heads import PixelBase, activate
+from diff4splat.models.maps import ReconstructionMaps
+from diff4splat.scene.gaussians import Gaussians, concatenate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetailedGaussians:
+    """What ``canonical_gaussians`` makes."""
+
+    gaussians: Gaussians
+    """Those of pixels first; the surroundings behind them never move."""
+    cells: Int[Tensor, " m"]
+    """Where each of the first m lies in the grid of key frames."""
+    doubled: int
+    """Pixels left out because an earlier key frame shows the same point."""
+
+
+def canonical_gaussians(
+    maps: ReconstructionMaps, sight: Sight, config: ActivationConfig
+) -> DetailedGaussians:
+    """Gaussians of a batch of one."""
+    cameras, raw = sight.key_cameras[0], maps.gaussians[0].float()
+    base = key_base(sight.key_rgb[0].movedim(1, -1), cameras)
+    depth = key_depth(raw[-1], config)
+    kept = ~covered(depth.detach(), cameras).flatten()
+    parts = [activate(raw, base, config).select(kept)]
+    if maps.surroundings is not None:
+        parts.append(_surroundings(maps.surroundings[0].float(), base, depth[0], config))
+    cells = kept.nonzero()[:, 0]
+    return DetailedGaussians(
+        gaussians=concatenate(parts), cells=cells, doubled=len(kept) - len(cells)
+    )
+
+
+def key_base(rgb: Float[Tensor, "k h w 3"], cameras: Camera) -> PixelBase:
+    """The key frames' own pixels, each on a plane before its own camera."""
+    plane = torch.full_like(rgb[..., 0], PLANE_DEPTH)
+    return PixelBase(
+        rgb=rgb,
+        distance=distance_from_depth(cameras, plane),
+        opacity=torch.full_like(plane, OPAQUE),
+        cameras=cameras,
+    )
+
+
+def _surroundings(
+    raw: Float[Tensor, "12 hs ws"],
+    base: PixelBase,
+    depth: Float[Tensor, "h w"],
+    config: ActivationConfig,
+) -> Gaussians:
+    """The layer behind the first picture."""
+    camera = base.cameras[0]
+    distance = distance_from_depth(camera, depth)
+    margin = (raw.shape[-1] - base.rgb.shape[2] // CELL_PX) // 2
+    behind = surroundings_base(base.rgb[0], distance, camera, margin)
+    return activate(raw[:, None], behind, config)

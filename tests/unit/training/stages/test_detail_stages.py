@@ -1,0 +1,77 @@
+"""Stages of a model with a detail decoder: what it sees, what it learns from."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
+
+from diff4splat.errors import ConfigError
+from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.config import DetailConfig, ModelConfig
+from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.stage import TOTAL
+
+DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4)
+MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
+SIGHT = "sight"
+
+
+def detailed(name: str) -> StageRecipe:
+    """The stage with key frames and with their depth in the loss."""
+    recipe = stage_recipe("static-low" if name == SIGHT else name, depth_log=1.0)
+    data = replace(recipe.data, track_stride=4)
+    if name != SIGHT:
+        return replace(recipe, data=data)
+    return replace(recipe, kind=SIGHT, data=data, true_pictures=True)
+
+
+@pytest.mark.parametrize("name", [SIGHT, "static-low", "dynamic", "joint"])
+def test_terms_and_gradients_are_finite_and_reach_what_learns(name: str) -> None:
+    recipe = detailed(name)
+    stage = make_stage(recipe, model=MODEL)
+    shake_heads(stage)
+    terms = stage(make_batch(recipe, (0, 1)))
+    assert "depth_log" in terms and ("motion" in terms) == (name in ("dynamic", "joint"))
+    terms[TOTAL].sum().backward()
+    for part in recipe.trained:
+        gradients = [p.grad for p in getattr(stage, part).parameters() if p.grad is not None]
+        assert gradients and all(bool(g.isfinite().all()) for g in gradients), part
+
+
+def test_pictures_alone_need_no_autoencoder() -> None:
+    recipe = detailed(SIGHT)
+    stage = make_stage(recipe, model=MODEL)
+    assert not hasattr(stage, "vae")
+    latent = stage.encode(make_batch(recipe))
+    assert latent.shape == (1, 4, 2, 4, 4) and not latent.any()
+    for wrong in (
+        {"recipe": replace(recipe, true_pictures=False), "model": MODEL},
+        {"recipe": recipe},
+    ):
+        with pytest.raises(ConfigError, match="expected true_pictures and a model with a detail"):
+            make_stage(**wrong)
+
+
+@pytest.mark.parametrize("true_pictures", [True, False])
+def test_the_first_picture_is_always_the_true_one(true_pictures: bool) -> None:
+    recipe = replace(detailed("static-low"), true_pictures=true_pictures)
+    stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe)
+    seen = stage.sight(batch, stage.encode(batch)).rgb.movedim(1, -1)
+    truth = unit_rgb(batch.video)
+    assert torch.equal(seen[:, 0], truth[:, 0])
+    assert torch.equal(seen[:, 1:], truth[:, 1:]) == true_pictures
+
+
+def test_without_a_detail_decoder_there_is_nothing_to_see() -> None:
+    recipe = stage_recipe("static-low")
+    stage, batch = make_stage(recipe), make_batch(recipe)
+    assert stage.sight(batch, stage.encode(batch)) is None
+
+
+def test_followed_points_are_those_of_key_frames() -> None:
+    batch = make_batch(detailed("dynamic"))
+    frames = batch.track_cell[..., 0][batch.track_valid]
+    assert set(frames.tolist()) <= {0, 4}
+    assert batch.depth.shape[1] == 2
