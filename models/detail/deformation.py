@@ -75,8 +75,8 @@ class DetailDeformation(nn.Module):
         for block in self.blocks:
             features = block(features, condition)
         features = torch.nn.functional.silu(self.norm(features))
-        motion = convex_enlarge(self.head(features), self.weights(features))
-        motion = motion.unflatten(0, (batch, keys))
+        raw = self.head(features) * _lengths(tokens).to(features.dtype)
+        motion = convex_enlarge(raw, self.weights(features)).unflatten(0, (batch, keys))
         elapsed = (time[:, None] - own)[..., None, None, None]
         return (elapsed.to(motion.dtype) * motion).transpose(1, 2).to(tokens.dtype)
 
@@ -86,3 +86,10 @@ class DetailDeformation(nn.Module):
         query = octave_embedding(time, self.octaves)[:, None].expand(-1, len(own), -1)
         source = octave_embedding(own, self.octaves)[None].expand(len(time), -1, -1)
         return self.time_mlp(torch.cat([query, source], -1)).flatten(0, 1)
+
+
+def _lengths(tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n 10 h w"]:
+    """Relative depth for the channels of the offset, 1 for all others."""
+    offsets = torch.arange(CHANNELS, device=tokens.device) < DEFORMATION_SPLIT[0]
+    log_depth = tokens[:, -1:].transpose(1, 2).flatten(0, 1)
+    return (log_depth * offsets[:, None, None]).exp()
