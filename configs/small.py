@@ -28,7 +28,7 @@ from diff4splat.training.recipe import (
 )
 
 RECONSTRUCTION = LossWeights(
-    photometric=4.0, perceptual=0.05, depth_log=0.5, motion=2.0, motion_size=0.0
+    photometric=4.0, perceptual=0.05, depth_log=0.5, motion_size=0.0, motion_width=0.2
 )
 """Without the paper's pull to standstill, which costs more than half of what motion gains."""
 FRESH = (("deformation", 2.0),)

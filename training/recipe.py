@@ -46,6 +46,8 @@ class LossWeights:
     """λ_m: distance between predicted and true displacement, inside the motion loss (paper)."""
     motion_size: float = 1.0
     """Size of the predicted displacement, inside the motion loss (paper; pulls to standstill)."""
+    motion_width: float = 0.0
+    """Distance, in model units, below which the motion loss is quadratic (ours); 0 is the paper."""
     divergence: float = 1e-4
     """KL of the autoencoder's posterior (ours; latent diffusion uses 1e-6 on sums)."""
 

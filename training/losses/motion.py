@@ -8,6 +8,10 @@ displacements are from the time a point was found at to the queried time, in the
 (Diff4Splat, arXiv 2511.00503, losses; O are the valid points.) The second term pulls every point
 to standstill, and the paper gives no reason for it: weight 0 switches it off. In a scene in which
 nothing moves the truth is zero, and both terms ask for the same.
+
+``width`` w rounds the distance off near 0, √(d² + w²) − w (ours). Most points stand still, and a
+plain distance pulls each of them to exactly zero as hard as it pulls others to where they go: a
+network that does not know yet which is which then stays at zero.
 """
 
 import torch
@@ -25,6 +29,7 @@ def track_motion(
     *,
     distance_weight: float = 2.0,
     size_weight: float = 1.0,
+    width: float = 0.0,
 ) -> Float[Tensor, " b"]:
     """The motion loss over an element's valid points; 0 with zero gradient without any.
 
@@ -34,6 +39,8 @@ def track_motion(
     predicted, truth, valid = _known(predicted, truth, valid)
     # The norm's gradient is 0 where both agree exactly.
     apart = torch.linalg.vector_norm(predicted - truth, dim=-1)
+    if width:
+        apart = torch.hypot(apart, torch.full_like(apart, width)) - width
     loss = distance_weight * apart
     if size_weight:
         loss = loss + size_weight * predicted.abs().sum(-1)

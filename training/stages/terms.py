@@ -59,4 +59,5 @@ def _motion(
         valid.flatten(1, 2),
         distance_weight=weights.motion_distance,
         size_weight=weights.motion_size,
+        width=weights.motion_width,
     )

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import oracles_losses as oracle
 import pytest
@@ -90,3 +92,20 @@ def test_shapes_must_agree() -> None:
         track_motion(one, two)
     with pytest.raises(ShapeError, match=r"valid: expected \(1, 2\) bool, got \(2, 2\) bool"):
         track_motion(one, one, torch.ones(2, 2, dtype=torch.bool))
+
+
+def test_a_width_rounds_the_distance_off_near_zero() -> None:
+    truth = torch.zeros(1, 3, 3, dtype=torch.float64)
+    predicted = torch.tensor([[[0.0, 0, 0], [0.3, 0.4, 0], [30.0, 40, 0]]], dtype=torch.float64)
+    want = sum(math.hypot(d, 1.2) - 1.2 for d in (0.0, 0.5, 50.0)) / 3
+    loss = track_motion(predicted, truth, distance_weight=1.0, size_weight=0.0, width=1.2)
+    torch.testing.assert_close(loss, torch.tensor([want], dtype=torch.float64))
+
+
+def test_a_width_has_the_right_gradient_and_none_where_both_agree() -> None:
+    truth = torch.rand(1, 4, 3, dtype=torch.float64)
+    predicted = (truth + 0.3).requires_grad_()
+    assert torch.autograd.gradcheck(lambda p: track_motion(p, truth, width=0.2), predicted)
+    same = truth.clone().requires_grad_()
+    track_motion(same, truth, size_weight=0.0, width=0.2).sum().backward()
+    assert not same.grad.any()
