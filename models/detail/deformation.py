@@ -50,7 +50,10 @@ class DetailDeformation(nn.Module):
         super().__init__()
         own = config.deformation
         self.octaves = own.octaves
-        self.enter = nn.Conv2d(widths(config.detail.width)[0] + CUES, own.width, 3, padding=1)
+        seen = widths(config.detail.width)[0]
+        # Features grow along their skips; cues would drown in them.
+        self.norm_in = ChannelRmsNorm(seen)
+        self.enter = nn.Conv2d(seen + CUES, own.width, 3, padding=1)
         self.time_mlp = EmbeddingMlp(4 * own.octaves, own.width)
         self.blocks = nn.ModuleList(
             [TimeConvBlock(own.width, own.width) for _ in range(own.blocks)]
@@ -71,7 +74,8 @@ class DetailDeformation(nn.Module):
         batch, _, keys = tokens.shape[:3]
         own = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
         condition = self._condition(time, own)
-        features = self.enter(tokens.transpose(1, 2).flatten(0, 1))
+        seen, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
+        features = self.enter(torch.cat([self.norm_in(seen), cues], 1))
         for block in self.blocks:
             features = block(features, condition)
         features = torch.nn.functional.silu(self.norm(features))

@@ -27,9 +27,11 @@ NEIGHBOURS = (-4, -2, -1, 1, 2, 4)
 """Frames before and after a key frame; beyond the video its ends stand in."""
 REACH = 3
 """Farthest shift along one axis, in steps of two pixels."""
+SIDE = 2 * REACH + 1
+"""Shifts along one axis; votes times it have a root mean square of 1 where all are for one."""
 SHARPNESS, STILLNESS = 60.0, 0.004
 """Of the vote, per unit of colour; and what a step of shift costs where colours cannot tell."""
-CUES = (2 * REACH + 1) ** 2 * len(NEIGHBOURS) + 1
+CUES = SIDE**2 * len(NEIGHBOURS) + 1
 """Channels behind the features: a vote per neighbour, and the logarithm of depth at the end."""
 
 
@@ -45,7 +47,7 @@ def motion_cues(
         votes = [match(_carried(depth, sight, offset), sight.key_rgb) for offset in NEIGHBOURS]
         relative = (depth / PLANE_DEPTH).log().flatten(0, 1)[:, None]
         relative = torch.nn.functional.avg_pool2d(relative, CELL_PX).unflatten(0, depth.shape[:2])
-        cues = torch.cat([*votes, relative], 2)
+        cues = torch.cat([*(SIDE * vote for vote in votes), relative], 2)
     return torch.cat([features, cues.to(features.dtype)], 2).transpose(1, 2)
 
 
@@ -75,8 +77,8 @@ def _shifted_costs(
     height, width = here.shape[-2:]
     around = torch.nn.functional.pad(there, (REACH,) * 4, mode="replicate")
     costs = []
-    for down in range(2 * REACH + 1):
-        for right in range(2 * REACH + 1):
+    for down in range(SIDE):
+        for right in range(SIDE):
             moved = around[..., down : down + height, right : right + width]
             length = math.hypot(down - REACH, right - REACH)
             costs.append((moved - here).abs().mean(1) + STILLNESS * length)
