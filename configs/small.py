@@ -50,7 +50,21 @@ def small_recipe() -> Recipe:
         views=2,
         target_frames=4,
     )
-    vae = StageRecipe(
+    vae = _autoencoder(data)
+    sight = _sight(vae, data)
+    static = replace(sight, name="static-low", kind="static", steps=600)
+    dynamic = _dynamic(static, data.tracks)
+    return Recipe(
+        name="small",
+        seed=0,
+        model=model,
+        stages=(vae, sight, static, dynamic, _generator(dynamic, vae), _joint(dynamic)),
+        trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
+    )
+
+
+def _autoencoder(data: DataSettings) -> StageRecipe:
+    return StageRecipe(
         name="vae",
         kind="vae",
         steps=1_600,
@@ -62,43 +76,42 @@ def small_recipe() -> Recipe:
         data=dynamic_data(replace(data, target_frames=1, tracks=0)),
         gates=(Gate(measure="psnr", bound=28.0),),
     )
-    sight = replace(
+
+
+def _sight(vae: StageRecipe, data: DataSettings) -> StageRecipe:
+    """LDRM from pictures and cameras alone; may run beside the autoencoder."""
+    return replace(
         static_stage(vae, data),
         name="sight",
         kind="sight",
         steps=2_400,
-        global_batch=4,
-        micro_batch=4,
         losses=RECONSTRUCTION,
         optimizer=OptimizerSettings(learning_rate=8e-4, warmup_steps=200),
         true_pictures=True,
         gates=reconstruction_gates(psnr=16.0, depth_correlation=0.5),
     )
-    static = replace(sight, name="static-low", kind="static", steps=600)
-    dynamic = replace(
-        dynamic_stage(static, data.tracks),
+
+
+def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
+    return replace(
+        dynamic_stage(static, tracks),
         steps=4_000,
-        optimizer=replace(sight.optimizer, learning_rate=6e-4, part_rates=FRESH),
+        optimizer=replace(static.optimizer, learning_rate=6e-4, part_rates=FRESH),
         true_pictures=False,
         gates=(*static.gates, Gate(measure="track_share", bound=0.8, direction="at_most")),
     )
-    generator = generator_stage(dynamic)
-    generator = replace(
-        generator,
-        steps=40_000,
-        optimizer=vae.optimizer,
-        data=replace(generator.data, augment=False),
-    )
-    joint = replace(
+
+
+def _generator(dynamic: StageRecipe, vae: StageRecipe) -> StageRecipe:
+    """Captions speak of left and right, so clips are not mirrored here."""
+    stage = replace(generator_stage(dynamic), steps=40_000, optimizer=vae.optimizer)
+    return replace(stage, data=replace(stage.data, augment=False))
+
+
+def _joint(dynamic: StageRecipe) -> StageRecipe:
+    return replace(
         joint_stage(dynamic),
         steps=2_000,
         data=replace(dynamic.data, augment=False),
         optimizer=replace(dynamic.optimizer, learning_rate=2e-5, warmup_steps=100),
-    )
-    return Recipe(
-        name="small",
-        seed=0,
-        model=model,
-        stages=(vae, sight, static, dynamic, generator, joint),
-        trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
