@@ -3,7 +3,7 @@
 Axes: ``k`` key frames, ``h w`` pixels. A pixel is covered when an earlier key frame sees the same
 point: it lies in its picture, at about the depth that it has there. What moves is at another place
 in every key frame and stays. Leaving covered pixels out keeps doubled surfaces, which never agree
-exactly, from blurring each other, and most scenes need little more than one frame's Gaussians.
+exactly, from blurring each other.
 """
 
 import torch

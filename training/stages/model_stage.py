@@ -67,7 +67,7 @@ class ModelStage(Stage):
         """What the detail decoder sees: decoded pictures behind the first one, which is true.
 
         None where the model has no such decoder. Recipes may show the true pictures instead of
-        decoding, which takes longer than all else in a step.
+        decoding, which is about a fifth of a dynamic step.
         """
         if not self.plan.model.detail.used:
             return None

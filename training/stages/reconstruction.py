@@ -13,11 +13,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.errors import ConfigError
-from diff4splat.models.factory import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stages.measures import reconstruction_measures
-from diff4splat.training.stages.model_stage import ModelStage, StagePlan, network_rays
+from diff4splat.training.stages.model_stage import ModelStage, network_rays
 from diff4splat.training.stages.panels import reconstruction_panel
 from diff4splat.training.stages.prediction import (
     Rendered,
@@ -61,18 +59,11 @@ class StaticStage(ModelStage):
 class SightStage(StaticStage):
     """The same from pictures and cameras alone, before there is an autoencoder: latents are 0.
 
-    Most of a detail decoder needs none, so this stage can run while the autoencoder learns.
+    Most of a detail decoder needs none, so this stage can run while the autoencoder learns. Recipes
+    make sure that there is such a decoder and that it sees true pictures.
     """
 
     parts = ("ldrm",)
-
-    def __init__(self, networks: Networks, plan: StagePlan) -> None:
-        super().__init__(networks, plan)
-        if not (plan.recipe.true_pictures and plan.model.detail.used):
-            raise ConfigError(
-                f"stage {plan.recipe.name}: expected true_pictures and a model with a detail "
-                "decoder, since nothing is encoded or decoded here; set both or leave it out"
-            )
 
     def encode(self, batch: ClipBatch) -> Float[Tensor, "b c t h2 w2"]:
         """Zeros in the shape of the latents."""
