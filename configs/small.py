@@ -12,6 +12,7 @@ from diff4splat.configs.stages import (
     dynamic_stage,
     generator_stage,
     joint_stage,
+    motion_stage,
     reconstruction_gates,
     static_stage,
 )
@@ -28,11 +29,10 @@ from diff4splat.training.recipe import (
 )
 
 RECONSTRUCTION = LossWeights(
-    photometric=4.0, perceptual=0.05, depth_log=0.5, motion_size=0.0, motion_width=0.2
+    photometric=4.0, perceptual=0.0, depth_log=0.5, motion_size=0.0, motion_width=0.2
 )
 """Without the paper's pull to standstill, which costs more than half of what motion gains."""
-FRESH = (("deformation", 2.0),)
-"""Factors of the learning rate: the deformation network has learnt nothing before."""
+TRACK_GATE = Gate(measure="track_share", bound=0.8, direction="at_most")
 
 
 def small_recipe() -> Recipe:
@@ -52,13 +52,14 @@ def small_recipe() -> Recipe:
     )
     vae = _autoencoder(data)
     sight = _sight(vae, data)
-    static = replace(sight, name="static-low", kind="static", steps=600)
+    static = replace(sight, name="static-low", kind="static", steps=400)
+    motion = _motion(static, data.tracks)
     dynamic = _dynamic(static, data.tracks)
     return Recipe(
         name="small",
         seed=0,
         model=model,
-        stages=(vae, sight, static, dynamic, _generator(dynamic, vae), _joint(dynamic)),
+        stages=(vae, sight, static, motion, dynamic, _generator(dynamic, vae), _joint(dynamic)),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
 
@@ -67,7 +68,7 @@ def _autoencoder(data: DataSettings) -> StageRecipe:
     return StageRecipe(
         name="vae",
         kind="vae",
-        steps=1_600,
+        steps=600,
         global_batch=4,
         micro_batch=4,
         trained=("vae",),
@@ -84,7 +85,8 @@ def _sight(vae: StageRecipe, data: DataSettings) -> StageRecipe:
         static_stage(vae, data),
         name="sight",
         kind="sight",
-        steps=2_400,
+        steps=2_000,
+        micro_batch=2,
         losses=RECONSTRUCTION,
         optimizer=OptimizerSettings(learning_rate=8e-4, warmup_steps=200),
         true_pictures=True,
@@ -92,13 +94,27 @@ def _sight(vae: StageRecipe, data: DataSettings) -> StageRecipe:
     )
 
 
+def _motion(static: StageRecipe, tracks: int) -> StageRecipe:
+    """Many times per clip: without rendering another one costs little."""
+    stage = motion_stage(static, tracks)
+    return replace(
+        stage,
+        steps=3_000,
+        global_batch=8,
+        micro_batch=8,
+        data=replace(stage.data, target_frames=8),
+        optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
+        gates=(TRACK_GATE,),
+    )
+
+
 def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
     return replace(
         dynamic_stage(static, tracks),
         steps=4_000,
-        optimizer=replace(static.optimizer, learning_rate=6e-4, part_rates=FRESH),
+        optimizer=replace(static.optimizer, learning_rate=6e-4),
         true_pictures=False,
-        gates=(*static.gates, Gate(measure="track_share", bound=0.8, direction="at_most")),
+        gates=(*static.gates, TRACK_GATE),
     )
 
 

@@ -33,6 +33,12 @@ def static_stage(vae: StageRecipe, data: DataSettings) -> StageRecipe:
     return replace(vae, name="static-low", kind="static", trained=("ldrm",), data=data)
 
 
+def motion_stage(static: StageRecipe, tracks: int) -> StageRecipe:
+    """Deformation alone, from followed points on moving and still clips."""
+    data = dynamic_data(replace(static.data, tracks=tracks))
+    return replace(static, name="motion", kind="motion", trained=("deformation",), data=data)
+
+
 def dynamic_stage(static: StageRecipe, tracks: int) -> StageRecipe:
     """Deformation too, on moving and still clips with followed points."""
     data = dynamic_data(replace(static.data, tracks=tracks))

@@ -13,6 +13,8 @@ convolution over all levels enlarged and stacked, for a small part of the memory
 start at zero.
 """
 
+from collections.abc import Iterable, Iterator
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -104,6 +106,13 @@ class DeformationNetwork(nn.Module):
         frames = motion.shape[1]
         motion = enlarge(motion.flatten(0, 1), self.last_scale).unflatten(0, (batch, frames))
         return motion.transpose(1, 2).to(tokens.dtype)
+
+    def at_times(
+        self, tokens: Float[Tensor, "b d t h w"], times: Iterable[Float[Tensor, " b"]]
+    ) -> Iterator[Float[Tensor, "b 10 f hh ww"]]:
+        """The same at one time after the other."""
+        for time in times:
+            yield self(tokens, time)
 
     def _tokens_at(self, tokens: Tensor, time: Tensor) -> Float[Tensor, "b t h w e"]:
         frames = tokens.shape[2]

@@ -114,9 +114,8 @@ def deform(
     fractions = torch.linspace(0, 1, len(key_times_s), device=key_times_s.device)
     states = []
     with log.phases.phase("deform", len(key_times_s)) as advance:
-        for fraction in fractions:
-            raw = network(canonical.maps.tokens, fraction[None])[0].float()
-            states.append(deformation_state(raw, raw_scale, canonical.cells, units))
+        for raw in network.at_times(canonical.maps.tokens, fractions[:, None]):
+            states.append(deformation_state(raw[0].float(), raw_scale, canonical.cells, units))
             advance()
     everything = torch.arange(len(canonical.cells), device=raw_scale.device)
     return keyframe_motion(states, key_times_s, everything)

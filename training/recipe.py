@@ -12,11 +12,11 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.config_parts import TIME_STRIDE
 
-StageKind = Literal["vae", "sight", "static", "dynamic", "generator", "joint"]
+StageKind = Literal["vae", "sight", "static", "motion", "dynamic", "generator", "joint"]
 Precision = Literal["float32", "bfloat16"]
 Parallel = Literal["none", "ddp", "fsdp2"]
 Direction = Literal["at_least", "at_most"]
-RECONSTRUCTING = ("sight", "static", "dynamic", "joint")
+RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "joint")
 
 
 def _require(holds: bool, what: str, expected: str, got: object) -> None:

@@ -47,7 +47,7 @@ def run(options: Options) -> None:
     """Check everything cheap, then train and judge one variant after the other."""
     require_matplotlib()
     variants = chosen_variants(options.only)
-    base = reduced(options.recipe(), options.static_steps, options.dynamic_steps)
+    base = reduced(options.recipe(), options.steps)
     for variant in variants:
         recipe_of(variant, base)
     judged = held_out(base.stage(STATIC).data.size_px, options.items)

@@ -1,9 +1,10 @@
-"""Trains a variant in its folder: OUT/<variant>/{vae, static-low, dynamic, model, plan-*.json}.
+"""Trains a variant in its folder: OUT/<variant>/{vae, <stage>, model, plan-<stage>.json}.
 
-The autoencoder is a link to the run it was trained in; a static stage that equals the full one's is
-a link to that. Seconds are made equal by steps: a few steps of the variant and of the full one are
-timed one after the other, and the full one's steps times the ratio are the variant's. So learning
-rates end when the time does. Steps once chosen are kept, for going on after a stop.
+The autoencoder is a link to the run it was trained in; a static or motion stage that learns the
+very same as the full one's is a link to that. Seconds are made equal by steps: a few steps of the
+variant and of the full one are timed one after the other, and the full one's steps times the ratio
+are the variant's. So learning rates end when the time does. Steps once chosen are kept, for going
+on after a stop.
 """
 
 import json
@@ -15,8 +16,8 @@ from pathlib import Path
 from ablations.clock import StepClock, step_seconds, steps_for, typical_s
 from ablations.variants import (
     AUTOENCODER,
+    DYNAMIC,
     FULL,
-    STATIC,
     Variant,
     paid_by,
     recipe_of,
@@ -99,19 +100,22 @@ def require_autoencoder(run: Path) -> Path:
 
 
 def is_shared(recipe: Recipe, stage: str, base: Recipe) -> bool:
-    """Whether a variant's static stage learns the very same as the full one's."""
-    return stage == STATIC and fingerprint(recipe, stage) == fingerprint(base, stage)
+    """Whether a variant's static or motion stage learns the very same as the full one's.
+
+    The dynamic stage leaves the model behind, so every variant trains its own.
+    """
+    return stage != DYNAMIC and _course(recipe, stage) == _course(base, stage)
 
 
 def is_finished(folder: Path, recipe: Recipe) -> bool:
     """Whether a stage is over, with this very recipe.
 
     Raises:
-        ConfigError: it was begun with another one.
+        ConfigError: it was begun with another one, or after other stages.
     """
     if (folder / RECIPE_FILE).is_file():
         begun = recipe_from_json((folder / RECIPE_FILE).read_text(encoding="utf-8"))
-        if fingerprint(begun, folder.name) != fingerprint(recipe, folder.name):
+        if _course(begun, folder.name) != _course(recipe, folder.name):
             raise ConfigError(
                 f"{folder}: expected a stage of the same recipe and steps, got another; "
                 "choose another --out, or the options it was begun with"
@@ -132,6 +136,12 @@ def link(target: Path, place: Path) -> None:
         raise ConfigError(
             f"{place}: expected a link to {target}, got {place.resolve()}; choose another --out"
         )
+
+
+def _course(recipe: Recipe, stage: str) -> list[str]:
+    """Fingerprints of a stage and those before it: one alone does not say what it builds on."""
+    names = trained_stages(recipe)
+    return [fingerprint(recipe, name) for name in names[: names.index(stage) + 1]]
 
 
 def _planned_steps(recipe: Recipe, stage: str, folder: Path, lab: Lab) -> int:

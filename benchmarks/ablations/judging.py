@@ -95,13 +95,11 @@ def held_out(size_px: tuple[int, int], items: int) -> HeldOut:
 
 def protocol_at(size_px: tuple[int, int]) -> Protocol:
     """The shipped protocol at another size."""
-    shipped = load_protocol(SHIPPED).protocol
+    protocol = load_protocol(SHIPPED).protocol.at_size(size_px)
     return replace(
-        shipped,
-        name=f"{SHIPPED} at {size_px[0]} px",
-        size_px=size_px,
-        loop=replace(shipped.loop, frames=SHORTEST, size_px=size_px),
-        pose=replace(shipped.pose, frames=SHORTEST, size_px=size_px),
+        protocol,
+        loop=replace(protocol.loop, frames=SHORTEST),
+        pose=replace(protocol.pose, frames=SHORTEST, size_px=size_px),
     )
 
 

@@ -1,11 +1,13 @@
 """What the command takes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from ablations.variants import DYNAMIC, MOTION, STATIC
 from diff4splat.configs.recipes import find_recipe, with_clips
 from diff4splat.training.recipe import Recipe
 from diff4splat.training.recipe_json import changed
@@ -25,11 +27,13 @@ class Options:
     clips: Path | None = None
     """Folder of shards to learn from; if left out, worlds are drawn meanwhile."""
     config: str = "small"
-    """Recipe: a name or a JSON file; stages static-low and dynamic are taken from it."""
+    """Recipe: a name or a JSON file; stages static-low, motion and dynamic are taken from it."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Changes of the recipe for all variants, such as trainer.precision=bfloat16."""
     static_steps: int = 300
     """Of static-low in the full variant."""
+    motion_steps: int = 300
+    """Of motion in the full variant, at the size of static-low."""
     dynamic_steps: int = 300
     """Of dynamic in the full variant, at the size of static-low."""
     items: int = 24
@@ -45,3 +49,8 @@ class Options:
         """
         recipe = changed(find_recipe(self.config), [one for given in self.set for one in given])
         return recipe if self.clips is None else with_clips(recipe, self.clips)
+
+    @property
+    def steps(self) -> Mapping[str, int]:
+        """Of every stage in the full variant."""
+        return {STATIC: self.static_steps, MOTION: self.motion_steps, DYNAMIC: self.dynamic_steps}

@@ -56,15 +56,17 @@ def _record(row: Row, full: Row, protocol: Protocol) -> dict[str, object]:
 
 def _head(rows: Sequence[Row], base: Recipe, protocol: Protocol) -> list[str]:
     stages = base.stages[1:]
-    steps = " and ".join(f"{stage.steps} steps of {stage.name}" for stage in stages)
+    counts = [f"{stage.steps} of {stage.name}" for stage in stages]
+    counts[0] = f"{stages[0].steps} steps of {stages[0].name}"
     size_px = stages[0].data.size_px
     count, whole = max(len(row.items) for row in rows), protocol.source.count
     return [
         "# Ablations of the reconstruction",
         "",
         f"Recipe {base.name}, seed {base.seed}, {size_px[1]} × {size_px[0]} px. The full variant "
-        f"takes {steps}; the others take about the same processor seconds, in as many steps as a "
-        f"timing of {TIMED} steps allows. All start from the same autoencoder.",
+        f"takes {', '.join(counts[:-1])} and {counts[-1]}; the others take about the same "
+        f"processor seconds, in as many steps as a timing of {TIMED} steps allows. Seconds of "
+        f"stages left out go to {stages[-1].name}. All start from the same autoencoder.",
         f"Protocol {protocol.name}, digest `{protocol.digest}`, reconstruction; the first {count} "
         f"of {whole} clips.",
         "One training each: intervals say how much means depend on the clips, not on the seed.",

@@ -1,19 +1,20 @@
 """What each variant leaves out or exchanges, as changes of one recipe.
 
-    vae (trained before) ─ static-low, S steps ─ dynamic, D steps
+    vae (trained before) ─ static-low, S steps ─ motion, M steps ─ dynamic, D steps
 
-Both stages run at the size of ``static-low``. Their names stay the same in every variant, because
+All three run at the size of ``static-low``. Their names stay the same in every variant, because
 samples follow from names: all variants see the same clips and targets in the same order.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from diff4splat.errors import ConfigError
 from diff4splat.training.recipe import Recipe, StageRecipe
 from diff4splat.training.recipe_json import changed
 
-AUTOENCODER, STATIC, DYNAMIC = "vae", "static-low", "dynamic"
-STAGES = (STATIC, DYNAMIC)
+AUTOENCODER, STATIC, MOTION, DYNAMIC = "vae", "static-low", "motion", "dynamic"
+STAGES = (STATIC, MOTION, DYNAMIC)
 WARM_UP_SHARE = 0.1
 """Of a stage's steps: the warm-up of a whole training would fill most of a short one."""
 
@@ -27,14 +28,18 @@ class Variant:
     title: str
     changes: tuple[str, ...] = ()
     """As ``--set`` of the training command takes them."""
-    ordered: bool = True
-    """False: motion is learnt from the start, in the time of both stages."""
+    without: tuple[str, ...] = ()
+    """Stages left out; the dynamic stage gets their processor time."""
     true_pictures: bool = False
     """Judged with the given pictures as they are, not as the autoencoder decodes them."""
 
 
-def _both(change: str) -> tuple[str, ...]:
-    return tuple(f"stages.{stage}.{change}" for stage in STAGES)
+def _each(stages: tuple[str, ...], change: str) -> tuple[str, ...]:
+    return tuple(f"stages.{stage}.{change}" for stage in stages)
+
+
+def _rendering(change: str) -> tuple[str, ...]:
+    return _each((STATIC, DYNAMIC), change)
 
 
 FULL = Variant(name="full", title="full")
@@ -43,28 +48,32 @@ VARIANTS = (
     Variant(
         name="no-motion-loss",
         title="no motion loss",
+        # The motion stage has no other loss to learn from.
+        without=(MOTION,),
         changes=(f"stages.{DYNAMIC}.losses.motion=0",),
     ),
     Variant(
         name="no-deformation",
         title="no deformation",
+        without=(MOTION,),
         changes=(f"stages.{DYNAMIC}.kind=static", f'stages.{DYNAMIC}.trained=["ldrm"]'),
     ),
     Variant(
         name="no-depth-correlation",
         title="no depth correlation, nor smoothness",
-        changes=_both("losses.depth=0"),
+        changes=_rendering("losses.depth=0"),
     ),
     Variant(
         name="no-depth-loss",
         title="no depth loss at all",
-        changes=(*_both("losses.depth=0"), *_both("losses.depth_log=0")),
+        changes=(*_rendering("losses.depth=0"), *_rendering("losses.depth_log=0")),
     ),
-    Variant(name="no-order", title="no order of stages", ordered=False),
+    Variant(name="no-motion-stage", title="no motion stage", without=(MOTION,)),
+    Variant(name="no-order", title="no order of stages", without=(STATIC, MOTION)),
     Variant(
         name="pictures",
         title="true pictures instead of latents",
-        changes=("model.ldrm.reads=frames", *_both("true_pictures=true")),
+        changes=("model.ldrm.reads=frames", *_each(STAGES, "true_pictures=true")),
         true_pictures=True,
     ),
     Variant(
@@ -94,22 +103,31 @@ def chosen_variants(only: tuple[str, ...]) -> tuple[Variant, ...]:
     return tuple(variant for variant in VARIANTS if variant.name in wanted)
 
 
-def reduced(recipe: Recipe, static_steps: int, dynamic_steps: int) -> Recipe:
+def reduced(recipe: Recipe, steps: Mapping[str, int]) -> Recipe:
     """The stages of all variants, at one size and without gates or evaluations.
 
-    Samples are made in the training process, so that its seconds are all there is to count.
+    ``steps`` has those of the full variant by stage. Samples are made in the training process, so
+    that its seconds are all there is to count.
 
     Raises:
         ConfigError: the recipe lacks a stage, or steps are not at least 1.
     """
-    static, dynamic = recipe.stage(STATIC), recipe.stage(DYNAMIC)
-    dynamic = replace(dynamic, data=replace(dynamic.data, size_px=static.data.size_px))
+    names = [stage.name for stage in recipe.stages]
+    if missing := [name for name in (AUTOENCODER, *STAGES) if name not in names]:
+        raise ConfigError(
+            f"--config: expected a recipe with stages {', '.join((AUTOENCODER, *STAGES))}, got "
+            f"{recipe.name!r} without {', '.join(missing)}; choose another"
+        )
+    size_px = recipe.stage(STATIC).data.size_px
     later = [
-        replace(stage, gates=(), data=replace(stage.data, workers=0)) for stage in (static, dynamic)
+        replace(stage, gates=(), data=replace(stage.data, size_px=size_px, workers=0))
+        for stage in map(recipe.stage, STAGES)
     ]
     trainer = replace(recipe.trainer, evaluation_samples=0, keep_checkpoints=1)
     whole = replace(recipe, stages=(recipe.stage(AUTOENCODER), *later), trainer=trainer)
-    return with_steps(with_steps(whole, STATIC, static_steps), DYNAMIC, dynamic_steps)
+    for name in STAGES:
+        whole = with_steps(whole, name, steps[name])
+    return whole
 
 
 def with_steps(recipe: Recipe, stage: str, steps: int) -> Recipe:
@@ -124,7 +142,7 @@ def with_steps(recipe: Recipe, stage: str, steps: int) -> Recipe:
 
 
 def recipe_of(variant: Variant, base: Recipe) -> Recipe:
-    """The recipe of a variant; each stage has the steps of the full one, both where it is one.
+    """The recipe of a variant: steps of the full one, with those left out added to the last stage.
 
     Raises:
         ConfigError: the base cannot be changed like that.
@@ -133,13 +151,15 @@ def recipe_of(variant: Variant, base: Recipe) -> Recipe:
         recipe = changed(base, variant.changes)
     except ConfigError as error:
         raise ConfigError(f"variant {variant.name}: {error}; choose others with --only") from error
-    if variant.ordered:
+    if not variant.without:
         return recipe
-    static, dynamic = recipe.stage(STATIC), recipe.stage(DYNAMIC)
-    # What starts from nothing learns at the rate of what starts from nothing.
-    dynamic = replace(dynamic, optimizer=static.optimizer)
-    alone = replace(recipe, stages=tuple(stage for stage in recipe.stages if stage != static))
-    return with_steps(_exchanged(alone, dynamic), DYNAMIC, static.steps + dynamic.steps)
+    dynamic = recipe.stage(DYNAMIC)
+    if STATIC in variant.without:
+        # What starts from nothing learns at the rate of what starts from nothing.
+        dynamic = replace(dynamic, optimizer=recipe.stage(STATIC).optimizer)
+    steps = sum(recipe.stage(name).steps for name in (*variant.without, DYNAMIC))
+    kept = tuple(stage for stage in recipe.stages if stage.name not in variant.without)
+    return with_steps(_exchanged(replace(recipe, stages=kept), dynamic), DYNAMIC, steps)
 
 
 def trained_stages(recipe: Recipe) -> tuple[str, ...]:
@@ -148,8 +168,12 @@ def trained_stages(recipe: Recipe) -> tuple[str, ...]:
 
 
 def paid_by(recipe: Recipe, stage: str) -> tuple[str, ...]:
-    """The stages of the full variant whose seconds a stage of this recipe may take."""
-    return (stage,) if set(trained_stages(recipe)) == set(STAGES) else STAGES
+    """The stages of the full variant whose seconds a stage of this recipe may take.
+
+    Its own, and for the dynamic stage those of the stages that are left out as well.
+    """
+    left_out = set(STAGES) - set(trained_stages(recipe)) if stage == DYNAMIC else set()
+    return tuple(name for name in STAGES if name == stage or name in left_out)
 
 
 def _exchanged(recipe: Recipe, stage: StageRecipe) -> Recipe:

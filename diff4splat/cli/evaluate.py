@@ -20,6 +20,8 @@ class Evaluate:
     """A model folder, or a size (test, small): its shipped weights, else random ones."""
     protocol: str = "held_out_v2"
     """Name of a protocol that ships, or a JSON file of your own."""
+    size: int | None = None
+    """Picture side in pixels, such as the model's own; the protocol's if left out."""
     task: Literal["generation", "reconstruction", "text"] = "generation"
     """From the first picture; from the input video; or does the text decide what moves."""
     out: Path = Path("evaluation")
@@ -35,6 +37,8 @@ class Evaluate:
 
     def run(self) -> None:
         """Check everything cheap first, then measure, write, and print the table."""
+        from dataclasses import replace
+
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
@@ -47,6 +51,8 @@ class Evaluate:
         from diff4splat.training.evaluation.protocol_json import load_protocol
 
         loaded, phases = load_protocol(self.protocol), ConsolePhases()
+        if self.size is not None:
+            loaded = replace(loaded, protocol=loaded.protocol.at_size((self.size, self.size)))
         features, clips = load_features(self.features), open_clips(loaded)
         with phases.phase("load model"):
             subject = self.subject()

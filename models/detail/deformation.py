@@ -6,6 +6,8 @@ the clip. The answer is multiplied by (query time − own time): a Gaussian is w
 it, and what the network says is how fast it leaves.
 """
 
+from collections.abc import Iterable, Iterator
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -71,11 +73,26 @@ class DetailDeformation(nn.Module):
         self, tokens: Float[Tensor, "b d k h w"], time: Float[Tensor, " b"]
     ) -> Float[Tensor, "b 10 k h4 w4"]:
         """Channels offset 3, rotation 4, scale offset 3; zero means "does not move"."""
+        return self._at(self._entered(tokens), tokens, time)
+
+    def at_times(
+        self, tokens: Float[Tensor, "b d k h w"], times: Iterable[Float[Tensor, " b"]]
+    ) -> Iterator[Float[Tensor, "b 10 k h4 w4"]]:
+        """The same at one time after the other; what does not depend on time is computed once."""
+        entered = self._entered(tokens)
+        for time in times:
+            yield self._at(entered, tokens, time)
+
+    def _entered(self, tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n c h w"]:
+        seen, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
+        return self.enter(torch.cat([self.norm_in(seen), cues], 1))
+
+    def _at(
+        self, entered: Float[Tensor, "n c h w"], tokens: Tensor, time: Float[Tensor, " b"]
+    ) -> Float[Tensor, "b 10 k h4 w4"]:
         batch, _, keys = tokens.shape[:3]
         own = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
-        condition = self._condition(time, own)
-        seen, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
-        features = self.enter(torch.cat([self.norm_in(seen), cues], 1))
+        features, condition = entered, self._condition(time, own)
         for block in self.blocks:
             features = block(features, condition)
         features = torch.nn.functional.silu(self.norm(features))

@@ -6,7 +6,7 @@ reports can be compared exactly when their digests are equal; a published protoc
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from diff4splat.errors import ConfigError
@@ -110,6 +110,15 @@ class Protocol:
         """Sixteen hexadecimal digits that change whenever anything does."""
         text = json.dumps(self.record(), sort_keys=True)
         return hashlib.sha256(f"{VERSION}{text}".encode()).hexdigest()[:16]
+
+    def at_size(self, size_px: tuple[int, int]) -> "Protocol":
+        """The same clips and pairs at another picture size, with a name and digest of its own.
+
+        Raises:
+            ConfigError: a side is not positive.
+        """
+        name = f"{self.name} at {size_px[0]} px"
+        return replace(self, name=name, size_px=size_px, loop=replace(self.loop, size_px=size_px))
 
     def record(self) -> dict[str, object]:
         """Plain values, as they are digested and written."""

@@ -9,13 +9,19 @@ from diff4splat.training.stages.autoencoder import AutoencoderStage
 from diff4splat.training.stages.generator import GeneratorStage
 from diff4splat.training.stages.joint import JointStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
-from diff4splat.training.stages.reconstruction import DynamicStage, SightStage, StaticStage
+from diff4splat.training.stages.reconstruction import (
+    DynamicStage,
+    MotionStage,
+    SightStage,
+    StaticStage,
+)
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
     {
         "vae": AutoencoderStage,
         "sight": SightStage,
         "static": StaticStage,
+        "motion": MotionStage,
         "dynamic": DynamicStage,
         "generator": GeneratorStage,
         "joint": JointStage,

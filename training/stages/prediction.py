@@ -82,18 +82,26 @@ def moving_pictures(
     scenes: list[Canonical], deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
 ) -> Rendered:
     """``deformations`` hold the raw maps of all samples, one tensor (b, 10, …) per target time."""
-    shown, offsets = [], []
+    shown = []
     for index, scene in enumerate(scenes):
         states = [deformed_state(scene, maps[index], model) for maps in deformations]
         moved = [deformed(scene.gaussians, state) for state in states]
         targets = batch.target_cameras[index]
         flat = [_pictures(state, targets[time]) for time, state in enumerate(moved)]
         shown.append(_stack(flat))
-        cells = _cell_index(batch.track_cell[index], batch, model)
-        raw = torch.stack([maps[index].flatten(1)[:3, cells] for maps in deformations])
-        offsets.append(raw.float().mT * PLANE_DEPTH)
     rgb, depth = _stack(shown)
-    return Rendered(rgb=rgb, depth=depth, offsets=torch.stack(offsets))
+    return Rendered(rgb=rgb, depth=depth, offsets=track_offsets(deformations, batch, model))
+
+
+def track_offsets(
+    deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
+) -> Float[Tensor, "b m n 3"]:
+    """Displacements that raw maps, one tensor (b, 10, …) per target time, give followed points."""
+    rows = []
+    for index in range(len(batch)):
+        cells = _cell_index(batch.track_cell[index], batch, model)
+        rows.append(torch.stack([maps[index].flatten(1)[:3, cells] for maps in deformations]))
+    return torch.stack(rows).float().mT * PLANE_DEPTH
 
 
 def with_depth(rendered: Rendered, maps: ReconstructionMaps, model: ModelConfig) -> Rendered:

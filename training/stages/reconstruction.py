@@ -13,7 +13,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.measures import reconstruction_measures
 from diff4splat.training.stages.model_stage import ModelStage, network_rays
 from diff4splat.training.stages.panels import reconstruction_panel
@@ -22,9 +24,10 @@ from diff4splat.training.stages.prediction import (
     canonical_scenes,
     moving_pictures,
     still_pictures,
+    track_offsets,
     with_depth,
 )
-from diff4splat.training.stages.terms import rendering_terms
+from diff4splat.training.stages.terms import motion_term, rendering_terms
 
 
 class StaticStage(ModelStage):
@@ -81,9 +84,27 @@ class DynamicStage(StaticStage):
         """Pictures of the moved scenes at the targets, one query time after the other."""
         sight = self.sight(batch, latent)
         maps = self.ldrm(latent, network_rays(batch), sight)
-        times = batch.target_time.unbind(1)
-        deformations = [self.deformation(maps.tokens, time) for time in times]
+        deformations = self.deformations(maps, batch)
         with torch.autocast(latent.device.type, enabled=False):
             scenes = canonical_scenes(maps, batch, self.plan.model, sight)
             rendered = moving_pictures(scenes, deformations, batch, self.plan.model)
             return with_depth(rendered, maps, self.plan.model)
+
+    def deformations(self, maps: ReconstructionMaps, batch: ClipBatch) -> list[Tensor]:
+        """Raw maps (b, 10, …) at every target time."""
+        return list(self.deformation.at_times(maps.tokens, batch.target_time.unbind(1)))
+
+
+class MotionStage(DynamicStage):
+    """Deformation alone, from followed points alone: nothing is rendered to learn from.
+
+    Most of a dynamic step is rendering and the gradient of LDRM, and displacements need neither.
+    """
+
+    def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
+        """The motion loss at the target times."""
+        latent, losses = self.encode(batch), self.plan.recipe.losses
+        maps = self.ldrm(latent, network_rays(batch), self.sight(batch, latent))
+        offsets = track_offsets(self.deformations(maps, batch), batch, self.plan.model)
+        term = motion_term(offsets, batch, losses)
+        return {"motion": term, TOTAL: losses.motion * term}

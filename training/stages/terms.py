@@ -44,14 +44,15 @@ def rendering_terms(
         terms["depth_log"] = depth_log_error(rendered.own_depth, batch.depth)
         weighted["depth_log"] = weights.depth_log
     if weights.motion and rendered.offsets is not None:
-        terms["motion"] = _motion(rendered.offsets, batch, weights)
+        terms["motion"] = motion_term(rendered.offsets, batch, weights)
         weighted["motion"] = weights.motion
     return terms | {TOTAL: sum(weight * terms[name] for name, weight in weighted.items())}
 
 
-def _motion(
+def motion_term(
     offsets: Float[Tensor, "b m n 3"], batch: ClipBatch, weights: LossWeights
 ) -> Float[Tensor, " b"]:
+    """The motion loss of the followed points at all target times, before its weight."""
     valid = batch.track_valid[:, None].expand(offsets.shape[:3])
     return track_motion(
         offsets.flatten(1, 2),

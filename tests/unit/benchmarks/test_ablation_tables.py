@@ -16,9 +16,10 @@ from diff4splat.training.evaluation.baselines import BASELINES, NEAREST
 from diff4splat.training.evaluation.columns import SYSTEM
 from diff4splat.training.evaluation.records import ItemResult, Score
 
-BASE = reduced(recipe_by_name("small"), 300, 200)
+BASE = reduced(recipe_by_name("small"), {"static-low": 300, "motion": 100, "dynamic": 200})
 COSTS = (
     StageCost(stage="static-low", steps=300, cpu_s=240.0, shared=True),
+    StageCost(stage="motion", steps=90, cpu_s=30.0, shared=False),
     StageCost(stage="dynamic", steps=190, cpu_s=200.0, shared=False),
 )
 
@@ -76,10 +77,10 @@ def test_a_measure_that_nothing_has_stays_empty(judged: HeldOut) -> None:
 def test_the_table_has_steps_of_every_stage_and_seconds_of_all(judged: HeldOut) -> None:
     markdown = to_markdown([row("full", 2.0), row("pictures", 3.0)], BASE, judged.protocol)
     means, differences = cells(markdown, "pictures")
-    assert means[-2:] == ["300* + 190", "440"]
+    assert means[-2:] == ["300* + 90 + 190", "470"]
     assert differences[0] == "+1"
     assert judged.protocol.digest in markdown
-    assert "300 steps of static-low and 200 steps of dynamic" in markdown
+    assert "takes 300 steps of static-low, 100 of motion and 200 of dynamic; the others" in markdown
 
 
 def test_the_full_variant_alone_is_compared_with_nothing(judged: HeldOut) -> None:
@@ -122,7 +123,7 @@ def test_json_holds_every_value_by_clip(judged: HeldOut) -> None:
     full, other = record["rows"]
     assert full["values"]["psnr"] == {"0": 2.0, "1": 4.0}
     assert other["differences"]["psnr"]["value"] == 0.5
-    assert other["stages"][1] == {
+    assert other["stages"][2] == {
         "stage": "dynamic",
         "steps": 190,
         "cpu_s": 200.0,

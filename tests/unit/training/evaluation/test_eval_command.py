@@ -16,7 +16,11 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.training.evaluation.case import make_case
-from diff4splat.training.evaluation.protocol_json import protocol_json, protocol_names
+from diff4splat.training.evaluation.protocol_json import (
+    LoadedProtocol,
+    protocol_json,
+    protocol_names,
+)
 from diff4splat.training.evaluation.sources import ListedClips
 from diff4splat.training.evaluation.subjects import Generator
 
@@ -92,6 +96,24 @@ def test_reconstruction_sees_the_whole_input_video(
         model="test", protocol=str(protocol_file), task="reconstruction", out=tmp_path / "out"
     ).run()
     assert set(seen) == {(FRAMES, 1)}
+
+
+def test_another_size_is_asked_of_the_clips_too(
+    protocol_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def clips(loaded: LoadedProtocol) -> ListedClips:
+        asked.append(loaded.protocol.size_px)
+        return ListedClips([make_clip(FRAMES, (16, 16), seed=s, tracks=64) for s in range(2)])
+
+    opening = SimpleNamespace(open_clips=clips)
+    monkeypatch.setitem(sys.modules, "diff4splat.training.evaluation.opening", opening)
+    out = tmp_path / "out"
+    wanted = Evaluate(model="test", protocol=str(protocol_file), size=16, out=out, items=1, steps=1)
+    wanted.run()
+    assert asked == [(16, 16)]
+    assert "tiny at 16 px" in (out / "results.md").read_text()
 
 
 @pytest.mark.parametrize(

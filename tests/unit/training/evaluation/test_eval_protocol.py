@@ -133,6 +133,17 @@ def test_values_out_of_range_are_refused(change: dict[str, object], says: str) -
     assert says in str(error.value)
 
 
+def test_another_size_is_another_protocol_on_the_same_clips() -> None:
+    shipped = load_protocol("held_out_v2").protocol
+    found = shipped.at_size((64, 64))
+    assert (found.name, found.size_px) == ("held_out_v2 at 64 px", (64, 64))
+    assert found.loop.size_px == (64, 64) and found.pose == shipped.pose
+    assert (found.source, found.reconstruction) == (shipped.source, shipped.reconstruction)
+    assert found.digest not in SHIPPED.values()
+    with pytest.raises(ConfigError, match="of at least 1"):
+        shipped.at_size((0, 0))
+
+
 def test_unknown_names_say_what_there_is(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"held_out_v1, held_out_v2 or a \.json file, got 'held'"):
         load_protocol("held")

@@ -14,13 +14,16 @@ from diff4splat.training.stage import TOTAL
 
 DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4)
 MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
-SIGHT = "sight"
+SIGHT, MOTION = "sight", "motion"
 
 
 def detailed(name: str) -> StageRecipe:
     """The stage with key frames and with their depth in the loss."""
-    recipe = stage_recipe("static-low" if name == SIGHT else name, depth_log=1.0)
+    like = {SIGHT: "static-low", MOTION: "dynamic"}.get(name, name)
+    recipe = stage_recipe(like, depth_log=1.0)
     data = replace(recipe.data, track_stride=4)
+    if name == MOTION:
+        return replace(recipe, kind=MOTION, data=data, trained=("deformation",))
     if name != SIGHT:
         return replace(recipe, data=data)
     return replace(recipe, kind=SIGHT, data=data, true_pictures=True)
@@ -37,6 +40,32 @@ def test_terms_and_gradients_are_finite_and_reach_what_learns(name: str) -> None
     for part in recipe.trained:
         gradients = [p.grad for p in getattr(stage, part).parameters() if p.grad is not None]
         assert gradients and all(bool(g.isfinite().all()) for g in gradients), part
+
+
+def test_motion_alone_is_the_dynamic_stage_without_pictures() -> None:
+    stages = [make_stage(detailed(name), model=MODEL) for name in (MOTION, "dynamic")]
+    for stage in stages:
+        shake_heads(stage)
+    batch = make_batch(detailed("dynamic"), (0, 1))
+    alone, whole = (stage(batch) for stage in stages)
+    assert set(alone) == {"motion", TOTAL}
+    torch.testing.assert_close(alone["motion"], whole["motion"])
+    weight = stages[0].plan.recipe.losses.motion
+    torch.testing.assert_close(alone[TOTAL], weight * alone["motion"])
+    alone[TOTAL].sum().backward()
+    assert all(p.grad is None for p in stages[0].ldrm.parameters())
+    assert any(bool(p.grad.any()) for p in stages[0].deformation.parameters())
+    assert {"psnr", "track_share"} <= set(stages[0].measure(batch))
+
+
+def test_many_times_at_once_are_the_same_as_each_alone() -> None:
+    stage = make_stage(detailed(MOTION), model=MODEL)
+    shake_heads(stage)
+    tokens = torch.rand(2, stage.deformation.enter.in_channels, 2, 8, 8)
+    times = torch.tensor([[0.0, 0.3], [0.5, 1.0]])
+    together = stage.deformation.at_times(tokens, times)
+    for time, found in zip(times, together, strict=True):
+        torch.testing.assert_close(found, stage.deformation(tokens, time))
 
 
 def test_pictures_alone_need_no_autoencoder() -> None:
