@@ -66,17 +66,20 @@ class Ldrm(nn.Module):
         latent: Float[Tensor, "b c t h w"],
         camera: Float[Tensor, "b 6 f hh ww"],
         sight: Sight | None = None,
+        *,
+        moving: bool = True,
     ) -> ReconstructionMaps:
         """Raw maps; ``camera`` is the Plücker map of the video frames relative to the first camera.
 
-        ``sight`` is looked at by the detail decoder only.
+        ``sight`` is looked at by the detail decoder only. Where nothing is to be ``moving``, pixels
+        are not followed either, and the deformation network cannot be asked.
 
         Raises:
             ShapeError: latent and rays do not belong to the same video, or a sight is missing.
         """
         tokens = self._tokens(latent, camera, sight)
         if self.detail is not None:
-            return self.detail(tokens, _require_sight(sight))
+            return self.detail(tokens, _require_sight(sight), moving=moving)
         # Latent i holds frames 4 i − 3 … 4 i: three of the first pack lie before the video.
         gaussians = self.to_gaussians(tokens)[:, :, TIME_STRIDE - 1 :]
         return ReconstructionMaps(

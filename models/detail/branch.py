@@ -3,7 +3,7 @@
 Axes: ``b`` batch, ``k`` key frames, ``e`` width of a token, ``h4 w4`` token grid, ``h w`` cells of
 4 pixels, ``d`` channels for the deformation network.
 
-    tokens, sight ─ decoder ─┬─ pixel head ─── raw maps ─ depth ─ stabilised neighbours ─┐
+    tokens, sight ─ decoder ─┬─ pixel head ─── raw maps ─ depth ─ pixels followed ────────┐
                              ├─ surroundings                                             │
                              └──────────────────────────── features ─────────────────────┴─ motion
 """
@@ -31,15 +31,18 @@ class DetailBranch(nn.Module):
         margin = config.detail.surroundings
         self.surroundings = SurroundingsHead(width, margin) if margin else None
 
-    def forward(self, tokens: Float[Tensor, "b e k h4 w4"], sight: Sight) -> ReconstructionMaps:
-        """``tokens`` of the answer are what the deformation network looks at."""
+    def forward(
+        self, tokens: Float[Tensor, "b e k h4 w4"], sight: Sight, *, moving: bool
+    ) -> ReconstructionMaps:
+        """``tokens`` of the answer are what the deformation network looks at, if it is asked."""
         batch = len(tokens)
         features = self.decoder(tokens, sight)
         raw = self.pixels(features).unflatten(0, (batch, -1))
         features = features.unflatten(0, (batch, -1))
         around = None if self.surroundings is None else self.surroundings(features[:, 0])
+        seen = features.transpose(1, 2)
+        if moving:
+            seen = motion_cues(features, raw[:, :, -1], sight, self.activation)
         return ReconstructionMaps(
-            gaussians=raw.transpose(1, 2),
-            tokens=motion_cues(features, raw[:, :, -1], sight, self.activation),
-            surroundings=around,
+            gaussians=raw.transpose(1, 2), tokens=seen, surroundings=around
         )

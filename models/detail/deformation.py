@@ -3,7 +3,10 @@
 Axes: ``b`` batch, ``d`` channels of features and motion cues, ``k`` key frames, ``n`` = b k,
 ``h w`` cells of 4 pixels, ``h4 w4`` pixels, ``e`` width of the condition. Times are fractions of
 the clip. The answer is multiplied by (query time − own time): a Gaussian is where its own frame saw
-it, and what the network says is how fast it leaves.
+it, and what the network says is how fast it leaves. It says so beside the rate at which the pixel
+was seen to leave until that time, of which it takes a share of its own:
+
+    offset = elapsed · depth · (enlarged(head + share · seen rate))
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,7 +23,14 @@ from diff4splat.models.config import ModelConfig
 from diff4splat.models.config_parts import DEFORMATION_SPLIT
 from diff4splat.models.detail.decoder import widths
 from diff4splat.models.detail.layers import CELL_PX, NEIGHBOURS, convex_enlarge
-from diff4splat.models.detail.stabilise import CUES
+from diff4splat.models.detail.stabilise import (
+    CUES,
+    RATE_UNIT,
+    SLOT_CUES,
+    SLOTS,
+    frames_between,
+    slot_shares,
+)
 
 CHANNELS = sum(DEFORMATION_SPLIT)
 
@@ -56,13 +66,14 @@ class DetailDeformation(nn.Module):
         # Features grow along their skips; cues would drown in them.
         self.norm_in = ChannelRmsNorm(seen)
         self.enter = nn.Conv2d(seen + CUES, own.width, 3, padding=1)
+        self.enter_now = nn.Conv2d(SLOT_CUES, own.width, 3, padding=1)
         self.time_mlp = EmbeddingMlp(4 * own.octaves, own.width)
         self.blocks = nn.ModuleList(
             [TimeConvBlock(own.width, own.width) for _ in range(own.blocks)]
         )
         self.norm = ChannelRmsNorm(own.width)
         self.weights = nn.Conv2d(own.width, NEIGHBOURS * CELL_PX**2, 1)
-        self.head = zero_(nn.Conv2d(own.width, CHANNELS, 3, padding=1))
+        self.head = zero_(nn.Conv2d(own.width, CHANNELS + 1, 3, padding=1))
 
     @property
     def is_identity(self) -> bool:
@@ -92,14 +103,18 @@ class DetailDeformation(nn.Module):
     ) -> Float[Tensor, "b 10 k h4 w4"]:
         batch, _, keys = tokens.shape[:3]
         own = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
-        features, condition = entered, self._condition(time, own)
+        elapsed, condition = time[:, None] - own, self._condition(time, own)
+        now = _seen_at(tokens, elapsed)
+        features = entered + self.enter_now(now)
         for block in self.blocks:
             features = block(features, condition)
         features = torch.nn.functional.silu(self.norm(features))
-        raw = self.head(features) * _lengths(tokens).to(features.dtype)
+        raw, share = self.head(features).split([CHANNELS, 1], 1)
+        raw = torch.cat([raw[:, :3] + share * RATE_UNIT * now[:, :3], raw[:, 3:]], 1)
+        raw = raw * _lengths(tokens).to(features.dtype)
         motion = convex_enlarge(raw, self.weights(features)).unflatten(0, (batch, keys))
-        elapsed = (time[:, None] - own)[..., None, None, None]
-        return (elapsed.to(motion.dtype) * motion).transpose(1, 2).to(tokens.dtype)
+        elapsed = elapsed[..., None, None, None].to(motion.dtype)
+        return (elapsed * motion).transpose(1, 2).to(tokens.dtype)
 
     def _condition(
         self, time: Float[Tensor, " b"], own: Float[Tensor, " k"]
@@ -107,6 +122,16 @@ class DetailDeformation(nn.Module):
         query = octave_embedding(time, self.octaves)[:, None].expand(-1, len(own), -1)
         source = octave_embedding(own, self.octaves)[None].expand(len(time), -1, -1)
         return self.time_mlp(torch.cat([query, source], -1)).flatten(0, 1)
+
+
+def _seen_at(
+    tokens: Float[Tensor, "b d k h w"], elapsed: Float[Tensor, "b k"]
+) -> Float[Tensor, "n 4 h w"]:
+    """Rate and difference of every cell at one time, between those of the nearest slots."""
+    keys = tokens.shape[2]
+    slots = tokens[:, -CUES:-1].transpose(1, 2).unflatten(2, (SLOTS, SLOT_CUES))
+    shares = slot_shares(elapsed * frames_between(keys)).to(tokens.dtype)
+    return torch.einsum("bks,bksdhw->bkdhw", shares, slots).flatten(0, 1)
 
 
 def _lengths(tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n 10 h w"]:

@@ -40,9 +40,11 @@ def convex_enlarge(
     maps: Float[Tensor, "n c h w"], weights: Float[Tensor, "n 144 h w"]
 ) -> Float[Tensor, "n c h4 w4"]:
     """Pixels from cells; ``weights`` are logits, equal ones give the mean of the neighbours."""
-    channels = maps.shape[1]
-    share = weights.unflatten(1, (1, NEIGHBOURS, CELL_PX**2)).softmax(2)
+    channels, height, width = maps.shape[1:]
+    share = weights.unflatten(1, (NEIGHBOURS, CELL_PX**2)).softmax(1)
     padded = torch.nn.functional.pad(maps, (1, 1, 1, 1), mode="replicate")
-    around = torch.nn.functional.unfold(padded, 3).unflatten(1, (channels, NEIGHBOURS, 1))
-    mixed = (share * around.unflatten(-1, maps.shape[-2:])).sum(2)
+    around = torch.nn.functional.unfold(padded, 3).unflatten(1, (channels, NEIGHBOURS))
+    # As a product of small matrices: the products of all pixels and neighbours are never stored.
+    mixed = torch.einsum("nckp,nksp->ncsp", around, share.flatten(3))
+    mixed = mixed.unflatten(-1, (height, width))
     return torch.nn.functional.pixel_shuffle(mixed.flatten(1, 2), CELL_PX)

@@ -1,38 +1,38 @@
-"""Where each key frame's pixels went, had its own camera taken the neighbouring frames too.
+"""How fast each key frame's pixels leave, had its own camera taken the other frames too.
 
-Axes: ``b`` batch, ``k`` key frames, ``h w`` pixels, ``h4 w4`` cells of 4 pixels, ``s`` shifts,
-``d`` channels. Neighbouring pictures are carried into the key frame through the predicted depth.
-What stands still then lies where it was, and what moves is found at a shift: the deformation
-network need not learn to subtract the camera's motion. Shifts are compared at half the resolution,
+Axes: ``b`` batch, ``k`` key frames, ``h w`` pixels, ``h4 w4`` cells of 4 pixels, ``s`` slots: other
+frames, by distance in time, later ones first. Frames are carried into the key frame through the
+predicted depth. What stands still then lies where it was, and what moves is followed from one
+distance to the next, begun where an even motion would be. The deformation network need learn
+neither to subtract the camera's motion nor to compare pictures. Per slot
 
-    match_s = softmax_s( −SHARPNESS · (mean |carried(x + s) − own(x)| + STILLNESS · |s|) )
+    rate = R · (flow / focal, 0) / (time of the slot − own time),     R = world_from_camera
 
-a soft vote over shifts, of which a displacement is a linear function. No gradient passes.
+so that a point at depth z leaves at z · rate per clip; and how far colours differ there. No gradient
+passes.
 """
 
-import math
-
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.models import activations
 from diff4splat.models.base_scene import PLANE_DEPTH
-from diff4splat.models.config_parts import ActivationConfig
+from diff4splat.models.config_parts import TIME_STRIDE, ActivationConfig
+from diff4splat.models.detail.following import follow, moved
 from diff4splat.models.detail.layers import CELL_PX
 from diff4splat.models.detail.sight import Sight, camera_frames, flat_cameras
 from diff4splat.models.detail.warping import other_pixels, sampled
 
-NEIGHBOURS = (-4, -2, -1, 1, 2, 4)
-"""Frames before and after a key frame; beyond the video its ends stand in."""
-REACH = 3
-"""Farthest shift along one axis, in steps of two pixels."""
-SIDE = 2 * REACH + 1
-"""Shifts along one axis; votes times it have a root mean square of 1 where all are for one."""
-SHARPNESS, STILLNESS = 60.0, 0.004
-"""Of the vote, per unit of colour; and what a step of shift costs where colours cannot tell."""
-CUES = SIDE**2 * len(NEIGHBOURS) + 1
-"""Channels behind the features: a vote per neighbour, and the logarithm of depth at the end."""
+DISTANCES = (1, 2, 4, 8)
+"""In frames, doubled each time; beyond the video its ends stand in."""
+SLOTS = 2 * len(DISTANCES)
+RATE_UNIT, DIFFERENCE_UNIT = 0.25, 0.1
+"""What is 1 in a cue: about as large as both are where something moves."""
+SLOT_CUES = 4
+"""Rate (x, y, z), difference."""
+CUES = SLOT_CUES * SLOTS + 1
+"""Channels behind the features: those of the slots, and the logarithm of depth at the end."""
 
 
 def motion_cues(
@@ -41,13 +41,13 @@ def motion_cues(
     sight: Sight,
     config: ActivationConfig,
 ) -> Float[Tensor, "b d k h4 w4"]:
-    """Features of the key frames, then votes, then log depth over that of the plane."""
-    with torch.no_grad():
+    """Features of the key frames, then their cues."""
+    with torch.no_grad(), torch.autocast(features.device.type, enabled=False):
         depth = key_depth(raw_distance, config)
-        votes = [match(_carried(depth, sight, offset), sight.key_rgb) for offset in NEIGHBOURS]
-        relative = (depth / PLANE_DEPTH).log().flatten(0, 1)[:, None]
-        relative = torch.nn.functional.avg_pool2d(relative, CELL_PX).unflatten(0, depth.shape[:2])
-        cues = torch.cat([*(SIDE * vote for vote in votes), relative], 2)
+        relative = (depth / PLANE_DEPTH).log()[:, :, None]
+        pixels = torch.cat([followed(depth, sight).flatten(2, 3), relative], 2)
+        cues = torch.nn.functional.avg_pool2d(pixels.flatten(0, 1), CELL_PX)
+        cues = cues.unflatten(0, depth.shape[:2])
     return torch.cat([features, cues.to(features.dtype)], 2).transpose(1, 2)
 
 
@@ -59,41 +59,63 @@ def key_depth(
     return PLANE_DEPTH * activations.bounded_factor(raw, config.log_distance_limit)
 
 
-def match(
-    carried: Float[Tensor, "b k 3 h w"], own: Float[Tensor, "b k 3 h w"]
-) -> Float[Tensor, "b k s h4 w4"]:
-    """Votes per cell, row by row from the shift up and to the left; they sum to 1."""
-    there, here = (torch.nn.functional.avg_pool2d(one.flatten(0, 1), 2) for one in (carried, own))
-    costs = _shifted_costs(there, here)
-    costs = torch.nn.functional.avg_pool2d(costs, 3, 1, 1, count_include_pad=False)
-    votes = (-SHARPNESS * costs).softmax(1)
-    return torch.nn.functional.avg_pool2d(votes, CELL_PX // 2).unflatten(0, own.shape[:2])
+def followed(depth: Float[Tensor, "b k h w"], sight: Sight) -> Float[Tensor, "b k s 4 h w"]:
+    """Rate and difference of every pixel in every slot; beyond an end of the video, those before."""
+    later, earlier = (_one_way(depth, sight, sign) for sign in (1, -1))
+    last = sight.rgb.shape[2] - 1
+    ends = [(sight.keys == end)[:, None, None, None, None] for end in (last, 0)]
+    return torch.cat(
+        [torch.where(ends[0], earlier, later), torch.where(ends[1], later, earlier)], 2
+    )
 
 
-def _shifted_costs(
-    there: Float[Tensor, "n 3 h2 w2"], here: Float[Tensor, "n 3 h2 w2"]
-) -> Float[Tensor, "n s h2 w2"]:
-    """Difference of colour at every shift, and a little for its length."""
-    height, width = here.shape[-2:]
-    around = torch.nn.functional.pad(there, (REACH,) * 4, mode="replicate")
-    costs = []
-    for down in range(SIDE):
-        for right in range(SIDE):
-            moved = around[..., down : down + height, right : right + width]
-            length = math.hypot(down - REACH, right - REACH)
-            costs.append((moved - here).abs().mean(1) + STILLNESS * length)
-    return torch.stack(costs, 1)
+def slot_shares(elapsed: Float[Tensor, "*b"]) -> Float[Tensor, "*b s"]:
+    """How much each slot says of a time so many frames later: the nearest two, linear in log₂."""
+    octave = elapsed.abs().clamp(DISTANCES[0], DISTANCES[-1]).log2()[..., None]
+    near = (1 - (octave - torch.arange(len(DISTANCES)).to(octave)).abs()).clamp_min(0)
+    later = (elapsed >= 0)[..., None]
+    return torch.cat([near * later, near * ~later], -1)
+
+
+def frames_between(keys: int) -> int:
+    """Frames from the first key frame to the last."""
+    return TIME_STRIDE * (keys - 1)
+
+
+def _one_way(
+    depth: Float[Tensor, "b k h w"], sight: Sight, sign: int
+) -> Float[Tensor, "b k s 4 h w"]:
+    """Slots at growing distance, each begun at the even motion that the one before it saw."""
+    own = sight.key_rgb.flatten(0, 1).float()
+    rate_px = torch.zeros_like(own[:, :2])
+    slots = []
+    for distance in DISTANCES:
+        frames = (sight.keys + sign * distance).clamp(0, sight.rgb.shape[2] - 1)
+        elapsed = (frames - sight.keys).repeat(len(depth)).to(own)[:, None, None, None]
+        other = _carried(depth, sight, frames)
+        flow = follow(own, other, rate_px * elapsed)
+        difference = (moved(other, flow) - own).abs().mean(1, keepdim=True)
+        rate_px = torch.where(elapsed == 0, rate_px, flow / elapsed)
+        slots.append(torch.cat([_rate(rate_px, sight), difference / DIFFERENCE_UNIT], 1))
+    return torch.stack(slots, 1).unflatten(0, depth.shape[:2])
+
+
+def _rate(rate_px: Float[Tensor, "n 2 h w"], sight: Sight) -> Float[Tensor, "n 3 h w"]:
+    """Pixels per frame as depths per clip, along the axes of the first camera."""
+    cameras = flat_cameras(sight.key_cameras)
+    count = sight.rgb.shape[2] - 1
+    across = count * rate_px / cameras.focal_px[:, :, None, None].to(rate_px)
+    turn = cameras.world_from_camera[:, :3, :2].to(rate_px)
+    return torch.einsum("nij,njhw->nihw", turn, across) / RATE_UNIT
 
 
 def _carried(
-    depth: Float[Tensor, "b k h w"], sight: Sight, offset: int
-) -> Float[Tensor, "b k 3 h w"]:
-    """A neighbour as the key frame's camera would have seen it."""
-    batch, count = depth.shape[:2]
-    frames = (sight.keys + offset).clamp(0, sight.rgb.shape[2] - 1)
+    depth: Float[Tensor, "b k h w"], sight: Sight, frames: Int[Tensor, " k"]
+) -> Float[Tensor, "n 3 h w"]:
+    """One frame for each key frame, as that one's camera would have seen it."""
     own, other = (
         flat_cameras(c) for c in (sight.key_cameras, camera_frames(sight.cameras, frames))
     )
     pixels, _ = other_pixels(own, other, 1 / depth.flatten(0, 1)[:, None])
     neighbour = sight.rgb[:, :, frames].transpose(1, 2).flatten(0, 1)
-    return sampled(neighbour, pixels)[:, :, 0].unflatten(0, (batch, count))
+    return sampled(neighbour, pixels)[:, :, 0].float()

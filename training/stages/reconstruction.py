@@ -43,7 +43,7 @@ class StaticStage(ModelStage):
     def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
         """Pictures of the canonical scenes at the targets."""
         sight = self.sight(batch, latent)
-        maps = self.ldrm(latent, network_rays(batch), sight)
+        maps = self.ldrm(latent, network_rays(batch), sight, moving=False)
         with torch.autocast(latent.device.type, enabled=False):
             scenes = canonical_scenes(maps, batch, self.plan.model, sight)
             return with_depth(still_pictures(scenes, batch), maps, self.plan.model)

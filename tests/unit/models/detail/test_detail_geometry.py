@@ -11,7 +11,6 @@ from diff4splat.models.detail.coverage import covered
 from diff4splat.models.detail.layers import convex_enlarge
 from diff4splat.models.detail.plane_sweep import UNSEEN, plane_sweep
 from diff4splat.models.detail.sight import Sight
-from diff4splat.models.detail.stabilise import REACH, match
 from diff4splat.models.detail.surroundings import surroundings_base
 from diff4splat.models.detail.warping import other_pixels
 
@@ -103,20 +102,3 @@ def test_a_sight_needs_a_camera_for_every_picture() -> None:
     batch = one.with_pose(one.world_from_camera[None])
     with pytest.raises(ShapeError, match=r"Sight.cameras: expected .* \(1, 5, 8, 12\), got"):
         Sight(rgb=torch.zeros(1, 3, 5, *SIZE), cameras=batch)
-
-
-@pytest.mark.parametrize(("right", "down"), [(0, 0), (2, -1), (-3, 3)])
-def test_votes_are_for_the_shift_at_which_a_pixel_is_found(right: int, down: int) -> None:
-    generator = torch.Generator().manual_seed(0)
-    own = torch.rand(1, 1, 3, 48, 64, generator=generator)
-    carried = own.roll((2 * down, 2 * right), (-2, -1))
-    votes = match(carried, own)
-    assert votes.shape == (1, 1, (2 * REACH + 1) ** 2, 12, 16)
-    torch.testing.assert_close(votes.sum(2), torch.ones(1, 1, 12, 16))
-    place = (down + REACH) * (2 * REACH + 1) + right + REACH
-    assert bool((votes[0, 0, :, 3:-3, 3:-3].argmax(0) == place).all())
-
-
-def test_where_nothing_can_be_told_votes_are_for_standing_still() -> None:
-    plain = torch.full((1, 1, 3, 16, 16), 0.5)
-    assert bool((match(plain, plain)[0, 0].argmax(0) == (2 * REACH + 1) ** 2 // 2).all())
