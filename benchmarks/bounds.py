@@ -10,6 +10,7 @@ Axes: ``h w`` pixels.
 
 import argparse
 import statistics
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -57,10 +58,14 @@ def main() -> None:
     """Both rows over the items of a protocol."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--protocol", default="held_out_v2")
+    parser.add_argument("--size", type=int, help="picture side; the protocol's if left out")
     parser.add_argument("--items", type=int, default=16)
     parser.add_argument("--out", type=Path, required=True, help="markdown file")
     options = parser.parse_args()
     loaded = load_protocol(options.protocol)
+    if options.size:
+        size_px = (options.size, options.size)
+        loaded = replace(loaded, protocol=loaded.protocol.at_size(size_px))
     clips, protocol = open_clips(loaded), loaded.protocol
     found: dict[str, list[tuple[float, float]]] = {row: [] for row in ROWS}
     for item in range(options.items):

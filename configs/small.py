@@ -59,7 +59,7 @@ def small_recipe() -> Recipe:
         name="small",
         seed=0,
         model=model,
-        stages=(vae, sight, static, motion, dynamic, _generator(dynamic, vae), _joint(dynamic)),
+        stages=(vae, sight, static, motion, dynamic, _generator(dynamic), _joint(dynamic)),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
 
@@ -68,12 +68,12 @@ def _autoencoder(data: DataSettings) -> StageRecipe:
     return StageRecipe(
         name="vae",
         kind="vae",
-        steps=600,
+        steps=150,
         global_batch=4,
         micro_batch=4,
         trained=("vae",),
         losses=LossWeights(perceptual=0.0),
-        optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
+        optimizer=OptimizerSettings(learning_rate=2e-4, warmup_steps=20),
         data=dynamic_data(replace(data, target_frames=1, tracks=0)),
         gates=(Gate(measure="psnr", bound=28.0),),
     )
@@ -99,7 +99,7 @@ def _motion(static: StageRecipe, tracks: int) -> StageRecipe:
     stage = motion_stage(static, tracks)
     return replace(
         stage,
-        steps=3_000,
+        steps=800,
         global_batch=8,
         micro_batch=8,
         data=replace(stage.data, target_frames=8),
@@ -109,18 +109,21 @@ def _motion(static: StageRecipe, tracks: int) -> StageRecipe:
 
 
 def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
+    """Who moves is known by now, so that who does not is held to it."""
     return replace(
         dynamic_stage(static, tracks),
-        steps=4_000,
-        optimizer=replace(static.optimizer, learning_rate=6e-4),
+        steps=500,
+        losses=replace(static.losses, motion_width=0.05),
+        optimizer=replace(static.optimizer, learning_rate=4e-4, warmup_steps=20),
         true_pictures=False,
         gates=(*static.gates, TRACK_GATE),
     )
 
 
-def _generator(dynamic: StageRecipe, vae: StageRecipe) -> StageRecipe:
+def _generator(dynamic: StageRecipe) -> StageRecipe:
     """Captions speak of left and right, so clips are not mirrored here."""
-    stage = replace(generator_stage(dynamic), steps=40_000, optimizer=vae.optimizer)
+    optimizer = OptimizerSettings(learning_rate=1e-3, warmup_steps=100)
+    stage = replace(generator_stage(dynamic), steps=40_000, optimizer=optimizer)
     return replace(stage, data=replace(stage.data, augment=False))
 
 

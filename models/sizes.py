@@ -43,7 +43,7 @@ def small_size() -> ModelConfig:
         name="small",
         frames=9,
         size_px=(64, 64),
-        vae=VaeConfig(latent_channels=64, widths=(32, 64, 96), pixel_patch=2, linear_code=True),
+        vae=VaeConfig(latent_channels=128, widths=(32, 64, 96), pixel_patch=2, linear_code=True),
         text=TextConfig(width=128, blocks=3, heads=4, feedforward_width=256),
         dit=DitConfig(width=256, blocks=8, heads=4, feedforward_width=768, camera_width=64),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
