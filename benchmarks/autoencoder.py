@@ -1,8 +1,8 @@
-"""How much a picture loses in the autoencoder: held-out clips and photographs, to latents and back.
+"""What pictures lose in the autoencoder: held-out clips and photographs, to latents and back.
 
-Run ``python benchmarks/autoencoder.py --clips 16 --out FILE.md`` (needs scikit-image's photographs);
-prints Markdown. Clips are the first ones of ``held_out_v2``, every second frame, at the model's own
-size and at twice that; a photograph is shown as a video that stands still.
+Run ``python benchmarks/autoencoder.py --clips 16 --out FILE.md``; prints Markdown. Clips are the
+first ones of ``held_out_v2``, every second frame, at the model's own size and at twice that; a
+photograph of scikit-image is shown as a video that stands still.
 """
 
 import argparse

@@ -43,6 +43,4 @@ class DetailBranch(nn.Module):
         seen = features.transpose(1, 2)
         if moving:
             seen = motion_cues(features, raw[:, :, -1], sight, self.activation)
-        return ReconstructionMaps(
-            gaussians=raw.transpose(1, 2), tokens=seen, surroundings=around
-        )
+        return ReconstructionMaps(gaussians=raw.transpose(1, 2), tokens=seen, surroundings=around)

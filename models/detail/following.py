@@ -4,8 +4,8 @@ Axes: ``n`` pairs of pictures, ``h w`` pixels. With the flow f₀ so far, each s
 
     min_f  mean_W weight · (∇own · (f − f₀) + other(x + f₀) − own(x))²  +  DAMPING · |f − mean f₀|²
 
-per pixel x, over a window W around it and all colours; weight = 1 / (1 + (difference/DOUBT)²) trusts
-what looks alike. Where nothing can be told the flow is that of the surroundings.
+per pixel x, over a window W around it and all colours. weight = 1 / (1 + (difference / DOUBT)²)
+trusts what looks alike. Where nothing can be told the flow is that of the surroundings.
 """
 
 import torch

@@ -8,8 +8,8 @@ neither to subtract the camera's motion nor to compare pictures. Per slot
 
     rate = R · (flow / focal, 0) / (time of the slot − own time),     R = world_from_camera
 
-so that a point at depth z leaves at z · rate per clip; and how far colours differ there. No gradient
-passes.
+so that a point at depth z leaves at z · rate per clip; and how far colours differ there. No
+gradient passes.
 """
 
 import torch
@@ -60,7 +60,7 @@ def key_depth(
 
 
 def followed(depth: Float[Tensor, "b k h w"], sight: Sight) -> Float[Tensor, "b k s 4 h w"]:
-    """Rate and difference of every pixel in every slot; beyond an end of the video, those before."""
+    """Rate and difference of every pixel in every slot; beyond an end, those of the other way."""
     later, earlier = (_one_way(depth, sight, sign) for sign in (1, -1))
     last = sight.rgb.shape[2] - 1
     ends = [(sight.keys == end)[:, None, None, None, None] for end in (last, 0)]

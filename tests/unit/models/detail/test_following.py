@@ -90,7 +90,8 @@ def test_rates_are_depths_per_clip_and_ends_take_the_other_side() -> None:
     # One pixel per frame, eight of them per clip, at a focal length of 64.
     rate, difference = found[:, :, :, :3] * RATE_UNIT, found[:, :, :, 3] * DIFFERENCE_UNIT
     medians = rate[INSIDE].flatten(-2).median(-1).values
-    torch.testing.assert_close(medians[..., 0], torch.full((1, 3, SLOTS), 8 / 64), atol=5e-3, rtol=0)
+    want = torch.full((1, 3, SLOTS), 8 / 64)
+    torch.testing.assert_close(medians[..., 0], want, atol=5e-3, rtol=0)
     assert float(medians[..., 1:].abs().max()) < 5e-3
     assert float(difference[INSIDE].median()) < 0.02
     half = len(DISTANCES)

@@ -1,0 +1,60 @@
+"""Seconds from a true video to its scene: autoencoder, LDRM and deformation, no video model.
+
+Run ``python benchmarks/reconstruction_time.py --out FILE.md``; prints Markdown. The median of
+several runs after one that does not count.
+"""
+
+import argparse
+import statistics
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from diff4splat.io.atomic import write_text
+from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.pretrained import load_model
+from diff4splat.models.video_to_scene import scene_from_video
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.report.tables import this_machine
+from diff4splat.training.evaluation.opening import open_clips
+from diff4splat.training.evaluation.protocol_json import load_protocol
+
+
+def held_out_video(side: int) -> tuple[torch.Tensor, CameraPath]:
+    """What reconstruction is given of the first held-out clip."""
+    loaded = load_protocol("held_out_v2")
+    loaded = replace(loaded, protocol=loaded.protocol.at_size((side, side)))
+    clip, shown = open_clips(loaded).clip(0), slice(None, None, loaded.protocol.input_stride)
+    view = clip.views[0]
+    path = CameraPath(cameras=view.cameras[shown].to(torch.float32), times_s=clip.times_s[shown])
+    return unit_rgb(view.rgb[shown]), path
+
+
+def main() -> None:
+    """One line per size."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--model", default="small")
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--out", type=Path, help="markdown file")
+    options = parser.parse_args()
+    model = load_model(options.model)
+    lines = ["| size | frames | Gaussians | seconds |", "| ---: | ---: | ---: | ---: |"]
+    for side in (model.config.size_px[0], 2 * model.config.size_px[0]):
+        video, path = held_out_video(side)
+        seconds = []
+        for _ in range(options.runs + 1):
+            start = time.perf_counter()
+            scene = scene_from_video(model, video, path)
+            seconds.append(time.perf_counter() - start)
+        found = statistics.median(seconds[1:])
+        lines.append(f"| {side} px | {len(video)} | {len(scene.gaussians):,} | {found:.2f} |")
+    text = "\n".join(lines) + f"\n\n{this_machine()}.\n"
+    print(text)
+    if options.out:
+        write_text(options.out, text)
+
+
+if __name__ == "__main__":
+    main()
