@@ -112,7 +112,7 @@ def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
     """Who moves is known by now, so that who does not is held to it."""
     return replace(
         dynamic_stage(static, tracks),
-        steps=500,
+        steps=400,
         losses=replace(static.losses, motion_width=0.05),
         optimizer=replace(static.optimizer, learning_rate=4e-4, warmup_steps=20),
         true_pictures=False,

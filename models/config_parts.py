@@ -223,9 +223,14 @@ class DeformationConfig:
     """Channels of the features at 1/2, 1/4 and 1/8 of the token side."""
     octaves: int = 10
     """Frequencies 2^0 … 2^9 of the time embedding (MoVieS)."""
+    noise_px: float = 0.0
+    """How far trained weights move what stands still, in pixels of the model's own size: Gaussians
+    that are said to move less are taken to stand (ours, measured)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "width", "blocks", "octaves")
+        small = 0 <= self.noise_px < math.inf
+        require(small, "DeformationConfig.noise_px", "a number from 0 on", self.noise_px)
         three = isinstance(self.level_widths, tuple) and len(self.level_widths) == 3
         require(three, "DeformationConfig.level_widths", "three widths", self.level_widths)
         for width in self.level_widths:

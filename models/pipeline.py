@@ -32,7 +32,7 @@ from diff4splat.models.pretrained import Model, load_model, save_model, with_tex
 from diff4splat.models.prompt import require_prompt
 from diff4splat.models.reconstruction import Canonical, deform
 from diff4splat.models.settings import GenerationSettings, require_seed
-from diff4splat.models.still import drop_still_tracks
+from diff4splat.models.still import drop_still_tracks, seen_as_still_px
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
@@ -142,7 +142,8 @@ class Diff4SplatPipeline:
             provenance=self._provenance(request),
         )
         scene = self._match_colors(scene, canonical, request, log)
-        camera, still_px = request.picture.camera, request.settings.still_px
+        camera = request.picture.camera
+        still_px = seen_as_still_px(self.model.config, camera, request.settings.still_px)
         return drop_still_tracks(scene, camera, still_px, log).to(torch.device("cpu"))
 
     def _from_video(

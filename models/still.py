@@ -13,6 +13,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, project
+from diff4splat.models.config import ModelConfig
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.keyframe_algebra import keep_moving, largest_change
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -34,6 +35,12 @@ def drop_still_tracks(scene: Scene, camera: Camera, still_px: float, log: RunLog
     why = f"they move by at most {still_px:g} px"
     log.left_out("key times of still Gaussians", why, f"{still:,} tracks", still_px)
     return replace(scene, motion=keep_moving(scene.motion, moves))
+
+
+def seen_as_still_px(config: ModelConfig, camera: Camera, still_px: float) -> float:
+    """The larger of what is asked for and what the model cannot tell from nothing."""
+    own_px = max(camera.size_px) / max(config.size_px)
+    return max(still_px, config.deformation.noise_px * own_px)
 
 
 def largest_move_px(scene: Scene, camera: Camera) -> Float[Tensor, " m"]:

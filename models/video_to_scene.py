@@ -17,7 +17,7 @@ from diff4splat.models.picture import Picture
 from diff4splat.models.pretrained import Model
 from diff4splat.models.reconstruction import deform
 from diff4splat.models.settings import GenerationSettings
-from diff4splat.models.still import drop_still_tracks
+from diff4splat.models.still import drop_still_tracks, seen_as_still_px
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.scene import Provenance, Scene
@@ -60,7 +60,8 @@ def scene_from_video(
         path=path.to(torch.float32),
         provenance=_provenance(model),
     )
-    return drop_still_tracks(scene, cameras[0], settings.still_px, log).to(torch.device("cpu"))
+    still_px = seen_as_still_px(model.config, cameras[0], settings.still_px)
+    return drop_still_tracks(scene, cameras[0], still_px, log).to(torch.device("cpu"))
 
 
 def _provenance(model: Model) -> Provenance:

@@ -5,9 +5,11 @@ from dataclasses import replace
 import pytest
 import torch
 
+from diff4splat.errors import ConfigError
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera, pinhole, project
-from diff4splat.models.still import drop_still_tracks, largest_move_px
+from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.models.still import drop_still_tracks, largest_move_px, seen_as_still_px
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
@@ -104,3 +106,20 @@ def test_gaussians_behind_the_camera_and_nan_keep_their_tracks() -> None:
         motion=replace(scene.motion, offsets=offsets),
     )
     assert 0 in drop_still_tracks(odd, CAMERA, 0.05, RunLog()).motion.moving_index.tolist()
+
+
+@pytest.mark.parametrize(
+    ("noise_px", "asked_px", "want_px"), [(0.0, 0.1, 0.1), (2.0, 0.1, 8.0), (2.0, 9.0, 9.0)]
+)
+def test_what_a_model_cannot_tell_from_nothing_stands_still(
+    noise_px: float, asked_px: float, want_px: float
+) -> None:
+    config = tiny_size()
+    config = replace(config, deformation=replace(config.deformation, noise_px=noise_px))
+    camera = pinhole(100.0, (64, 4 * config.size_px[1]))
+    assert seen_as_still_px(config, camera, asked_px) == want_px
+
+
+def test_noise_must_be_a_number_of_pixels() -> None:
+    with pytest.raises(ConfigError, match="noise_px: expected a number from 0 on, got -1"):
+        replace(tiny_size().deformation, noise_px=-1.0)
