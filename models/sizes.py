@@ -47,7 +47,7 @@ def small_size() -> ModelConfig:
         text=TextConfig(width=128, blocks=3, heads=4, feedforward_width=256),
         dit=DitConfig(width=256, blocks=8, heads=4, feedforward_width=768, camera_width=64),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
-        deformation=DeformationConfig(width=64, blocks=3, octaves=3),
+        deformation=DeformationConfig(width=64, blocks=3, octaves=3, noise_px=4.0),
         activation=ActivationConfig(),
         detail=DetailConfig(width=48),
     )
