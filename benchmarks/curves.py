@@ -49,7 +49,7 @@ def draw(axes, stage: str, rows: list[dict]) -> None:
         for key, title in MEASURES.items()
         if judged and key in judged[-1]
     ]
-    axes.set_title("\n".join([stage, ", ".join(said)]), fontsize=9)
+    axes.set_title("\n".join([stage, ", ".join(said[:2]), *said[2:]]), fontsize=9)
     axes.legend(fontsize=7)
 
 
