@@ -32,6 +32,7 @@ OTHER_VALUES = {
     "width": 48,
     "surroundings": 8,
     "linear_code": True,
+    "noise_px": 1.5,
     "range": [2.0, 9.0],
 }
 """Valid values where doubling the old one is not."""
