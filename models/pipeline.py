@@ -38,9 +38,6 @@ from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.scene import Provenance, Scene
 
-BASE_SIDE_PX = 256
-"""Picture side where no network runs: nothing then asks for the size that they were made for."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
@@ -122,10 +119,7 @@ class Diff4SplatPipeline:
         """At a size that the model can take, in single precision."""
         config = self.model.config
         if not isinstance(image, Picture):
-            side_px = max(config.size_px)
-            if not self.model.runs_video_model:
-                side_px = max(side_px, BASE_SIDE_PX)
-            image = load_picture(Path(image), side_px, multiple_px=config.token_px)
+            image = load_picture(Path(image), self.model.side_px, multiple_px=config.token_px)
         config.latent_grid(config.frames, image.camera.size_px)
         return replace(image, rgb=image.rgb.float(), camera=image.camera.to(torch.float32))
 

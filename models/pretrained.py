@@ -24,6 +24,7 @@ from diff4splat.models.factory import (
 )
 from diff4splat.models.provenance import (
     NOT_STATED,
+    PROVENANCE_FILE,
     ModelProvenance,
     read_provenance,
     write_provenance,
@@ -41,6 +42,8 @@ from diff4splat.models.weight_files import (
 )
 
 BYTES_PER_WEIGHT = 4
+BASE_SIDE_PX = 256
+"""Picture side where no network runs: nothing then asks for the size that they were made for."""
 RECONSTRUCTION = frozenset({"vae", "ldrm", "deformation"})
 """Parts between a true video and its scene."""
 
@@ -79,9 +82,12 @@ class Model:
         the base scene too, and heads that somebody set by hand are seen. A detail decoder would
         show decoded noise, so with one the video model must be trained.
         """
-        if "dit" in self.trained:
-            return True
-        return not self.trained and not self.config.detail.used
+        return _runs_video_model(self.config, self.trained)
+
+    @property
+    def side_px(self) -> int:
+        """Longer side of pictures read from files."""
+        return _side_px(self.config, self.trained)
 
     @property
     def device(self) -> torch.device:
@@ -147,6 +153,17 @@ def find_config(name_or_folder: str | Path) -> ModelConfig:
     return size_by_name(str(name_or_folder)) if folder is None else load_config(folder)
 
 
+def find_side_px(name_or_folder: str | Path) -> int:
+    """``Model.side_px`` without any weights.
+
+    Raises:
+        ConfigError, CheckpointError, FileFormatError: as ``load_model``.
+    """
+    folder = checked_folder(name_or_folder, (CONFIG_FILE, PROVENANCE_FILE))
+    trained = frozenset() if folder is None else read_provenance(folder).trained
+    return _side_px(find_config(name_or_folder), trained)
+
+
 def with_text_encoder(model: Model) -> Model:
     """The same model with its text encoder; the other networks are shared."""
     if model.networks.text_encoder is not None:
@@ -167,6 +184,17 @@ def save_model(model: Model, folder: Path) -> None:
     # Checksums of what lay there before would call the new files damaged.
     (folder / SUMS_FILE).unlink(missing_ok=True)
     save_networks(complete.networks, model.config, folder)
+
+
+def _runs_video_model(config: ModelConfig, trained: frozenset[str]) -> bool:
+    if "dit" in trained:
+        return True
+    return not trained and not config.detail.used
+
+
+def _side_px(config: ModelConfig, trained: frozenset[str]) -> int:
+    own_px = max(config.size_px)
+    return own_px if _runs_video_model(config, trained) else max(own_px, BASE_SIDE_PX)
 
 
 def _is_folder(folder: Path) -> bool:

@@ -115,11 +115,11 @@ class Generate:
     def picture(self) -> "Picture":
         """The photograph at the model's size."""
         from diff4splat.models.picture import load_picture
-        from diff4splat.models.pretrained import find_config
+        from diff4splat.models.pretrained import find_config, find_side_px
 
-        config = find_config(self.model)
-        side_px = max(config.size_px) if self.resolution is None else self.resolution
-        return load_picture(self.image, side_px, self.fov, self.convert, config.token_px)
+        side_px = find_side_px(self.model) if self.resolution is None else self.resolution
+        multiple_px = find_config(self.model).token_px
+        return load_picture(self.image, side_px, self.fov, self.convert, multiple_px)
 
     def inputs(
         self, picture: "Picture", settings: "GenerationSettings", model_fingerprint: str

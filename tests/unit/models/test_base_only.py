@@ -1,19 +1,21 @@
 """Generation with a trained reconstruction behind a video model that nobody trained."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 import torch
 from packed_models import TRAINED, as_trained, random_model, trained_folder
+from PIL import Image
 from torch import nn
 
+from diff4splat.cli.generate import Generate
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.factory import PARTS
 from diff4splat.models.picture import Picture
 from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.pretrained import Model, load_model
+from diff4splat.models.pretrained import BASE_SIDE_PX, Model, find_side_px, load_model
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
@@ -109,3 +111,19 @@ def test_otherwise_everything_runs(partly: Model, trained: tuple[str, ...]) -> N
     assert "video model and reconstruction" not in {one.what for one in log.omissions}
     with pytest.raises(AssertionError):
         assert_equal(scene, generate(random_model())[0])
+
+
+def test_pictures_are_larger_where_no_network_runs(tmp_path: Path) -> None:
+    folder = trained_folder(tmp_path / "partly")
+    assert find_side_px(folder) == load_model(folder).side_px == BASE_SIDE_PX
+    whole = trained_folder(tmp_path / "whole", PARTS)
+    assert find_side_px(whole) == load_model(whole).side_px == max(load_model(whole).config.size_px)
+    assert find_side_px("test") == load_model("test").side_px == 32
+
+
+def test_the_command_reads_pictures_at_that_size(tmp_path: Path) -> None:
+    folder, file = trained_folder(tmp_path / "partly"), tmp_path / "photo.png"
+    Image.new("RGB", (320, 320), (200, 90, 30)).save(file)
+    asked = Generate(image=file, model=str(folder), out=tmp_path / "scene")
+    assert max(asked.picture().camera.size_px) == BASE_SIDE_PX
+    assert max(replace(asked, resolution=64).picture().camera.size_px) == 64
