@@ -3,7 +3,7 @@
 Axes: ``b`` batch, ``k`` key frames, ``e`` width of a token, ``h4 w4`` token grid, ``h w`` cells of
 4 pixels, ``d`` channels for the deformation network.
 
-    tokens, sight ─ decoder ─┬─ pixel head ─── raw maps ─ depth ─ pixels followed ────────┐
+    tokens, sight ─ decoder ─┬─ pixel head ─── raw maps ─ depth ─ pixels followed ───────┐
                              ├─ surroundings                                             │
                              └──────────────────────────── features ─────────────────────┴─ motion
 """
