@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PHOTO ?= demo/picture.jpg
+PROMPT ?= in a meadow, a turquoise rounded block slides to the left
 
 .PHONY: demo test test-all lint clean
 
@@ -12,10 +12,14 @@ $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'
 	touch $@
 
-demo: $(VENV)/ready  ## a photograph-like picture, made here, to a scene; PHOTO=mine.jpg takes yours
-	$(BIN)/python examples/make_picture.py demo/picture.jpg
-	$(BIN)/diff4splat generate $(PHOTO) --camera spiral --out demo/scene
+demo: $(VENV)/ready  ## a drawn world's first picture to a scene that moves; PHOTO=mine.jpg takes yours too
+	$(BIN)/python examples/make_world_picture.py demo/picture.jpg
+	$(BIN)/diff4splat generate demo/picture.jpg --camera arc:0.2 --prompt "$(PROMPT)" --out demo/scene
 	@echo "look at demo/scene/preview.png and demo/scene/video.mp4"
+ifdef PHOTO
+	$(BIN)/diff4splat generate $(PHOTO) --camera arc:0.2 --out demo/photo-scene
+	@echo "look at demo/photo-scene/preview.png and demo/photo-scene/video.mp4"
+endif
 
 test: $(VENV)/ready  ## everything that needs neither a GPU nor patience
 	$(BIN)/pytest -q -m "not slow"

@@ -3,7 +3,8 @@
 Run ``python benchmarks/bounds.py --items 16 --out FILE.md``: every pixel of the given frame nearest
 in time stands at its true depth; where the judged camera looks past all of them it sees the best
 plane. No network takes part, nothing has to be guessed but what the frame does not show. The rest
-is resampling, hidden places and motion between two frames.
+is resampling, hidden places and motion between two frames. With ``--task generation`` the first
+picture is all that is given, and nothing moves.
 
 Axes: ``h w`` pixels.
 """
@@ -58,6 +59,9 @@ def main() -> None:
     """Both rows over the items of a protocol."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--protocol", default="held_out_v2")
+    parser.add_argument(
+        "--task", default="reconstruction", choices=("reconstruction", "generation")
+    )
     parser.add_argument("--size", type=int, help="picture side; the protocol's if left out")
     parser.add_argument("--items", type=int, default=16)
     parser.add_argument("--out", type=Path, required=True, help="markdown file")
@@ -70,7 +74,7 @@ def main() -> None:
     found: dict[str, list[tuple[float, float]]] = {row: [] for row in ROWS}
     for item in range(options.items):
         clip = clips.clip(protocol.source.first + item)
-        case = make_case(clip, protocol, "reconstruction")
+        case = make_case(clip, protocol, options.task)
         for row, pictures in both(case, make_baseline(BEST_PLANE, case, protocol.planes)).items():
             found[row].append(pictures)
         print(f"item {item}: { ({row: rows[-1] for row, rows in found.items()}) }", flush=True)

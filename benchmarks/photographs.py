@@ -1,15 +1,19 @@
 """The main path on real photographs: fidelity, geometry, files, seconds and memory.
 
-Run ``python benchmarks/photographs.py`` (needs scikit-image's photographs); prints Markdown. Every
-photograph goes through ``small`` in a process of its own, so that peak memory is its own.
+Run ``python benchmarks/photographs.py`` (needs scikit-image's photographs); prints Markdown, and
+with ``--pictures FOLDER`` writes a strip of each as it came out. Every photograph goes through
+``small`` in a process of its own, so that peak memory is its own.
 
-    first view     PSNR of the first frame against the photograph at the model's size
+    first view     PSNR of the first frame against the photograph at the scene's size
+    orbit          least share of a frame that shows something, 15 degrees to both sides, and
+                   whether every number is finite
     geometry       median error of the measured optical flow (OpenCV DIS, textured half of the
                    picture) against the flow of the predicted depth, after a step to the left
     file, PLY      PSNR of a frame rendered from the re-read file against the one in memory
     same bits      whether a second run with the same seed gives an equal scene file
 """
 
+import argparse
 import multiprocessing
 import tempfile
 import time
@@ -18,6 +22,8 @@ from pathlib import Path
 
 import cv2
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
@@ -25,14 +31,23 @@ from diff4splat.geometry.rays import pixel_centers
 from diff4splat.io.ply import read_ply, write_ply
 from diff4splat.io.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
+from diff4splat.models.context import view_of
 from diff4splat.models.picture import Picture, choose_focal, prepare_picture
 from diff4splat.models.pipeline import Diff4SplatPipeline
+from diff4splat.models.pretrained import find_multiple_px
+from diff4splat.paths.build import build_path
+from diff4splat.paths.settings import PathSettings
 from diff4splat.render.api import render, render_video
 from diff4splat.report.phases import peak_memory_bytes
 from diff4splat.scene.scene import Scene
 
+SIDE_PX = 256
 PHOTOGRAPHS = ("astronaut", "coffee", "chelsea", "rocket")
 CAMERA = "left:0.05"
+ORBITS = ("orbit:0.0417", "orbit:-0.0417")
+"""15 of 360 degrees to each side."""
+ORBIT_FRAMES, SHOWN = 5, 0.5
+"""Frames per side, and the coverage from which a pixel shows something."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +57,9 @@ class Row:
     name: str
     size_px: tuple[int, int]
     first_view_db: float
+    orbit_share: float
+    orbit_finite: bool
+    strip: Float[Tensor, "h w 3"]
     flow_px: float
     flow_error_px: float
     file_db: float
@@ -65,7 +83,11 @@ def measure(name: str) -> Row:
     frame_ms = (time.perf_counter() - start) / len(frames) * 1e3
     flow_px, flow_error_px = flow_error(scene)
     file_db, ply_db, same_bits = through_files(scene, pipeline(picture, CAMERA))
+    share, finite, strip = around(scene, picture)
     return Row(
+        orbit_share=share,
+        orbit_finite=finite,
+        strip=strip,
         name=name,
         size_px=picture.camera.size_px,
         first_view_db=float(psnr(frames[0].rgb.clamp(0, 1), picture.rgb)),
@@ -85,7 +107,23 @@ def load(name: str) -> Picture:
     import skimage.data
 
     rgb = torch.from_numpy(getattr(skimage.data, name)()).float() / 255
-    return prepare_picture(rgb, choose_focal((rgb.shape[0], rgb.shape[1]), None, None), 256)
+    focal = choose_focal((rgb.shape[0], rgb.shape[1]), None, None)
+    return prepare_picture(rgb, focal, SIDE_PX, find_multiple_px("small", SIDE_PX))
+
+
+def around(scene: Scene, picture: Picture) -> tuple[float, bool, Float[Tensor, "h w 3"]]:
+    """Least share of a frame that shows something, whether all is finite, and frames in a row."""
+    shares, finite, frames = [], True, []
+    for orbit in ORBITS:
+        settings = PathSettings(frames=ORBIT_FRAMES, fps=ORBIT_FRAMES - 1)
+        for camera in build_path(orbit, view_of(picture.camera), settings).cameras:
+            seen = render(scene, camera, outputs=("rgb", "alpha", "depth"))
+            shares.append(float((seen.alpha > SHOWN).float().mean()))
+            finite &= all(bool(part.isfinite().all()) for part in (seen.rgb, seen.depth))
+            frames.append(seen.rgb.clamp(0, 1))
+    last = ORBIT_FRAMES - 1
+    chosen = (picture.rgb, frames[0], frames[last // 2], frames[last], frames[-1])
+    return min(shares), finite, torch.cat(chosen, 1)
 
 
 def flow_error(scene: Scene) -> tuple[float, float]:
@@ -125,16 +163,23 @@ def through_files(scene: Scene, again: Scene) -> tuple[float, float, bool]:
 
 def main() -> None:
     """Measure every photograph and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pictures", type=Path, help="folder for a strip of each photograph")
+    options = parser.parse_args()
     with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
         rows = pool.map(measure, PHOTOGRAPHS, chunksize=1)
     print(
-        "| photograph | size | first view | flow | flow error | file | PLY | same bits | "
-        "generate | frame | peak memory |\n|---|---|---|---|---|---|---|---|---|---|---|"
+        "| photograph | size | first view | orbit | flow | flow error | file | PLY | same bits | "
+        "generate | frame | peak memory |\n|---|---|---|---|---|---|---|---|---|---|---|---|"
     )
     for row in rows:
         height, width = row.size_px
+        if options.pictures:
+            write_png(row.strip, options.pictures / f"photograph-{row.name}.png")
         print(
-            f"| {row.name} | {width}×{height} | {row.first_view_db:.1f} dB | {row.flow_px:.1f} px "
+            f"| {row.name} | {width}×{height} | {row.first_view_db:.1f} dB "
+            f"| {row.orbit_share:.1%}{'' if row.orbit_finite else ', not finite'} "
+            f"| {row.flow_px:.1f} px "
             f"| {row.flow_error_px:.2f} px | {row.file_db:.0f} dB | {row.ply_db:.0f} dB "
             f"| {'yes' if row.same_bits else 'no'} | {row.generate_s:.1f} s "
             f"| {row.frame_ms:.0f} ms | {row.peak_gib:.2f} GiB |"

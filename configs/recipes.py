@@ -1,6 +1,6 @@
 """Every recipe by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -9,7 +9,7 @@ from diff4splat.configs.paper import paper_recipe
 from diff4splat.configs.small import small_recipe
 from diff4splat.configs.test import test_recipe
 from diff4splat.errors import ConfigError
-from diff4splat.training.recipe import DataSettings, Recipe
+from diff4splat.training.recipe import DataSettings, Recipe, SourceSettings
 from diff4splat.training.recipe_json import recipe_from_json
 
 RECIPES: Mapping[str, Callable[[], Recipe]] = MappingProxyType(
@@ -55,6 +55,19 @@ def with_clips(recipe: Recipe, folder: Path) -> Recipe:
         replace(stage, data=_from_folder(stage.data, folder.resolve())) for stage in recipe.stages
     ]
     return replace(recipe, stages=tuple(stages))
+
+
+def with_latents(recipe: Recipe, stage: str, folders: Sequence[Path]) -> Recipe:
+    """The recipe whose generator ``stage`` learns from folders of encoded clips."""
+    before = recipe.stage(stage)
+    share = before.data.sources[0].still_share
+    sources = tuple(
+        SourceSettings(kind="latents", folder=str(folder.resolve()), still_share=share)
+        for folder in folders
+    )
+    changed = replace(before, data=replace(before.data, sources=sources, workers=0))
+    stages = tuple(changed if one is before else one for one in recipe.stages)
+    return replace(recipe, stages=stages)
 
 
 def _from_folder(data: DataSettings, folder: Path) -> DataSettings:

@@ -133,12 +133,22 @@ class DitConfig:
     """Width of the sinusoid of the noise level (Wan)."""
     camera_width: int = 64
     """Hidden width of the camera adapter (inferred; AC3D finds a narrow one enough)."""
+    predicts: Literal["velocity", "clean"] = "velocity"
+    """Velocity (paper), or the clean latent that it leads to: where a token holds more numbers than
+    the width, noise does not fit through and data do (JiT, arXiv 2511.13720)."""
+    draft: bool = False
+    """Also sees a draft of the video, and corrects it if it predicts clean latents (ours;
+    docs/adr/0016)."""
 
     def __post_init__(self) -> None:
         require_counts(
             self, "width", "blocks", "heads", "feedforward_width", "frequency_width", "camera_width"
         )
         require_heads(self, smallest=6)
+        known = self.predicts in ("velocity", "clean")
+        require(known, "DitConfig.predicts", "velocity or clean", self.predicts)
+        known = isinstance(self.draft, bool)
+        require(known, "DitConfig.draft", "true or false", self.draft)
         require(
             self.frequency_width % 2 == 0,
             "DitConfig.frequency_width",

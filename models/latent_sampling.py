@@ -28,6 +28,8 @@ class Conditions:
     plucker: Float[Tensor, "b 6 f height width"]
     text: Float[Tensor, "b s d"] | None
     """None without a prompt: then neither the text encoder nor the guidance pass exists."""
+    draft: Float[Tensor, "b c t h w"] | None = None
+    """For a model that sees one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +76,7 @@ def _velocity(
     dit: VideoDiT, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
     # Cameras and text are embedded once: they are the same at every level.
-    embedded = dit.prepare(conditions.plucker, conditions.text)
+    embedded = dit.prepare(conditions.plucker, conditions.text, draft=conditions.draft)
     unconditional = _branch(dit, replace(embedded, text=None))
     if conditions.text is None:
         return guided(None, unconditional, UNGUIDED, calls)

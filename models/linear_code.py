@@ -39,6 +39,11 @@ class LinearCode(nn.Module):
         return listed.transpose(-1, -2).flatten(-2)
 
     @torch.no_grad()
+    def energy(self) -> Float[Tensor, " c"]:
+        """How much of a picture hangs on each latent channel of variance 1."""
+        return self.to_block.weight.square().sum(0)
+
+    @torch.no_grad()
     def set_components(
         self, mean: Float[Tensor, " n"], components: Float[Tensor, "c n"], std: Float[Tensor, " c"]
     ) -> None:

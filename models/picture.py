@@ -53,6 +53,16 @@ class Picture:
         return replace(self, rgb=self.rgb.to(device), camera=self.camera.to(device))
 
 
+def smaller(picture: Picture, factor: int) -> Picture:
+    """The picture with ``factor``² pixels averaged into one; its sides are multiples of that."""
+    if factor == 1:
+        return picture
+    rgb = torch.nn.functional.avg_pool2d(picture.rgb.movedim(-1, 0)[None], factor)[0]
+    height, width = picture.camera.size_px
+    camera = picture.camera.resized((height // factor, width // factor))
+    return replace(picture, rgb=rgb.movedim(0, -1), camera=camera)
+
+
 def load_picture(
     file: Path,
     side_px: int,

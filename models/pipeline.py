@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat import __version__
@@ -24,10 +24,12 @@ from diff4splat.models.base_only import base_canonical, base_motion, leave_out_v
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
+from diff4splat.models.draft import draft_latent
+from diff4splat.models.finer import FinerScene, finer
 from diff4splat.models.input_colors import InputGrid, match_input_view
 from diff4splat.models.latent_sampling import Conditions, sample_video
 from diff4splat.models.latents_to_scene import VideoLatent, canonical_scene
-from diff4splat.models.picture import Picture, load_picture
+from diff4splat.models.picture import Picture, load_picture, smaller
 from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
 from diff4splat.models.prompt import require_prompt
 from diff4splat.models.reconstruction import Canonical, deform
@@ -119,26 +121,32 @@ class Diff4SplatPipeline:
         """At a size that the model can take, in single precision."""
         config = self.model.config
         if not isinstance(image, Picture):
-            image = load_picture(Path(image), self.model.side_px, multiple_px=config.token_px)
+            side_px = self.model.side_px
+            multiple_px = config.token_px * self.model.pixels_per_cell((side_px, side_px))
+            image = load_picture(Path(image), side_px, multiple_px=multiple_px)
         config.latent_grid(config.frames, image.camera.size_px)
         return replace(image, rgb=image.rgb.float(), camera=image.camera.to(torch.float32))
 
     def _generate(self, request: Request, log: RunLog) -> Scene:
-        device = self.model.device
+        device, photo = self.model.device, request.picture.to(self.model.device)
+        small = smaller(photo, self.model.pixels_per_cell(photo.camera.size_px))
         context = context_path(request.path, self.model.config.frames).to(device)
-        request = replace(request, picture=request.picture.to(device))
+        context = replace(context, cameras=context.cameras.resized(small.camera.size_px))
         build = self._from_video if self.model.runs_video_model else self._from_picture
-        canonical, motion = build(request, context, log)
+        canonical, motion = build(replace(request, picture=small), context, log)
+        fine = FinerScene(gaussians=canonical.gaussians, motion=motion, cells=canonical.every_cell)
+        if small is not photo:
+            fine = finer(canonical, motion, small, photo)
         scene = Scene(
-            gaussians=canonical.gaussians,
-            motion=motion,
+            gaussians=fine.gaussians,
+            motion=fine.motion,
             path=request.path,
             provenance=self._provenance(request),
         )
-        scene = self._match_colors(scene, canonical, request, log)
-        camera = request.picture.camera
-        still_px = seen_as_still_px(self.model.config, camera, request.settings.still_px)
-        return drop_still_tracks(scene, camera, still_px, log).to(torch.device("cpu"))
+        request = replace(request, picture=photo)
+        scene = self._match_colors(scene, fine.cells, request, log)
+        still_px = seen_as_still_px(self.model.config, photo.camera, request.settings.still_px)
+        return drop_still_tracks(scene, photo.camera, still_px, log).to(torch.device("cpu"))
 
     def _from_video(
         self, request: Request, context: CameraPath, log: RunLog
@@ -167,7 +175,20 @@ class Diff4SplatPipeline:
             plucker = plucker_map(relative_to_first(context.cameras)).movedim(0, 1)[None]
             video = request.picture.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
             image_latent = self.model.networks.vae.encode(video).mean
-        return Conditions(image_latent=image_latent, plucker=plucker, text=text)
+        return Conditions(
+            image_latent=image_latent,
+            plucker=plucker,
+            text=text,
+            draft=self._draft(request, context, log),
+        )
+
+    def _draft(
+        self, request: Request, context: CameraPath, log: RunLog
+    ) -> Float[Tensor, "1 c t h w"] | None:
+        if not self.model.config.dit.draft:
+            return None
+        with log.phases.phase("draft"):
+            return draft_latent(self.model, request.picture, context.cameras)
 
     def _text_states(self, prompt: str | None, log: RunLog) -> Float[Tensor, "1 s d"] | None:
         if prompt is None:
@@ -196,12 +217,10 @@ class Diff4SplatPipeline:
         return deform(self.model.networks.deformation, canonical, context.times_s, units, log)
 
     def _match_colors(
-        self, scene: Scene, canonical: Canonical, request: Request, log: RunLog
+        self, scene: Scene, cells: Int[Tensor, " n"], request: Request, log: RunLog
     ) -> Scene:
         grid = InputGrid(
-            picture=request.picture,
-            stride=self.model.config.ldrm.grid_stride,
-            cells=canonical.every_cell,
+            picture=request.picture, stride=self.model.config.ldrm.grid_stride, cells=cells
         )
         return match_input_view(scene, grid, request.settings.color_steps, log)
 

@@ -5,6 +5,7 @@ config.json  provenance.json  {vae,text_encoder,dit,ldrm,deformation}.safetensor
 A name is looked for as a folder first, then among the weights that ship, then among the sizes.
 """
 
+import math
 import os
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -43,7 +44,8 @@ from diff4splat.models.weight_files import (
 
 BYTES_PER_WEIGHT = 4
 BASE_SIDE_PX = 256
-"""Picture side where no network runs: nothing then asks for the size that they were made for."""
+"""Picture side where no network runs, or where pixels take after what networks see in a smaller
+copy: nothing then asks for the size that they were made for."""
 RECONSTRUCTION = frozenset({"vae", "ldrm", "deformation"})
 """Parts between a true video and its scene."""
 
@@ -88,6 +90,24 @@ class Model:
     def side_px(self) -> int:
         """Longer side of pictures read from files."""
         return _side_px(self.config, self.trained)
+
+    def pixels_per_cell(self, size_px: tuple[int, int]) -> int:
+        """Pixels of a picture per pixel side that the networks see of it.
+
+        Of those that leave whole tokens the one with which networks see most nearly as many pixels
+        as they were made for.
+        """
+        side_px = math.sqrt(math.prod(size_px))
+        wanted = _pixels_per_cell(self.config, self.trained, side_px)
+        if wanted == 1:
+            return 1
+        token_px, own_px = self.config.token_px, max(self.config.size_px)
+        counts = [
+            count
+            for count in range(1, 2 * wanted)
+            if not any(side % (count * token_px) for side in size_px)
+        ]
+        return min(counts, key=lambda count: abs(math.log(side_px / own_px / count)), default=1)
 
     @property
     def device(self) -> torch.device:
@@ -164,6 +184,18 @@ def find_side_px(name_or_folder: str | Path) -> int:
     return _side_px(find_config(name_or_folder), trained)
 
 
+def find_multiple_px(name_or_folder: str | Path, side_px: int) -> int:
+    """What sides of pictures of about ``side_px`` must be multiples of, without any weights.
+
+    Raises:
+        ConfigError, CheckpointError, FileFormatError: as ``load_model``.
+    """
+    folder = checked_folder(name_or_folder, (CONFIG_FILE, PROVENANCE_FILE))
+    trained = frozenset() if folder is None else read_provenance(folder).trained
+    config = find_config(name_or_folder)
+    return config.token_px * _pixels_per_cell(config, trained, side_px)
+
+
 def with_text_encoder(model: Model) -> Model:
     """The same model with its text encoder; the other networks are shared."""
     if model.networks.text_encoder is not None:
@@ -194,7 +226,16 @@ def _runs_video_model(config: ModelConfig, trained: frozenset[str]) -> bool:
 
 def _side_px(config: ModelConfig, trained: frozenset[str]) -> int:
     own_px = max(config.size_px)
-    return own_px if _runs_video_model(config, trained) else max(own_px, BASE_SIDE_PX)
+    if _runs_video_model(config, trained) and not config.detail.used:
+        return own_px
+    return max(own_px, BASE_SIDE_PX)
+
+
+def _pixels_per_cell(config: ModelConfig, trained: frozenset[str], side_px: int | float) -> int:
+    """With a detail decoder every pixel of the first frame has a Gaussian to take after."""
+    if not (config.detail.used and _runs_video_model(config, trained)):
+        return 1
+    return max(round(side_px / max(config.size_px)), 1)
 
 
 def _is_folder(folder: Path) -> bool:

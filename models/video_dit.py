@@ -6,9 +6,13 @@ given per latent frame: an image condition overwrites latent frame 0 with the cl
 gives it level 0.
 
     latent ─ patch 1×2×2 ─ linear ─┐
+    draft ── patch 1×2×2 ─ linear ─┤
     camera ─ adapter ──────────────┴ + ─ blocks ─ norm, modulate ─ linear (zero at first) ─ velocity
     level ── sinusoid, MLP ─ modulation ───┘ │
     text ─── MLP ─ cross-attention ──────────┘
+
+Where it predicts clean latents, the last linear layer answers what to add to the draft (to 0, where
+there is none), and the velocity follows from that: a fresh model leads any noise to the draft.
 """
 
 from dataclasses import dataclass
@@ -17,6 +21,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
+from diff4splat.errors import ShapeError
+from diff4splat.flow.path import velocity_from_clean
 from diff4splat.models.blocks.dit_block import MODULATIONS, DitBlock
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
@@ -35,10 +41,13 @@ PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
 class DitConditions:
     """What stays the same over all noise levels of one generation; None is not computed at all."""
 
-    camera: Float[Tensor, "b t h w d"] | None = None
+    camera: Float[Tensor, "b t h2 w2 d"] | None = None
     text: Float[Tensor, "b s d"] | None = None
     text_mask: Bool[Tensor, "b s"] | None = None
     """True where a text token is real; None when all are."""
+    draft: Float[Tensor, "b c t h w"] | None = None
+    """Latent of a draft of the video."""
+    draft_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
 
 
 class TextProjection(nn.Module):
@@ -62,6 +71,8 @@ class VideoDiT(nn.Module):
         dit, channels = config.dit, config.vae.latent_channels
         self.config = dit
         self.patch_embedding = nn.Linear(channels * TOKEN_PATCH**2, dit.width)
+        if dit.draft:
+            self.draft_embedding = zero_(nn.Linear(channels * TOKEN_PATCH**2, dit.width))
         self.camera_adapter = CameraAdapter(dit.width, dit.camera_width, config.vae.space_stride)
         self.text_projection = TextProjection(config.text.width, dit.width)
         self.level_mlp = EmbeddingMlp(dit.frequency_width, dit.width)
@@ -78,21 +89,33 @@ class VideoDiT(nn.Module):
         camera: Float[Tensor, "b 6 f hh ww"] | None = None,
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
+        draft: Float[Tensor, "b c t h w"] | None = None,
     ) -> Float[Tensor, "b c t h w"]:
         """Velocity in one call: ``prepare``, then ``velocity``."""
-        return self.velocity(latent, level, self.prepare(camera, text, text_mask))
+        return self.velocity(latent, level, self.prepare(camera, text, text_mask, draft))
 
     def prepare(
         self,
         camera: Float[Tensor, "b 6 f hh ww"] | None = None,
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
+        draft: Float[Tensor, "b c t h w"] | None = None,
     ) -> DitConditions:
-        """Embed the conditions once for all steps of a sampler."""
+        """Embed the conditions once for all steps of a sampler.
+
+        Raises:
+            ShapeError: a draft is missing that the model sees, or given to one that sees none.
+        """
+        if self.config.draft != (draft is not None):
+            want, got = ("one", "none") if self.config.draft else ("none", "one")
+            raise ShapeError(f"draft: expected {want}, got {got}; DitConfig.draft decides")
+        seen = None if draft is None else self.draft_embedding(patchify(draft, PATCH))
         return DitConditions(
             camera=None if camera is None else self.camera_adapter(camera),
             text=None if text is None else self.text_projection(text),
             text_mask=text_mask,
+            draft=draft,
+            draft_tokens=seen,
         )
 
     def velocity(
@@ -105,6 +128,8 @@ class VideoDiT(nn.Module):
         tokens = self.patch_embedding(patchify(latent, PATCH))
         if conditions.camera is not None:
             tokens = tokens + conditions.camera
+        if conditions.draft_tokens is not None:
+            tokens = tokens + conditions.draft_tokens
         rows, columns = tokens.shape[2:4]
         rope = rope_tables(
             tuple(tokens.shape[1:4]), self.config.width // self.config.heads, tokens.device
@@ -116,4 +141,13 @@ class VideoDiT(nn.Module):
             tokens = block(tokens, modulation, rope, conditions.text, conditions.text_mask)
         shift, scale = (embedding[..., None, :] + self.modulation_out)[..., None, :].unbind(2)
         patches = self.head(modulate(self.norm_out(tokens), shift, scale))
-        return unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
+        answer = unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
+        return self._as_velocity(answer, latent, level, conditions.draft)
+
+    def _as_velocity(
+        self, answer: Tensor, latent: Tensor, level: Tensor, draft: Tensor | None
+    ) -> Float[Tensor, "b c t h w"]:
+        if self.config.predicts == "velocity":
+            return answer
+        clean = answer if draft is None else draft + answer
+        return velocity_from_clean(latent, clean, level[:, None, :, None, None].to(latent))

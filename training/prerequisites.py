@@ -5,18 +5,19 @@
 
 A part comes from the last earlier stage that trained it, with averaged weights. The parts that the
 stage goes on training from the latest such stage are then taken over by the trainer with raw
-weights beside their averages; older ones go on from their averages. Parts nobody trained yet are
-random.
+weights beside their averages; older ones go on from their averages. Parts nobody trained yet come
+from the model that the run starts from, where they are trained, and are random otherwise.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
-from diff4splat.models.factory import Networks, create_networks
+from diff4splat.models.factory import PARTS, Networks, create_networks
+from diff4splat.models.pretrained import Model
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
 from diff4splat.training.recipe import Recipe, StageRecipe
 from diff4splat.training.stages.factory import STAGES
@@ -34,30 +35,45 @@ def sources_of_parts(recipe: Recipe, stage: StageRecipe) -> dict[str, StageRecip
         part: earlier
         for earlier in before
         for part in earlier.trained
-        if part in STAGES[stage.kind].parts
+        if part in STAGES[stage.kind].needed(recipe.model)
+    }
+
+
+def stages_before(
+    recipe: Recipe, stage: StageRecipe, folder: Path, start: Model | None = None
+) -> dict[str, StageRecipe]:
+    """``sources_of_parts`` without parts that come from ``start`` because no stage was begun."""
+    ready = frozenset() if start is None else start.trained
+    return {
+        part: earlier
+        for part, earlier in sources_of_parts(recipe, stage).items()
+        if part not in ready or _has_weights(earlier, folder / earlier.name)
     }
 
 
 def require_prerequisites(
-    recipe: Recipe, stage: StageRecipe, folder: Path, ignore_gates: bool
+    recipe: Recipe, sources: Mapping[str, StageRecipe], folder: Path, ignore_gates: bool
 ) -> None:
-    """All stages that this one builds on are over and good enough.
+    """All stages that one builds on, its ``stages_before``, are over and good enough.
 
     Raises:
         ConfigError: one is not; says which measure is short by how much.
     """
-    for earlier in _in_order(recipe, sources_of_parts(recipe, stage)):
+    for earlier in _in_order(recipe, sources):
         stage_may_start(earlier, folder / earlier.name, ignore_gates)
 
 
-def continued_stage(recipe: Recipe, stage: StageRecipe) -> StageRecipe | None:
-    """The last earlier stage that trained something this one goes on training."""
-    sources = sources_of_parts(recipe, stage)
+def continued_stage(
+    recipe: Recipe, stage: StageRecipe, sources: Mapping[str, StageRecipe]
+) -> StageRecipe | None:
+    """The last of ``sources`` that trained something the stage goes on training."""
     learnt = {part: sources[part] for part in stage.trained if part in sources}
     return (_in_order(recipe, learnt) or [None])[-1]
 
 
-def starting_networks(recipe: Recipe, stage: StageRecipe, folder: Path) -> Networks:
+def starting_networks(
+    recipe: Recipe, stage: StageRecipe, folder: Path, start: Model | None = None
+) -> Networks:
     """Random networks, with the averaged weights of every part that was trained before.
 
     Parts that the stage does not run are not built: in the ``paper`` recipe they would not fit.
@@ -65,12 +81,15 @@ def starting_networks(recipe: Recipe, stage: StageRecipe, folder: Path) -> Netwo
     Raises:
         CheckpointError, FileFormatError: a checkpoint is missing, damaged or of other networks.
     """
-    needed = STAGES[stage.kind].parts
+    needed = STAGES[stage.kind].needed(recipe.model)
     networks = create_networks(recipe.model, seed=recipe.seed, needed=needed)
-    return _filled(networks, sources_of_parts(recipe, stage), folder)
+    _take(networks, start, needed)
+    return _filled(networks, stages_before(recipe, stage, folder, start), folder)
 
 
-def trained_networks(recipe: Recipe, folder: Path) -> tuple[Networks, frozenset[str]]:
+def trained_networks(
+    recipe: Recipe, folder: Path, start: Model | None = None
+) -> tuple[Networks, frozenset[str]]:
     """Networks with the newest averaged weights of all stages begun, and the parts that are done.
 
     Raises:
@@ -80,8 +99,19 @@ def trained_networks(recipe: Recipe, folder: Path) -> tuple[Networks, frozenset[
     finished = [stage for stage in begun if read_result(folder / stage.name).finished]
     sources = {part: stage for stage in begun for part in stage.trained}
     networks = create_networks(recipe.model, seed=recipe.seed)
+    _take(networks, start, PARTS)
     done = frozenset(part for stage in finished for part in stage.trained)
-    return _filled(networks, sources, folder), done
+    ready = frozenset() if start is None else start.trained - sources.keys()
+    return _filled(networks, sources, folder), done | ready
+
+
+def _take(networks: Networks, start: Model | None, parts: Collection[str]) -> None:
+    """What ``start`` has trained of these parts."""
+    if start is None:
+        return
+    for part in (name for name in PARTS if name in start.trained and name in parts):
+        stored = getattr(start.networks, part).state_dict()
+        _fill(getattr(networks, part), stored, f"{start.folder}: {part}")
 
 
 def _has_weights(stage: StageRecipe, place: Path) -> bool:

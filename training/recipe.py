@@ -30,6 +30,11 @@ class LossWeights:
 
     flow: float = 1.0
     """Flow matching (paper)."""
+    flow_level: float = 0.0
+    """Velocity errors at levels below count as if they were made here (ours); 0 is the paper. Where
+    clean latents are predicted, small levels would otherwise outweigh all others."""
+    flow_energy: float = 0.0
+    """Latent channels count as their share in pictures to this power (ours); 0 is the paper."""
     photometric: float = 1.0
     """λ_photo (paper)."""
     perceptual: float = 0.5
@@ -88,10 +93,10 @@ class OptimizerSettings:
 class SourceSettings:
     """One source of clips in the mixture."""
 
-    kind: Literal["worlds", "shards"] = "worlds"
-    """Drawn on the fly, or read from a folder of shards."""
+    kind: Literal["worlds", "shards", "latents"] = "worlds"
+    """Drawn on the fly, read from a folder of shards, or encoded already (generator only)."""
     folder: str = ""
-    """Of the shards."""
+    """Of the shards or latents."""
     split: Literal["training", "held_out"] = "training"
     still_share: float = 0.25
     """Share of worlds in which nothing moves."""
@@ -101,7 +106,7 @@ class SourceSettings:
         _require(0 <= self.still_share <= 1, "source.still_share", "0 to 1", self.still_share)
         _require(0 <= self.weight < math.inf, "source.weight", "at least 0", self.weight)
         named = self.kind == "worlds" or self.folder != ""
-        _require(named, "source.folder", "the folder of the shards", "none")
+        _require(named, "source.folder", "the folder of the shards or latents", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,6 +129,8 @@ class DataSettings:
     """Supervised (view, time) pairs per sample and step."""
     tracks: int = 512
     """Tracked points per clip."""
+    moving_targets: bool = True
+    """False judges moving clips at their first frame alone: for stages in which nothing moves."""
     track_stride: int = 1
     """Input frames from one to the next whose pixels carry Gaussians, and so can be followed."""
     workers: int = 1
@@ -180,8 +187,12 @@ class StageRecipe:
     gates: tuple[Gate, ...] = ()
     true_pictures: bool = False
     """The detail decoder sees the clip's pictures instead of decoded ones: a shorter step."""
+    single_share: float = 0.0
+    """Share of steps that are given the first picture alone (ours; docs/adr/0016)."""
     text_dropout: float = 0.1
     """Share of steps without text, for guidance (public code of the paper: 0.1)."""
+    vary_captions: bool = False
+    """Captions in other words, shorter, or as a plain sentence (ours)."""
     level_shift: float = 1.0
     """Above 1 leans to noisy levels; 5 in the paper's public code, at 512² and 49 frames."""
 
@@ -192,8 +203,10 @@ class StageRecipe:
                 f"stage {self.name}: expected steps above 0 and a global batch that micro batches "
                 f"divide, got {self.steps}, {self.global_batch} and {self.micro_batch}"
             )
-        share, shift = self.text_dropout, self.level_shift
-        _require(0 <= share <= 1, f"stage {self.name}: text_dropout", "0 to 1", share)
+        for name in ("text_dropout", "single_share"):
+            share = getattr(self, name)
+            _require(0 <= share <= 1, f"stage {self.name}: {name}", "0 to 1", share)
+        shift = self.level_shift
         _require(0 < shift < math.inf, f"stage {self.name}: level_shift", "above 0", shift)
 
 
@@ -250,6 +263,9 @@ class Recipe:
         what, detail = f"stage {stage.name}", self.model.detail.used
         seen = stage.kind != "sight" or (detail and stage.true_pictures)
         _require(seen, what, "a detail decoder and true_pictures for its kind", "neither or one")
+        encoded = any(source.kind == "latents" for source in stage.data.sources)
+        fits = not encoded or stage.kind == "generator"
+        _require(fits, f"{what}: data.sources", "latents for a generator stage alone", stage.kind)
         told = stage.data.augment and stage.kind in ("generator", "joint")
         _require(not told, f"{what}: data.augment", "false where captions are read", "true")
         stride, framed = stage.data.track_stride, detail and stage.kind in RECONSTRUCTING

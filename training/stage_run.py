@@ -15,11 +15,13 @@ from diff4splat.models.pretrained import Model, save_model
 from diff4splat.report.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latent_statistics import CLIPS, measure_statistics, write_statistics
+from diff4splat.training.latents.samples import LatentSamples, open_samples
 from diff4splat.training.linear_start import start_from_components
 from diff4splat.training.prerequisites import (
     continued_stage,
     last_checkpoint,
     require_prerequisites,
+    stages_before,
     starting_networks,
     trained_networks,
 )
@@ -46,6 +48,8 @@ class StageRun:
     features: str | None = None
     """Weights of the perceptual distance; None is the stand-in."""
     ignore_gates: bool = False
+    start: Model | None = None
+    """Has the parts that no stage of this run has trained."""
     stop_after_steps: int | None = None
     stop_after_s: float | None = None
     device: str | None = None
@@ -62,9 +66,10 @@ def train_stage(asked: StageRun) -> StageResult:
         InputError, FileFormatError, OutputError: clips cannot be read, or nothing be written.
     """
     recipe, stage_recipe = asked.recipe, asked.recipe.stage(asked.stage)
-    require_prerequisites(recipe, stage_recipe, asked.folder, asked.ignore_gates)
-    samples = ClipSamples.open(stage_recipe, recipe.seed)
-    networks = starting_networks(recipe, stage_recipe, asked.folder)
+    sources = stages_before(recipe, stage_recipe, asked.folder, asked.start)
+    require_prerequisites(recipe, sources, asked.folder, asked.ignore_gates)
+    samples = open_samples(stage_recipe, recipe.seed)
+    networks = starting_networks(recipe, stage_recipe, asked.folder, asked.start)
     plan = StagePlan(
         model=recipe.model,
         recipe=stage_recipe,
@@ -82,7 +87,8 @@ def train_stage(asked: StageRun) -> StageResult:
 
 def _settings(asked: StageRun, plan: StagePlan) -> RunSettings:
     recipe, folder = asked.recipe, asked.folder / asked.stage
-    before = continued_stage(recipe, plan.recipe)
+    sources = stages_before(recipe, plan.recipe, asked.folder, asked.start)
+    before = continued_stage(recipe, plan.recipe, sources)
     # Gates ignored, the stage before may be unfinished: its averages are all there is to take.
     over = before is not None and read_result(asked.folder / before.name).finished
     return RunSettings(
@@ -100,11 +106,11 @@ def _settings(asked: StageRun, plan: StagePlan) -> RunSettings:
     )
 
 
-def _hand_over(asked: StageRun, stage: StageRecipe, samples: ClipSamples) -> None:
+def _hand_over(asked: StageRun, stage: StageRecipe, samples: ClipSamples | LatentSamples) -> None:
     """Statistics of the latents if the autoencoder learns here, and a folder for pipelines."""
-    if "vae" in stage.trained:
+    if isinstance(samples, ClipSamples) and "vae" in stage.trained:
         _measure_latents(asked, stage, samples)
-    networks, trained = trained_networks(asked.recipe, asked.folder)
+    networks, trained = trained_networks(asked.recipe, asked.folder, asked.start)
     model = Model(config=asked.recipe.model, networks=networks, trained=trained)
     save_model(model, asked.folder / MODEL_FOLDER)
     missing = ", ".join(part for part in PARTS if part not in trained)
@@ -114,7 +120,7 @@ def _hand_over(asked: StageRun, stage: StageRecipe, samples: ClipSamples) -> Non
 
 def _measure_latents(asked: StageRun, stage: StageRecipe, samples: ClipSamples) -> None:
     folder = asked.folder / stage.name
-    vae = starting_networks(asked.recipe, stage, asked.folder).vae
+    vae = starting_networks(asked.recipe, stage, asked.folder, asked.start).vae
     vae.load_state_dict(load_parts(last_checkpoint(folder))["vae"])
     with asked.phases.phase("measure latents", CLIPS) as advance:
         write_statistics(measure_statistics(vae, samples, advance), folder)

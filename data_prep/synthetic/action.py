@@ -5,12 +5,13 @@ ground, away its viewing direction. What is meant is checked against the numbers
 built around it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from jaxtyping import Float64
 
+from diff4splat.data_prep.synthetic.captions.vocabulary import OPPOSITE
 from diff4splat.data_prep.synthetic.cast import Cast
 from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.layout.plan import Placed, Plan
@@ -28,6 +29,8 @@ HEADINGS: dict[Direction, tuple[float, float]] = {
     "away": (0.0, 1.0),
 }
 """(right, away) as the input camera sees it."""
+TURNED_SHARES = (1.0, 0.7, 0.5)
+"""Of the way, tried in this order."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +44,8 @@ class Stage:
     distance_m: float
     plan: Plan
     cast: Cast
+    against_share: float = 0.0
+    """Share of travelling movers that go the other way than their place and facing suggest."""
 
     @property
     def width_m(self) -> float:
@@ -83,7 +88,38 @@ def _try_mover(stage: Stage, count: int, number: int, draws: Draws) -> Placed | 
     placed = Placed(
         family=family, shape=performed.shape, parts=parts, motion=name, size_m=shape.height
     )
-    return placed if _is_good(stage, placed, motion, heading) else None
+    if not _is_good(stage, placed, motion, heading):
+        return None
+    return _turned(stage, placed, heading, draws.child("against"))
+
+
+def _turned(stage: Stage, placed: Placed, heading: str, draws: Draws) -> Placed:
+    """Perhaps the same thing going the other way, as far as it stays in view.
+
+    Things begin on one side, face where they go and go to the other side: a first picture that
+    tells all that needs no caption. After this the first picture is the same and the way is not.
+    """
+    motion = MOTIONS[placed.motion]
+    if not motion.travels or not draws.chance(stage.against_share):
+        return placed
+    for share in TURNED_SHARES:
+        other = replace(placed, parts=turned_back(placed.parts, share))
+        if _is_good(stage, other, motion, OPPOSITE[heading]):
+            return other
+    return placed
+
+
+def turned_back(parts: Posed, share: float) -> Posed:
+    """The same first frame and turning, but ``share`` of the way in the other direction."""
+    total = sum(part.shape[1] for part in parts)
+    way = sum((part - part[:1]).sum(1) for part in parts) / total
+    back = (1 + share) * way * np.array([1.0, 0.0, 1.0])
+    return tuple(part - back[:, None] for part in parts)
+
+
+def frozen(placed: Placed) -> Placed:
+    """The thing as the first frame shows it, standing."""
+    return replace(placed, parts=tuple(part[:1] for part in placed.parts), motion="")
 
 
 def _travel(stage: Stage, heading: str, motion: Motion, draws: Draws) -> float:

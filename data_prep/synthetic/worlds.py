@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.action import Stage, movers
+from diff4splat.data_prep.synthetic.action import Stage, frozen, movers
 from diff4splat.data_prep.synthetic.assembly import Scenery, assemble
 from diff4splat.data_prep.synthetic.cameras import Lens, draw_path, draw_shots, film
 from diff4splat.data_prep.synthetic.cast import Cast
@@ -38,6 +38,10 @@ class WorldRecipe:
     split: SplitName = "training"
     still_share: float = 0.15
     """Share of worlds in which only the camera moves."""
+    against_share: float = 0.0
+    """Share of travelling things that go against what their place and facing suggest."""
+    frozen_share: float = 0.0
+    """Share of the other worlds in which what could move stands all the same."""
     frames: int = 17
     size_px: tuple[int, int] = (128, 128)
     """(height, width)"""
@@ -55,7 +59,8 @@ class WorldRecipe:
         _require_range("views", self.views, 1, 8)
         _require_range("size_px", min(self.size_px), 8, 4096)
         _require_range("size_px", max(self.size_px), 8, 4096)
-        _require_range("still_share", self.still_share, 0.0, 1.0)
+        for name in ("still_share", "against_share", "frozen_share"):
+            _require_range(name, getattr(self, name), 0.0, 1.0)
         _require_range("fps", self.fps, 0.1, 1000.0)
 
     def allowed(self) -> Split:
@@ -119,9 +124,12 @@ def _try_world(
     around = Surroundings(
         cast=cast, stage_m=stage.radius_m, plan=stage.plan, draws=draws.child("around")
     )
+    standing = furnish(around)
+    if draws.child("frozen").chance(recipe.frozen_share):
+        moving, standing = [], [*map(frozen, moving), *standing]
     scenery = Scenery(
         moving=tuple(moving),
-        standing=tuple(furnish(around)),
+        standing=tuple(standing),
         split=split,
         draws=draws.child("looks"),
     )
@@ -167,6 +175,7 @@ def _framing(recipe: WorldRecipe, split: Split, draws: Draws, is_still: bool) ->
         distance_m=distance,
         plan=Plan(eyes=eyes, margin_m=0.16 * distance),
         cast=cast,
+        against_share=recipe.against_share,
     )
     return _Framing(cast=cast, stage=stage, views=views, path=shots[0].path)
 

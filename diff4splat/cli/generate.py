@@ -115,10 +115,10 @@ class Generate:
     def picture(self) -> "Picture":
         """The photograph at the model's size."""
         from diff4splat.models.picture import load_picture
-        from diff4splat.models.pretrained import find_config, find_side_px
+        from diff4splat.models.pretrained import find_multiple_px, find_side_px
 
         side_px = find_side_px(self.model) if self.resolution is None else self.resolution
-        multiple_px = find_config(self.model).token_px
+        multiple_px = find_multiple_px(self.model, side_px)
         return load_picture(self.image, side_px, self.fov, self.convert, multiple_px)
 
     def inputs(

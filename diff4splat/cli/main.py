@@ -14,7 +14,7 @@ from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
-from diff4splat.cli.prepare import PrepareCheck, PrepareSynthetic
+from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
 from diff4splat.cli.render import Render
 from diff4splat.cli.report import ErrorTime, ListKnobs
 from diff4splat.cli.train import Train
@@ -23,7 +23,9 @@ from diff4splat.errors import Diff4SplatError, InputError
 subcommand = tyro.conf.subcommand
 Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
 Prepare = (
-    Annotated[PrepareSynthetic, subcommand("synth")] | Annotated[PrepareCheck, subcommand("check")]
+    Annotated[PrepareSynthetic, subcommand("synth")]
+    | Annotated[PrepareLatents, subcommand("latents")]
+    | Annotated[PrepareCheck, subcommand("check")]
 )
 Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
 Command = (

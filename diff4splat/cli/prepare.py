@@ -21,6 +21,10 @@ class PrepareSynthetic:
     """Families, textures and motions to draw from."""
     still_share: float = 0.25
     """Share of clips in which only the camera moves."""
+    against_share: float = 0.0
+    """Share of things that go against what their place and facing suggest: only text tells then."""
+    frozen_share: float = 0.0
+    """Share of the other clips in which what could move stands all the same."""
     size: int = 128
     """Picture side in pixels."""
     frames: int = 17
@@ -46,6 +50,8 @@ class PrepareSynthetic:
             seed=self.seed,
             split=self.split,
             still_share=self.still_share,
+            against_share=self.against_share,
+            frozen_share=self.frozen_share,
             frames=self.frames,
             size_px=(self.size, self.size),
             views=self.views,
@@ -63,6 +69,42 @@ class PrepareSynthetic:
         write_clip_sheet(self.out, self.out / "clips.png")
         seconds = phases.seconds["draw clips"]
         note(f"wrote {drawn} clips to {self.out} in {seconds:.0f} s; look at clips.png there")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrepareLatents:
+    """Encode clips and their drafts once, so that the video model need not read pictures."""
+
+    clips: Path
+    """Folder of shards."""
+    out: Path
+    """Folder for the latents; files that are there already are left as they are."""
+    model: str = "small"
+    """Model (folder or name) that encodes."""
+    config: str = "small"
+    """Recipe whose generator stage says which frames, and at what size."""
+    mirror: bool = True
+    """Each clip also with left and right exchanged, in pictures and in words."""
+
+    def run(self) -> None:
+        """Encode and write."""
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.cli.installation import speck
+        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.configs.recipes import find_recipe
+        from diff4splat.models.pretrained import load_model
+        from diff4splat.training.latents.encode import EncodingJob, encode_clips
+
+        phases = ConsolePhases()
+        prepare_renderer(speck("cpu"), phases)
+        job = EncodingJob(
+            model=load_model(self.model),
+            data=find_recipe(self.config).stage("generator").data,
+            clips=self.clips,
+            folder=self.out,
+            mirror=self.mirror,
+        )
+        note(f"wrote {encode_clips(job, phases)} encoded clips to {self.out}")
 
 
 @dataclass(frozen=True, kw_only=True)

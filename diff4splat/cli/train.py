@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from diff4splat.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diff4splat.models.pretrained import Model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,13 +19,17 @@ class Train:
     config: str
     """Recipe: test, small or paper; or a JSON file such as the recipe.json of a run."""
     stage: str
-    """Name of the stage: vae, static-low, static-high, dynamic, generator, joint."""
+    """Name of the stage, as the recipe has it: vae, static-low, dynamic, generator, joint."""
     out: Path = Path("training-run")
     """Folder of the whole run; every stage has its own folder in it."""
     clips: Path | None = None
     """Folder of shards to learn from; if left out, the worlds that the recipe names."""
+    latents: tuple[Path, ...] = ()
+    """Folders of encoded clips (prepare latents) for a generator stage, instead of clips."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Changes such as stages.vae.steps=2000 or trainer.parallel=ddp; may be given again."""
+    from_model: str | None = None
+    """Model (folder or name) whose trained parts stand in for those that no stage here trained."""
     features: str | None = None
     """Weights of LPIPS, as vgg:FILE or alex:FILE; if left out, a stand-in without weights."""
     steps: int | None = None
@@ -40,7 +47,7 @@ class Train:
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.cli.worlds import prepare_sources
-        from diff4splat.configs.recipes import find_recipe, with_clips
+        from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
         from diff4splat.training.recipe_json import changed
         from diff4splat.training.stage_run import StageRun, is_first_process, train_stage
 
@@ -48,6 +55,8 @@ class Train:
         recipe = changed(find_recipe(self.config), [one for given in self.set for one in given])
         if self.clips is not None:
             recipe = with_clips(recipe, self.clips)
+        if self.latents:
+            recipe = with_latents(recipe, self.stage, self.latents)
         recipe.stage(self.stage)
         phases = ConsolePhases()
         prepare_renderer(speck("cpu"), phases)
@@ -58,6 +67,7 @@ class Train:
             folder=self.out,
             features=self.features,
             ignore_gates=self.ignore_gates,
+            start=self.starting_model(),
             stop_after_steps=self.steps,
             stop_after_s=None if self.minutes is None else 60 * self.minutes,
             device=self.device,
@@ -71,6 +81,14 @@ class Train:
         total = recipe.stage(self.stage).steps
         more = "" if result.outcome == "finished" else "; the same command goes on"
         print(f"{self.stage}: step {result.step} of {total} ({measures or 'not judged yet'}){more}")
+
+    def starting_model(self) -> "Model | None":
+        """The model that stands in for stages that were not run."""
+        from diff4splat.models.pretrained import load_model, with_text_encoder
+
+        if self.from_model is None:
+            return None
+        return with_text_encoder(load_model(self.from_model))
 
     def _require_some_work(self) -> None:
         """Refuse limits that leave nothing to do, before anything is loaded.

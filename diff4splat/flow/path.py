@@ -9,6 +9,7 @@ the only linear path is
     velocity = d noisy / d level = noise - clean
     clean    = noisy - level · velocity
     noise    = noisy + (1 - level) · velocity
+    velocity = (noisy - clean) / level
 """
 
 from jaxtyping import Float
@@ -49,6 +50,23 @@ def noise_from_velocity(
     """Where the straight line through ``noisy`` meets level 1."""
     _require_alike("velocity", velocity, noisy)
     return noisy + (1 - _spread(level, noisy)) * velocity
+
+
+def velocity_from_clean(
+    noisy: Float[Tensor, "b *d"], clean: Float[Tensor, "b *d"], level: Float[Tensor, "b *e"]
+) -> Float[Tensor, "b *d"]:
+    """The velocity that leads to ``clean``; 0 where the level is 0, which is where it leads.
+
+    ``level`` broadcasts against ``noisy``, axis by axis: one per latent frame is (b, 1, t, 1, 1).
+    """
+    _require_alike("clean", clean, noisy)
+    if level.ndim != noisy.ndim:
+        raise ShapeError(
+            f"level: expected {noisy.ndim} axes as the latents have, got {level.ndim}; "
+            "put axes of length 1 in between"
+        )
+    away = level > 0
+    return (noisy - clean) / level.where(away, level.new_ones(())) * away
 
 
 def _spread(level: Tensor | float, like: Tensor) -> Tensor | float:

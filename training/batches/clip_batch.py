@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, join_cameras
+from diff4splat.models.detail.sight import camera_frames
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +43,11 @@ class ClipBatch:
 
     def __len__(self) -> int:
         return len(self.sample_index)
+
+    def first_picture(self) -> "ClipBatch":
+        """The same with nothing but the first frame as input; targets stay."""
+        first = camera_frames(self.cameras, torch.zeros(1, dtype=torch.long))
+        return replace(self, video=self.video[:, :1], cameras=first, depth=self.depth[:, :1])
 
     def to(self, device: torch.device) -> "ClipBatch":
         """Move every tensor."""

@@ -3,7 +3,7 @@
 Axes: ``f`` frames, ``h w`` pixels. Everything random comes from the generator of the sample's key.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Float
@@ -42,6 +42,8 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
     clip = augmented(clip, settings, generator)
     clip = normalized(clip, settings.least_depth_share)
     targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
+    if not (settings.moving_targets or clip.note.is_static):
+        targets = replace(targets, frames=torch.zeros_like(targets.frames))
     tracks = draw_tracks(clip, targets.frames, settings, generator)
     view, shown = clip.views[INPUT_VIEW], slice(None, None, settings.input_stride)
     return ClipBatch(

@@ -8,8 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-import torch
-
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder, Selection
 from diff4splat.data.clip_part import ClipPart
@@ -17,12 +15,8 @@ from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import InputError
+from diff4splat.training.batches.places import Places, ShuffledPlaces, split_places
 from diff4splat.training.recipe import DataSettings, SourceSettings
-from diff4splat.training.stage import SampleKey
-from diff4splat.training.trainer.samples import EVALUATION_START
-
-KEPT_BACK = 16
-"""One clip in so many of a folder is kept back for evaluation."""
 
 
 @runtime_checkable
@@ -55,9 +49,8 @@ class FolderClips:
 
     def __init__(self, settings: SourceSettings, views: int, seed: int) -> None:
         self.folder = Path(settings.folder)
-        self.still_share = settings.still_share
         self.views = views
-        self.seed = seed
+        self.order = ShuffledPlaces(settings.still_share, seed)
 
     @cached_property
     def clips(self) -> ClipFolder:
@@ -66,14 +59,7 @@ class FolderClips:
 
     def clip(self, index: int) -> Clip:
         """Still and moving clips in the asked share, each shuffled on its own."""
-        judged = index >= EVALUATION_START
-        draw = torch.rand((), generator=SampleKey(self.seed, "kind", index, "still").generator())
-        kind = "still" if bool(draw < self.still_share) else "moving"
-        positions = self._positions[kind, judged]
-        epoch, place = divmod(index % EVALUATION_START, len(positions))
-        shuffle = SampleKey(self.seed, "epoch", epoch, kind).generator()
-        order = torch.randperm(len(positions), generator=shuffle)
-        return self._read(positions[int(order[place])])
+        return self._read(self.order.place(index, self._places))
 
     def _read(self, position: int) -> Clip:
         """Without flow, and no more views than samples have."""
@@ -82,16 +68,8 @@ class FolderClips:
         return self.clips.clip(position, part)
 
     @cached_property
-    def _positions(self) -> dict[tuple[str, bool], list[int]]:
-        """Places in the folder by kind and by whether evaluation owns them."""
-        chosen = {}
-        for kind, wanted in (("still", True), ("moving", False)):
-            places = list(self.clips.positions(Selection(is_static=wanted)))
-            kept = -(-len(places) // KEPT_BACK) if len(places) > 1 else 0
-            chosen[kind, False] = places[: len(places) - kept]
-            # A single clip serves both: over-fitting tests want exactly that.
-            chosen[kind, True] = places[len(places) - kept :] if kept else places
-        return chosen
+    def _places(self) -> Places:
+        return split_places([entry.is_static for entry in self.clips.entries])
 
 
 def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> EndlessClips:

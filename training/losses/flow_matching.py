@@ -26,8 +26,11 @@ def flow_matching(
     *,
     first_frame_is_clean: bool = False,
     weights: Float[Tensor, " b"] | None = None,
+    channels: Float[Tensor, " c"] | None = None,
 ) -> Float[Tensor, " b"]:
     """Mean squared error of a predicted velocity, times ``weights``.
+
+    ``channels`` says how much each latent channel counts; 1 on average keeps the scale.
 
     A video of nothing but the clean first frame gives 0.
 
@@ -37,6 +40,8 @@ def flow_matching(
     require_alike("velocity", velocity, clean)
     velocity, clean, noise = widen(velocity, clean, noise)
     error = (velocity - path_velocity(clean, noise)).square()
+    if channels is not None:
+        error = error * channels.to(error)[:, None, None, None]
     error = error[:, :, int(first_frame_is_clean) :].flatten(1)
     loss = masked_mean(error, torch.ones_like(error, dtype=torch.bool))
     if weights is None:

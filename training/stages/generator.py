@@ -3,7 +3,8 @@
     video ─ vae (frozen) ─ clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
                                     first latent frame: clean, level 0, no loss
     captions ─ text encoder ─┐
-    cameras ─ Plücker maps ──┴─ conditions
+    cameras ─ Plücker maps ──┤
+    first picture ─ draft ───┴─ conditions
 
 Whole steps go without text, so that guidance has its unconditional branch and every process runs
 the same networks: single samples without text would leave some processes waiting for others.
@@ -11,19 +12,25 @@ the same networks: single samples without text would leave some processes waitin
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from diff4splat.data_prep.synthetic.captions.variety import said_otherwise
 from diff4splat.flow.path import add_noise, clean_from_velocity
 from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.config import ModelConfig
+from diff4splat.models.draft import draft_latent
+from diff4splat.models.picture import Picture
 from diff4splat.models.text_encoder import tokenize
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.level_draws import LevelDraw, draw_levels
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.model_stage import ModelStage, network_rays, shown_video
+from diff4splat.training.stages.model_stage import ModelStage, camera_rays, shown_video
 from diff4splat.training.stages.panels import Row, panel
 
 UNSAID = "a scene"
@@ -60,79 +67,150 @@ class GeneratorStage(ModelStage):
 
     parts = ("vae", "text_encoder", "dit")
 
-    def forward(self, batch: ClipBatch) -> Terms:
+    @classmethod
+    def needed(cls, model: ModelConfig) -> tuple[str, ...]:
+        """Drafts are made by LDRM."""
+        drafts = model.dit.draft and "ldrm" not in cls.parts
+        return (*cls.parts, "ldrm") if drafts else cls.parts
+
+    def forward(self, batch: ClipBatch | LatentBatch) -> Terms:
         """The term ``flow``."""
-        return self.flow_terms(batch, self.encode(batch))
+        return self.flow_terms(self.encoded(batch))
 
-    def flow_terms(self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]) -> Terms:
+    @torch.no_grad()
+    def encoded(self, batch: ClipBatch | LatentBatch) -> LatentBatch:
+        """Latents and drafts; of clips they are made here, by frozen networks."""
+        if isinstance(batch, LatentBatch):
+            return batch
+        return LatentBatch(
+            sample_index=batch.sample_index,
+            source=batch.source,
+            latent=self.encode(batch),
+            draft=self._drafts(batch) if self.plan.model.dit.draft else None,
+            cameras=batch.cameras,
+            captions=batch.captions,
+        )
+
+    def _drafts(self, batch: ClipBatch) -> Float[Tensor, "b c t h w"]:
+        rows = []
+        for index in range(len(batch)):
+            cameras, rgb = batch.cameras[index], unit_rgb(batch.video[index, 0])
+            picture = Picture(rgb=rgb, camera=cameras[0], focal_source="clip")
+            rows.append(draft_latent(self.model, picture, cameras))
+        return torch.cat(rows)
+
+    def flow_terms(self, batch: LatentBatch) -> Terms:
         """Flow matching at one level per sample, for the latents of the batch."""
-        video = self.noisy(batch, clean)
+        video, weights = self.noisy(batch), self.plan.recipe.losses
         velocity = self.velocity(batch, video, self._drops_text(batch))
-        flow = flow_matching(velocity, video.clean, video.noise, first_frame_is_clean=True)
-        return {"flow": flow, TOTAL: self.plan.recipe.losses.flow * flow}
+        flow = self._flow(velocity, video, _level_weights(video.level, weights.flow_level))
+        return {"flow": flow, TOTAL: weights.flow * flow}
 
-    def noisy(self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]) -> NoisyVideo:
+    def _flow(
+        self, velocity: Tensor, video: NoisyVideo, weights: Float[Tensor, " b"] | None = None
+    ) -> Float[Tensor, " b"]:
+        return flow_matching(
+            velocity,
+            video.clean,
+            video.noise,
+            first_frame_is_clean=True,
+            weights=weights,
+            channels=self._channels,
+        )
+
+    @cached_property
+    def _channels(self) -> Float[Tensor, " c"] | None:
+        """How much each latent channel counts; None is all alike."""
+        power = self.plan.recipe.losses.flow_energy
+        if power == 0 or self.vae.code is None:
+            return None
+        share = self.vae.code.energy() * self.vae.latent_std.square()
+        return share.pow(power) / share.pow(power).mean()
+
+    def noisy(self, batch: LatentBatch) -> NoisyVideo:
         """Noise and level of every sample."""
         uniform = torch.cat([torch.rand(1, generator=own) for own in self.draw(batch, "level")])
-        level = draw_levels(uniform, LevelDraw(shift=self.plan.recipe.level_shift)).to(clean)
-        return NoisyVideo(clean=clean, noise=self.noise(batch, clean, "noise"), level=level)
+        level = draw_levels(uniform, LevelDraw(shift=self.plan.recipe.level_shift))
+        return NoisyVideo(
+            clean=batch.latent,
+            noise=self.noise(batch, batch.latent, "noise"),
+            level=level.to(batch.latent),
+        )
 
     def velocity(
-        self, batch: ClipBatch, video: NoisyVideo, without_text: bool = False
+        self, batch: LatentBatch, video: NoisyVideo, without_text: bool = False
     ) -> Float[Tensor, "b c t h w"]:
         """The model's answer."""
         return self.velocity_at(batch, video.latent, video.levels, without_text)
 
     def velocity_at(
         self,
-        batch: ClipBatch,
+        batch: LatentBatch,
         latent: Float[Tensor, "b c t h w"],
         levels: Float[Tensor, "b t"],
         without_text: bool = False,
     ) -> Float[Tensor, "b c t h w"]:
         """The model's answer for any latent."""
         text, mask = (None, None) if without_text else self._text(batch)
-        return self.dit(latent, levels, network_rays(batch), text, mask)
+        return self.dit(latent, levels, camera_rays(batch.cameras), text, mask, batch.draft)
 
-    def _text(self, batch: ClipBatch) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
-        captions = [caption or UNSAID for caption in batch.captions]
+    def _text(self, batch: LatentBatch) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
+        captions = [caption or UNSAID for caption in self._captions(batch)]
         tokens, mask = tokenize(captions, self.plan.model.text.max_bytes)
-        tokens, mask = tokens.to(batch.video.device), mask.to(batch.video.device)
+        tokens, mask = tokens.to(batch.latent.device), mask.to(batch.latent.device)
         return self.text_encoder(tokens, mask), mask
 
-    def _drops_text(self, batch: ClipBatch) -> bool:
+    def _captions(self, batch: LatentBatch) -> list[str]:
+        """As they stand, or as somebody else would put them."""
+        if not (self.training and self.plan.recipe.vary_captions):
+            return list(batch.captions)
+        said = []
+        for caption, own in zip(batch.captions, self.draw(batch, "words"), strict=True):
+            draw, variant = torch.rand((), generator=own), torch.randint(12, (), generator=own)
+            said.append(said_otherwise(caption, float(draw), int(variant)))
+        return said
+
+    def _drops_text(self, batch: LatentBatch) -> bool:
         draw = torch.rand((), generator=self.draw_for_step(batch, "text"))
         return self.training and bool(draw < self.plan.recipe.text_dropout)
 
     @torch.no_grad()
-    def measure(self, batch: ClipBatch) -> Terms:
+    def measure(self, batch: ClipBatch | LatentBatch) -> Terms:
         """``flow_error``: mean squared error of the velocity over fixed levels."""
-        return self.flow_measures(batch, self.encode(batch))
+        return self.flow_measures(self.encoded(batch))
 
-    def flow_measures(self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]) -> Terms:
+    def flow_measures(self, batch: LatentBatch) -> Terms:
         """The same for the latents of the batch."""
-        errors = [self._error_at(batch, clean, level) for level in JUDGED_LEVELS]
+        videos = [self._at_level(batch, level) for level in JUDGED_LEVELS]
+        errors = [self._flow(self.velocity(batch, video), video) for video in videos]
         return {"flow_error": torch.stack(errors).mean(0)}
 
     @torch.no_grad()
-    def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
-        """Truth, and what one step from each judged level takes the clean video for."""
-        clean = self.encode(batch)
-        rows: list[Row] = [("truth", list(unit_rgb(batch.video[0])))]
+    def panel(self, batch: ClipBatch | LatentBatch) -> Float[Tensor, "h w 3"]:
+        """Truth, the draft, and what one step from each judged level takes the video for."""
+        batch = self.encoded(batch)
+        rows: list[Row] = [("truth", self._shown(batch.latent))]
+        if batch.draft is not None:
+            rows.append(("draft", self._shown(batch.draft)))
         for level in JUDGED_LEVELS:
-            video = self._at_level(batch, clean, level)
+            video = self._at_level(batch, level)
             guess = clean_from_velocity(video.latent, self.velocity(batch, video), video.level)
-            guess = torch.cat([clean[:, :, :1], guess[:, :, 1:]], 2)
-            decoded = shown_video(self.vae.decode(guess[:1]))[0].clamp(0, 1)
-            rows.append((f"from level {level:g}", list(decoded)))
+            guess = torch.cat([batch.latent[:, :, :1], guess[:, :, 1:]], 2)
+            rows.append((f"from level {level:g}", self._shown(guess)))
         return panel(rows)
 
-    def _error_at(self, batch: ClipBatch, clean: Tensor, level: float) -> Float[Tensor, " b"]:
-        video = self._at_level(batch, clean, level)
-        return flow_matching(
-            self.velocity(batch, video), clean, video.noise, first_frame_is_clean=True
-        )
+    def _shown(self, latent: Float[Tensor, "b c t h w"]) -> list[Tensor]:
+        return list(shown_video(self.vae.decode(latent[:1]))[0].clamp(0, 1))
 
-    def _at_level(self, batch: ClipBatch, clean: Tensor, level: float) -> NoisyVideo:
+    def _at_level(self, batch: LatentBatch, level: float) -> NoisyVideo:
+        clean = batch.latent
         levels = clean.new_full((len(clean),), level)
         return NoisyVideo(clean=clean, noise=self.noise(batch, clean, "judged"), level=levels)
+
+
+def _level_weights(level: Float[Tensor, " b"], least: float) -> Float[Tensor, " b"] | None:
+    """Errors of velocity at small levels as if the error of the clean latent were made higher up.
+
+    The velocity of a clean prediction is wrong by its error over the level.
+    """
+    return None if least == 0 else (level / least).clamp_max(1).square()

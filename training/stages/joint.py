@@ -14,6 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.generator import GeneratorStage, NoisyVideo
 from diff4splat.training.stages.measures import reconstruction_measures
@@ -33,18 +34,18 @@ class JointStage(GeneratorStage, DynamicStage):
     parts = ("vae", "text_encoder", "dit", "ldrm", "deformation")
 
     def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
-        """The terms of both stages, and their sum as ``total``."""
-        clean = self.encode(batch)
-        flow = self.flow_terms(batch, clean)
-        rendered = self.render(batch, self.regenerated(batch, clean))
+        """The terms of both stages, and their sum as ``total``; no flow where it teaches nobody."""
+        encoded = self.encoded(batch)
+        learns = {"text_encoder", "dit"}.intersection(self.trained)
+        flow = self.flow_terms(encoded) if learns else {TOTAL: 0.0}
+        rendered = self.render(batch, self.regenerated(encoded))
         scene = rendering_terms(rendered, batch, self.plan.recipe.losses, self.plan.features)
         return {**flow, **scene, TOTAL: flow[TOTAL] + scene[TOTAL]}
 
     @torch.no_grad()
-    def regenerated(
-        self, batch: ClipBatch, clean: Float[Tensor, "b c t h w"]
-    ) -> Float[Tensor, "b c t h w"]:
+    def regenerated(self, batch: LatentBatch) -> Float[Tensor, "b c t h w"]:
         """The clip's latents after a detour through noise."""
+        clean = batch.latent
         draws = [torch.rand(1, generator=own) for own in self.draw(batch, "detour")]
         start = DEEPEST * torch.cat(draws).to(clean)
         video = NoisyVideo(clean=clean, noise=self.noise(batch, clean, "detour noise"), level=start)
@@ -59,12 +60,12 @@ class JointStage(GeneratorStage, DynamicStage):
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """Velocity error, and the reconstruction of regenerated latents."""
-        clean = self.encode(batch)
-        rendered = self.render(batch, self.regenerated(batch, clean))
-        return {**self.flow_measures(batch, clean), **reconstruction_measures(rendered, batch)}
+        encoded = self.encoded(batch)
+        rendered = self.render(batch, self.regenerated(encoded))
+        return {**self.flow_measures(encoded), **reconstruction_measures(rendered, batch)}
 
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """The reconstruction of regenerated latents."""
-        latent = self.regenerated(batch, self.encode(batch))
+        latent = self.regenerated(self.encoded(batch))
         return reconstruction_panel(self.render(batch, latent), batch)

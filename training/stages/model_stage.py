@@ -11,15 +11,17 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
+from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import plucker_map
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.detail.sight import Sight
 from diff4splat.models.factory import Networks
+from diff4splat.models.pretrained import Model
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import StageRecipe
-from diff4splat.training.stage import SampleKey, Stage
+from diff4splat.training.stage import Batch, SampleKey, Stage
 from diff4splat.training.trainer.samples import asked_index
 
 
@@ -40,10 +42,18 @@ class ModelStage(Stage):
     parts: tuple[str, ...] = ()
     """Names of the parts that run in this stage; the others are not even held."""
 
+    @classmethod
+    def needed(cls, model: ModelConfig) -> tuple[str, ...]:
+        """Names of the parts that run with such a model."""
+        del model
+        return cls.parts
+
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__()
         self.plan = plan
+        self.parts = self.needed(plan.model)
         self.trained = _require_parts(plan.recipe, self.parts)
+        self.model = Model(config=plan.model, networks=networks)
         for name, part in networks.parts():
             if name in self.parts:
                 self.add_module(name, part.requires_grad_(name in self.trained))
@@ -78,16 +88,16 @@ class ModelStage(Stage):
         rgb = torch.cat([truth[:, :, :1], decoded[:, :, 1:].clamp(0, 1)], 2)
         return Sight(rgb=rgb, cameras=batch.cameras)
 
-    def draw(self, batch: ClipBatch, purpose: str) -> list[torch.Generator]:
+    def draw(self, batch: Batch, purpose: str) -> list[torch.Generator]:
         """One generator per sample, the same on any number of processes."""
         return [self._key(sample, purpose).generator() for sample in batch.sample_index.tolist()]
 
-    def draw_for_step(self, batch: ClipBatch, purpose: str) -> torch.Generator:
+    def draw_for_step(self, batch: Batch, purpose: str) -> torch.Generator:
         """One generator for all samples of a step, on every process alike."""
         step = asked_index(int(batch.sample_index[0])) // self.plan.recipe.global_batch
         return self._key(step, purpose).generator()
 
-    def noise(self, batch: ClipBatch, like: Tensor, purpose: str) -> Tensor:
+    def noise(self, batch: Batch, like: Tensor, purpose: str) -> Tensor:
         """Standard normal numbers in the shape of ``like``."""
         rows = [torch.randn(like.shape[1:], generator=own) for own in self.draw(batch, purpose)]
         return torch.stack(rows).to(like)
@@ -103,9 +113,14 @@ def network_video(batch: ClipBatch) -> Float[Tensor, "b 3 f h w"]:
 
 def network_rays(batch: ClipBatch) -> Float[Tensor, "b 6 f h w"]:
     """Plücker maps of the input cameras, relative to the first."""
+    return camera_rays(batch.cameras)
+
+
+def camera_rays(cameras: Camera) -> Float[Tensor, "b 6 f h w"]:
+    """The same for cameras of batch shape (b, f)."""
     # Products of rotations must not follow the networks into half precision.
-    with torch.autocast(batch.video.device.type, enabled=False):
-        return plucker_map(batch.cameras).movedim(1, 2)
+    with torch.autocast(cameras.focal_px.device.type, enabled=False):
+        return plucker_map(cameras).movedim(1, 2)
 
 
 def shown_video(video: Float[Tensor, "b 3 f h w"]) -> Float[Tensor, "b f h w 3"]:

@@ -37,8 +37,15 @@ class StaticStage(ModelStage):
 
     def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """Rendering losses at the targets."""
+        batch = self.given(batch)
         rendered = self.render(batch, self.encode(batch))
         return rendering_terms(rendered, batch, self.plan.recipe.losses, self.plan.features)
+
+    def given(self, batch: ClipBatch) -> ClipBatch:
+        """Whole videos, or in some steps their first pictures: drafts are made from one."""
+        draw = torch.rand((), generator=self.draw_for_step(batch, "single"))
+        alone = self.training and bool(draw < self.plan.recipe.single_share)
+        return batch.first_picture() if alone else batch
 
     def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
         """Pictures of the canonical scenes at the targets."""

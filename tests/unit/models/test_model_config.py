@@ -34,6 +34,8 @@ OTHER_VALUES = {
     "linear_code": True,
     "noise_px": 1.5,
     "range": [2.0, 9.0],
+    "predicts": "clean",
+    "draft": True,
 }
 """Valid values where doubling the old one is not."""
 
@@ -63,6 +65,7 @@ def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
 def test_models_stored_before_there_were_details_have_none() -> None:
     data = json.loads(test_size().to_json())
     del data["detail"], data["vae"]["linear_code"], data["ldrm"]["reads"]
+    del data["dit"]["predicts"], data["dit"]["draft"]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
 

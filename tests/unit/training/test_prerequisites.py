@@ -45,9 +45,17 @@ WITH_SIGHT = {
     "static-low": {"vae": "vae", "ldrm": "sight"},
     "motion": {"vae": "vae", "ldrm": "static-low"},
     "dynamic": {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
+    "single": {"vae": "vae", "ldrm": "dynamic"},
+    "generator": {"vae": "vae", "ldrm": "single"},
+    "joint": BUILDS_ON["joint"] | {"ldrm": "single"},
 }
 """What differs in ``small``, at its only size: seeing is learnt first, and motion by itself."""
-SIGHT_CONTINUES = {"static-low": "sight", "dynamic": "motion"}
+SIGHT_CONTINUES = {
+    "static-low": "sight",
+    "dynamic": "motion",
+    "single": "dynamic",
+    "joint": "single",
+}
 
 
 @pytest.mark.parametrize(
@@ -61,8 +69,13 @@ def test_parts_come_from_the_last_stage_that_trained_them(name: str, stage: str)
     continues = CONTINUES | (SIGHT_CONTINUES if sees else {})
     found = sources_of_parts(recipe, recipe.stage(stage))
     assert {part: earlier.name for part, earlier in found.items()} == builds_on[stage]
-    before = continued_stage(recipe, recipe.stage(stage))
+    before = continued_stage(recipe, recipe.stage(stage), found)
     assert (before and before.name) == continues.get(stage)
+
+
+def required(recipe: Recipe, stage: str, folder: Path, ignore_gates: bool) -> None:
+    sources = sources_of_parts(recipe, recipe.stage(stage))
+    require_prerequisites(recipe, sources, folder, ignore_gates)
 
 
 @pytest.fixture(scope="module")
@@ -80,8 +93,8 @@ def test_a_stage_before_that_was_not_begun_is_named(stage: str, tmp_path: Path) 
     recipe = recipe_by_name("test")
     for ignoring in (False, True):
         with pytest.raises(ConfigError, match=r"vae/result.json: .* train that stage first"):
-            require_prerequisites(recipe, recipe.stage(stage), tmp_path, ignoring)
-    require_prerequisites(recipe, recipe.stage("vae"), tmp_path, False)
+            required(recipe, stage, tmp_path, ignoring)
+    required(recipe, "vae", tmp_path, False)
 
 
 def write_result(folder: Path, **values: object) -> None:
@@ -97,19 +110,19 @@ def test_gates_of_all_stages_before_are_looked_at(tmp_path: Path) -> None:
     recipe = replace(recipe, stages=stages)
     for stage in ("vae", "static-low"):
         write_result(tmp_path / stage, measures={"psnr": 25.0})
-    high = recipe.stage("static-high")
-    require_prerequisites(recipe, high, tmp_path, False)
+    high = "static-high"
+    required(recipe, high, tmp_path, False)
     for short in ("vae", "static-low"):
         write_result(tmp_path / short, measures={"psnr": 17.5})
         with pytest.raises(ConfigError, match=rf"{short}: .* at least 20, got 17.5, 2.5 short"):
-            require_prerequisites(recipe, high, tmp_path, False)
-        require_prerequisites(recipe, high, tmp_path, True)
+            required(recipe, high, tmp_path, False)
+        required(recipe, high, tmp_path, True)
         write_result(tmp_path / short, measures={"psnr": 25.0})
     write_result(tmp_path / "static-low", finished=False, step=1)
     with pytest.raises(ConfigError, match=r"static-low: expected 100 steps .* got 1; .*ignore"):
-        require_prerequisites(recipe, high, tmp_path, False)
+        required(recipe, high, tmp_path, False)
     # Another branch is not asked for.
-    require_prerequisites(recipe, recipe.stage("generator"), tmp_path, False)
+    required(recipe, "generator", tmp_path, False)
 
 
 def test_stages_start_with_averaged_weights(begun: tuple[Recipe, Path]) -> None:

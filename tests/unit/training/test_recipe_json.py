@@ -24,11 +24,11 @@ def test_every_recipe_survives_its_json(name: str) -> None:
 @pytest.mark.parametrize("name", RECIPES)
 def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     names = [stage.name for stage in recipe_by_name(name).stages]
-    # Small has one size, so one static stage; its detail decoder learns to see before it, and its
-    # deformation network what moves behind it.
-    small = ["sight", "static-low", "motion"]
-    middle = small if name == "small" else ["static-low", "static-high"]
-    assert names == ["vae", *middle, "dynamic", "generator", "joint"]
+    # Small has one size, so one static stage; its detail decoder learns to see before it, its
+    # deformation network what moves behind it, and last what a single picture shows.
+    small = ["sight", "static-low", "motion", "dynamic", "single"]
+    middle = small if name == "small" else ["static-low", "static-high", "dynamic"]
+    assert names == ["vae", *middle, "generator", "joint"]
 
 
 def test_the_paper_recipe_is_the_papers() -> None:

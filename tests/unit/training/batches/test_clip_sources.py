@@ -17,12 +17,9 @@ from hypothesis import strategies as st
 from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError, InputError
+from diff4splat.training.batches.places import KEPT_BACK
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.batches.sources import (
-    KEPT_BACK,
-    EndlessClips,
-    open_source,
-)
+from diff4splat.training.batches.sources import EndlessClips, open_source
 from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
 from diff4splat.training.trainer.loader import load_batch
 from diff4splat.training.trainer.samples import EVALUATION_START

@@ -1,0 +1,85 @@
+"""How different the futures are that different seeds give one picture.
+
+Run ``python benchmarks/futures.py --model small --out futures.md``. Per held-out picture of
+``text_v1`` a few seeds, with the clip's own caption and without any text:
+
+    way        mean distance that the named object's surface goes until the last frame, in units of
+               which the median depth of the picture is 4
+    spread     standard deviation over seeds of its way to the right, mean over pictures
+    pictures   mean PSNR between the last frames of two seeds, seen by the input view
+
+Axes: ``h w`` pixels.
+"""
+
+import argparse
+import itertools
+import statistics
+from pathlib import Path
+
+import torch
+
+from diff4splat.io.atomic import write_text
+from diff4splat.metrics.image import psnr
+from diff4splat.models.pipeline import Diff4SplatPipeline
+from diff4splat.render.api import render
+from diff4splat.scene.scene import Scene
+from diff4splat.training.evaluation.answers import scene_flow
+from diff4splat.training.evaluation.case import make_case
+from diff4splat.training.evaluation.opening import open_clips
+from diff4splat.training.evaluation.protocol_json import load_protocol
+from diff4splat.training.evaluation.subjects import Generator
+from diff4splat.training.evaluation.text_measures import TextCase, text_case
+
+PROTOCOL = "text_v1"
+EQUAL_DB = 100.0
+"""Stands for infinitely many."""
+
+
+def futures(subject: Generator, found: TextCase, prompt: str | None, seeds: int) -> list[Scene]:
+    """One scene per seed."""
+    return [subject.generate(found.case, prompt, seed) for seed in range(seeds)]
+
+
+def judged(found: TextCase, scenes: list[Scene]) -> tuple[float, float, float]:
+    """Way, spread and PSNR between the futures of one picture."""
+    camera = found.case.input_view.cameras[0]
+    last_s = float(found.case.clip.times_s[-1])
+    flows = [scene_flow(scene, camera, 0.0, (last_s,))[0][found.shown] for scene in scenes]
+    rightward = [float(flow[:, 0].mean()) for flow in flows]
+    way = statistics.fmean(float(flow.norm(dim=-1).mean()) for flow in flows)
+    seen = [render(scene, camera.to(torch.float32), last_s).rgb.clamp(0, 1) for scene in scenes]
+    pairs = itertools.combinations(seen, 2)
+    alike = statistics.fmean(min(float(psnr(a, b)), EQUAL_DB) for a, b in pairs)
+    return way, statistics.stdev(rightward), alike
+
+
+@torch.no_grad()
+def main() -> None:
+    """A row with captions and one without."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--model", default="small")
+    parser.add_argument("--items", type=int, default=16)
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--out", type=Path, required=True, help="markdown file")
+    options = parser.parse_args()
+    subject = Generator(pipeline=Diff4SplatPipeline.from_pretrained(options.model))
+    loaded = load_protocol(PROTOCOL)
+    clips, protocol = open_clips(loaded), loaded.protocol
+    rows: dict[str, list[tuple[float, float, float]]] = {"own caption": [], "no text": []}
+    for item in range(options.items):
+        case = make_case(clips.clip(protocol.source.first + item), protocol, "text")
+        found = text_case(case)
+        if found is None:
+            continue
+        for row, prompt in (("own caption", case.clip.note.caption), ("no text", None)):
+            rows[row].append(judged(found, futures(subject, found, prompt, options.seeds)))
+    lines = ["| | way | spread | pictures [dB] |", "|---|---:|---:|---:|"]
+    for row, values in rows.items():
+        way, spread, alike = map(statistics.fmean, zip(*values, strict=True))
+        lines.append(f"| {row} | {way:.3f} | {spread:.3f} | {alike:.1f} |")
+    print("\n".join(lines))
+    write_text(options.out, "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""The photograph's own pixels on geometry and motion that networks saw in a smaller copy (ours).
+
+Axes: ``h w`` cells of the input view as networks see it, ``s`` pixels per cell side, ``p`` = s² h w
+pixels of the photograph, ``k`` = 9 cells around a pixel's own, ``n`` Gaussians before, ``q`` after.
+Every pixel takes after the neighbouring cell that is near and of its colour (joint bilateral
+upsampling, Kopf et al. 2007): Gaussian, track and, blended with cells of the same surface, depth.
+
+    weight = exp(−distance² / 2 NEAR² − |colour − cell colour|² / 2 ALIKE²)
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.geometry.camera import project
+from diff4splat.geometry.depth import distance_from_depth
+from diff4splat.geometry.rays import world_rays
+from diff4splat.models.picture import Picture
+from diff4splat.models.reconstruction import Canonical
+from diff4splat.scene.gaussians import Gaussians, concatenate
+from diff4splat.scene.harmonics import dc_from_color
+from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.motion.protocol import Motion
+from diff4splat.scene.motion.static import StaticMotion
+
+NEAR, ALIKE = 0.7, 0.1
+"""Standard deviations: in cells, and in colour."""
+ONE_SURFACE = 0.1
+"""Difference of log depth up to which neighbours are one surface."""
+AROUND = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FinerScene:
+    """What ``finer`` makes."""
+
+    gaussians: Gaussians
+    motion: Motion
+    cells: Int[Tensor, " q"]
+    """Pixel of the photograph that each lies on; the number after the last for all others."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Pixels:
+    """What the pixels of the photograph take over."""
+
+    kept: Int[Tensor, " p"]
+    """Which pixels: those with a cell near them that has a Gaussian."""
+    parent: Int[Tensor, " p"]
+    """Gaussian that each takes after."""
+    log_depth: Float[Tensor, " p"]
+    """Of z, against the parent's."""
+
+
+def finer(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) -> FinerScene:
+    """Gaussians of the first frame replaced by one per pixel of ``photo``.
+
+    ``small`` is the photograph as networks saw it; its sides divide those of ``photo``.
+    """
+    first = int((canonical.cells < small.rgb[..., 0].numel()).sum())
+    pixels = _take_over(canonical, first, small, photo)
+    rest = canonical.gaussians.select(slice(first, None))
+    fine = _fine_gaussians(canonical.gaussians, pixels, small, photo)
+    behind = torch.arange(first, len(canonical.gaussians), device=pixels.parent.device)
+    outside = behind.new_full((len(behind),), photo.rgb[..., 0].numel())
+    grown = torch.cat([pixels.log_depth.exp(), torch.ones_like(behind, dtype=torch.float32)])
+    return FinerScene(
+        gaussians=concatenate([fine, rest]),
+        motion=_inherited(motion, torch.cat([pixels.parent, behind]), grown),
+        cells=torch.cat([pixels.kept, outside]),
+    )
+
+
+def _take_over(canonical: Canonical, first: int, small: Picture, photo: Picture) -> _Pixels:
+    """Parent and depth of every pixel."""
+    height, width = small.camera.size_px
+    side = photo.camera.size_px[0] // height
+    cells = canonical.cells[:first]
+    depth = project(small.camera, canonical.gaussians.means[:first])[1]
+    log_depth = depth.new_zeros(height * width).index_copy(0, cells, depth.clamp_min(1e-6).log())
+    row = cells.new_full((height * width,), -1).index_copy(0, cells, torch.arange(first).to(cells))
+    colors = _around(small.rgb.movedim(-1, 0), side)
+    depths = _around(log_depth.view(1, height, width), side)[0]
+    rows = _around(row.view(1, height, width).float(), side)[0].long()
+    unlike = (colors - photo.rgb.movedim(-1, 0)[:, None]).square().sum(0)
+    weight = (_nearness(side, rows) - unlike / (2 * ALIKE**2)).masked_fill(rows < 0, -torch.inf)
+    best = weight.argmax(0, keepdim=True)
+    own = depths.gather(0, best)
+    share = weight.masked_fill((depths - own).abs() > ONE_SURFACE, -torch.inf).softmax(0)
+    relative = (share * (depths - own)).sum(0).flatten()
+    parent = rows.gather(0, best).flatten()
+    kept = (parent >= 0).nonzero()[:, 0]
+    return _Pixels(kept=kept, parent=parent[kept], log_depth=relative[kept])
+
+
+def _around(maps: Float[Tensor, "c h w"], side: int) -> Float[Tensor, "c k sh sw"]:
+    """The cells around the own cell of every pixel."""
+    padded = torch.nn.functional.pad(maps[None], (1, 1, 1, 1), mode="replicate")
+    patches = torch.nn.functional.unfold(padded, AROUND)
+    patches = patches.view(len(maps), AROUND**2, *maps.shape[1:])
+    return patches.repeat_interleave(side, -1).repeat_interleave(side, -2)
+
+
+def _nearness(side: int, like: Tensor) -> Float[Tensor, "k sh sw"]:
+    """Logarithm of the weight that decreases with the distance from pixel to cell."""
+    inside = (torch.arange(side, device=like.device, dtype=torch.float32) + 0.5) / side - 0.5
+    step = torch.arange(-1, 2, device=like.device, dtype=torch.float32)
+    away = (step[:, None] - inside).square()
+    square = away[:, None, :, None] + away[None, :, None, :]
+    rows, columns = like.shape[1] // side, like.shape[2] // side
+    return -square.flatten(0, 1).repeat(1, rows, columns) / (2 * NEAR**2)
+
+
+def _fine_gaussians(
+    coarse: Gaussians, pixels: _Pixels, small: Picture, photo: Picture
+) -> Gaussians:
+    """One per kept pixel: the parent, smaller, at the pixel's depth and of its colour."""
+    parent = coarse.select(pixels.parent)
+    side = photo.camera.size_px[0] // small.camera.size_px[0]
+    depth = project(small.camera, parent.means)[1] * pixels.log_depth.exp()
+    whole = depth.new_ones(photo.rgb[..., 0].numel()).index_copy(0, pixels.kept, depth)
+    distance = distance_from_depth(photo.camera, whole.view(photo.camera.size_px)).flatten()
+    origins, directions = (rays.flatten(0, 1)[pixels.kept] for rays in world_rays(photo.camera))
+    return replace(
+        parent,
+        means=origins + distance[pixels.kept, None] * directions,
+        scales=parent.scales * (pixels.log_depth.exp() / side)[:, None],
+        sh=dc_from_color(photo.rgb.flatten(0, 1)[pixels.kept])[:, None].to(parent.sh),
+    )
+
+
+def _inherited(motion: Motion, parent: Int[Tensor, " q"], grown: Float[Tensor, " q"]) -> Motion:
+    """Every Gaussian moves as its parent did; farther ones by as much more."""
+    if not isinstance(motion, KeyframeMotion):
+        return StaticMotion(time_range_s=motion.time_range_s)
+    size = torch.cat([parent, motion.moving_index]).amax().item() + 1 if len(parent) else 0
+    track = parent.new_full((size,), -1)
+    track[motion.moving_index] = torch.arange(len(motion.moving_index), device=parent.device)
+    own = track[parent]
+    index = (own >= 0).nonzero()[:, 0]
+    own = own[index]
+    return replace(
+        motion,
+        moving_index=index,
+        offsets=motion.offsets[:, own] * grown[index, None],
+        rotations=motion.rotations[:, own],
+        log_scale_offsets=motion.log_scale_offsets[:, own],
+    )

@@ -1,0 +1,63 @@
+"""Encoded clips made of numbers that can be told apart, for several test files."""
+
+from pathlib import Path
+
+import torch
+
+from diff4splat.geometry.camera import Camera
+from diff4splat.training.latents.stored import LatentPack, write_pack
+from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
+
+FRAMES = 5
+
+
+def make_pack(
+    is_static: list[bool], first: int = 0, draft: bool = True, versions: int = 1, model: str = "m"
+) -> LatentPack:
+    """Clip number ``first + k`` has that number as its latent, and in its caption."""
+    count = len(is_static)
+    number = torch.arange(first, first + count, dtype=torch.float32)
+    latent = number[:, None, None, None, None].expand(count, 4, 2, 3, 3).contiguous()
+    pose = torch.eye(4).repeat(count, FRAMES, 1, 1)
+    pose[:, :, 0, 3] = number[:, None] * 0.01 * torch.arange(FRAMES)
+    return LatentPack(
+        latent=latent,
+        draft=latent + 0.5 if draft else None,
+        cameras=Camera(
+            focal_px=torch.full((count, FRAMES, 2), 20.0) + number[:, None, None],
+            center_px=torch.full((count, FRAMES, 2), 12.0),
+            world_from_camera=pose,
+            size_px=(24, 26),
+        ),
+        is_static=torch.tensor(is_static, dtype=torch.bool),
+        captions=tuple(f"clip {first + k}, “said”" for k in range(count)),
+        model=model,
+        versions=versions,
+    )
+
+
+def latent_folder(folder: Path, *packs: LatentPack) -> Path:
+    """The packs as files."""
+    for number, pack in enumerate(packs):
+        write_pack(pack, folder, number)
+    return folder
+
+
+def latents_of(folder: Path, still_share: float = 0.5, weight: float = 1.0) -> SourceSettings:
+    """The folder as a source."""
+    return SourceSettings(
+        kind="latents", folder=str(folder), still_share=still_share, weight=weight
+    )
+
+
+def learning_from(*sources: SourceSettings) -> StageRecipe:
+    """A generator stage with these sources."""
+    return StageRecipe(
+        name="generator",
+        kind="generator",
+        steps=1,
+        global_batch=2,
+        micro_batch=2,
+        trained=("dit",),
+        data=DataSettings(sources=sources, workers=0),
+    )

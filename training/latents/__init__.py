@@ -1,0 +1,1 @@
+"""Clips encoded once and for all: what the video model learns from without reading pictures."""

@@ -1,0 +1,52 @@
+"""What the video model learns from: latents of true videos and of their drafts.
+
+Axes: ``b`` batch, ``c t h w`` latents, ``f`` video frames.
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.geometry.camera import Camera, join_cameras
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentBatch:
+    """Encoded clips with their cameras and captions."""
+
+    sample_index: Int[Tensor, " b"]
+    source: tuple[str, ...]
+    latent: Float[Tensor, "b c t h w"]
+    draft: Float[Tensor, "b c t h w"] | None
+    """None for a model that sees no draft."""
+    cameras: Camera
+    """Batch shape (b, f); the first of each sample is the identity."""
+    captions: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.sample_index)
+
+    def to(self, device: torch.device) -> "LatentBatch":
+        """Move every tensor."""
+        return replace(
+            self,
+            sample_index=self.sample_index.to(device),
+            latent=self.latent.to(device),
+            draft=None if self.draft is None else self.draft.to(device),
+            cameras=self.cameras.to(device),
+        )
+
+
+def collate_latents(samples: list[LatentBatch]) -> LatentBatch:
+    """Batches of one sample each, as one."""
+    drafts = [sample.draft for sample in samples if sample.draft is not None]
+    return LatentBatch(
+        sample_index=torch.cat([sample.sample_index for sample in samples]),
+        source=tuple(name for sample in samples for name in sample.source),
+        latent=torch.cat([sample.latent for sample in samples]),
+        draft=torch.cat(drafts) if drafts else None,
+        cameras=join_cameras([sample.cameras for sample in samples]),
+        captions=tuple(text for sample in samples for text in sample.captions),
+    )
