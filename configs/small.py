@@ -155,7 +155,7 @@ def _generator(dynamic: StageRecipe) -> StageRecipe:
         global_batch=16,
         micro_batch=16,
         optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
-        losses=replace(stage.losses, flow_level=0.4, flow_energy=0.5),
+        losses=replace(stage.losses, flow_level=0.4, flow_energy=0.5, flow_motion=200.0),
         data=replace(stage.data, augment=False),
         level_shift=3.0,
         vary_captions=True,

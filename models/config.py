@@ -11,6 +11,7 @@ from typing import TypeVar
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.models.config_parts import (
     DETAIL_TOKEN_PX,
+    MOTION_CELL_PX,
     TIME_STRIDE,
     TOKEN_PATCH,
     ActivationConfig,
@@ -74,6 +75,9 @@ class ModelConfig:
         fits = not self.detail.used or self.token_px == DETAIL_TOKEN_PX
         expected = f"tokens of {DETAIL_TOKEN_PX} px with a detail decoder"
         require(fits, "ModelConfig.vae", expected, self.token_px)
+        fits = not self.dit.motion or self.vae.space_stride % MOTION_CELL_PX == 0
+        expected = f"latent pixels of a multiple of {MOTION_CELL_PX} px for a motion"
+        require(fits, "ModelConfig.vae", expected, self.vae.space_stride)
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)
@@ -82,6 +86,13 @@ class ModelConfig:
     def token_px(self) -> int:
         """Pixels per token side; picture sides must be multiples of it."""
         return self.vae.space_stride * TOKEN_PATCH
+
+    @property
+    def motion_channels(self) -> int:
+        """Channels that the video model makes beside those of the latent."""
+        if not self.dit.motion:
+            return 0
+        return 3 * (self.vae.space_stride // MOTION_CELL_PX) ** 2
 
     def latent_grid(self, frames: int, size_px: tuple[int, int]) -> tuple[int, int, int]:
         """(frames, height, width) of the latent of a video.

@@ -16,6 +16,8 @@ TOKEN_PATCH = 2
 """Latent pixels per token side, in the video model and in LDRM (paper)."""
 DETAIL_TOKEN_PX = 16
 """Pixels per token side that the detail decoder's three resolutions lead down to."""
+MOTION_CELL_PX = 4
+"""Pixels per cell side of the motion that a video model makes beside latents."""
 GAUSSIAN_SPLIT = (3, 3, 4, 1, 1)
 """RGB, scale, quaternion, opacity, ray distance: K_g = 12 as in Wonderland, not in the paper."""
 DEFORMATION_SPLIT = (3, 4, 3)
@@ -140,6 +142,10 @@ class DitConfig:
     """Also sees a draft of the video, and corrects it if it predicts clean latents (ours;
     docs/adr/0016)."""
 
+    motion: bool = False
+    """Also makes, beside the latent, where what the first frame shows goes to (ours;
+    docs/adr/0018)."""
+
     def __post_init__(self) -> None:
         require_counts(
             self, "width", "blocks", "heads", "feedforward_width", "frequency_width", "camera_width"
@@ -147,8 +153,9 @@ class DitConfig:
         require_heads(self, smallest=6)
         known = self.predicts in ("velocity", "clean")
         require(known, "DitConfig.predicts", "velocity or clean", self.predicts)
-        known = isinstance(self.draft, bool)
-        require(known, "DitConfig.draft", "true or false", self.draft)
+        for name in ("draft", "motion"):
+            value = getattr(self, name)
+            require(isinstance(value, bool), f"DitConfig.{name}", "true or false", value)
         require(
             self.frequency_width % 2 == 0,
             "DitConfig.frequency_width",

@@ -1,11 +1,9 @@
 """The photograph's own pixels on geometry and motion that networks saw in a smaller copy (ours).
 
 Axes: ``h w`` cells of the input view as networks see it, ``s`` pixels per cell side, ``p`` = s² h w
-pixels of the photograph, ``k`` = 9 cells around a pixel's own, ``n`` Gaussians before, ``q`` after.
-Every pixel takes after the neighbouring cell that is near and of its colour (joint bilateral
-upsampling, Kopf et al. 2007): Gaussian, track and, blended with cells of the same surface, depth.
-
-    weight = exp(−distance² / 2 NEAR² − |colour − cell colour|² / 2 ALIKE²)
+pixels of the photograph, ``n`` Gaussians before, ``q`` after. Every pixel takes after the cell
+around it that is near and of its colour (``bilateral``): Gaussian, track and, blended with cells of
+the same surface, depth.
 """
 
 from dataclasses import dataclass, replace
@@ -17,6 +15,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.rays import world_rays
+from diff4splat.models.bilateral import around, log_weights
 from diff4splat.models.picture import Picture
 from diff4splat.models.reconstruction import Canonical
 from diff4splat.scene.gaussians import Gaussians, concatenate
@@ -25,11 +24,8 @@ from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.static import StaticMotion
 
-NEAR, ALIKE = 0.7, 0.1
-"""Standard deviations: in cells, and in colour."""
 ONE_SURFACE = 0.1
 """Difference of log depth up to which neighbours are one surface."""
-AROUND = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,11 +77,9 @@ def _take_over(canonical: Canonical, first: int, small: Picture, photo: Picture)
     depth = project(small.camera, canonical.gaussians.means[:first])[1]
     log_depth = depth.new_zeros(height * width).index_copy(0, cells, depth.clamp_min(1e-6).log())
     row = cells.new_full((height * width,), -1).index_copy(0, cells, torch.arange(first).to(cells))
-    colors = _around(small.rgb.movedim(-1, 0), side)
-    depths = _around(log_depth.view(1, height, width), side)[0]
-    rows = _around(row.view(1, height, width).float(), side)[0].long()
-    unlike = (colors - photo.rgb.movedim(-1, 0)[:, None]).square().sum(0)
-    weight = (_nearness(side, rows) - unlike / (2 * ALIKE**2)).masked_fill(rows < 0, -torch.inf)
+    depths = around(log_depth.view(1, height, width), side)[0]
+    rows = around(row.view(1, height, width).float(), side)[0].long()
+    weight = log_weights(small.rgb, photo.rgb).masked_fill(rows < 0, -torch.inf)
     best = weight.argmax(0, keepdim=True)
     own = depths.gather(0, best)
     share = weight.masked_fill((depths - own).abs() > ONE_SURFACE, -torch.inf).softmax(0)
@@ -93,24 +87,6 @@ def _take_over(canonical: Canonical, first: int, small: Picture, photo: Picture)
     parent = rows.gather(0, best).flatten()
     kept = (parent >= 0).nonzero()[:, 0]
     return _Pixels(kept=kept, parent=parent[kept], log_depth=relative[kept])
-
-
-def _around(maps: Float[Tensor, "c h w"], side: int) -> Float[Tensor, "c k sh sw"]:
-    """The cells around the own cell of every pixel."""
-    padded = torch.nn.functional.pad(maps[None], (1, 1, 1, 1), mode="replicate")
-    patches = torch.nn.functional.unfold(padded, AROUND)
-    patches = patches.view(len(maps), AROUND**2, *maps.shape[1:])
-    return patches.repeat_interleave(side, -1).repeat_interleave(side, -2)
-
-
-def _nearness(side: int, like: Tensor) -> Float[Tensor, "k sh sw"]:
-    """Logarithm of the weight that decreases with the distance from pixel to cell."""
-    inside = (torch.arange(side, device=like.device, dtype=torch.float32) + 0.5) / side - 0.5
-    step = torch.arange(-1, 2, device=like.device, dtype=torch.float32)
-    away = (step[:, None] - inside).square()
-    square = away[:, None, :, None] + away[None, :, None, :]
-    rows, columns = like.shape[1] // side, like.shape[2] // side
-    return -square.flatten(0, 1).repeat(1, rows, columns) / (2 * NEAR**2)
 
 
 def _fine_gaussians(

@@ -16,6 +16,7 @@ from diff4splat.flow.guidance import CallCount, Guidance, guided
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.video_dit import DitConditions, VideoDiT
+from diff4splat.models.video_motion import with_still_motion
 
 UNGUIDED = Guidance(weight=1.0)
 
@@ -37,6 +38,8 @@ class SampledVideo:
     """Clean video latents and what they cost."""
 
     latent: Float[Tensor, "b c t h w"]
+    motion: Float[Tensor, "b m t h w"]
+    """Where what the first frame shows goes to (``video_motion``); no channels without one."""
     calls: CallCount
 
 
@@ -52,15 +55,26 @@ def sample_video(
     Raises:
         ConfigError: an unknown sampler or schedule.
     """
-    calls = CallCount()
-    latent = integrate(
+    calls, channels = CallCount(), conditions.image_latent.shape[1]
+    conditions = _with_motion(conditions, dit.motion_channels)
+    made = integrate(
         find_sampler(settings.sampler),
         _velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
         settings.levels,
         advance,
     )
-    return SampledVideo(latent=latent, calls=calls)
+    return SampledVideo(latent=made[:, :channels], motion=made[:, channels:], calls=calls)
+
+
+def _with_motion(conditions: Conditions, channels: int) -> Conditions:
+    """The first frame has gone nowhere yet, and a draft stands still."""
+    draft = conditions.draft
+    return replace(
+        conditions,
+        image_latent=with_still_motion(conditions.image_latent, channels),
+        draft=None if draft is None else with_still_motion(draft, channels),
+    )
 
 
 def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w"]:

@@ -24,10 +24,11 @@ from diff4splat.models.base_only import base_canonical, base_motion, leave_out_v
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
+from diff4splat.models.detail.stabilise import key_depth
 from diff4splat.models.draft import draft_latent
 from diff4splat.models.finer import FinerScene, finer
 from diff4splat.models.input_colors import InputGrid, match_input_view
-from diff4splat.models.latent_sampling import Conditions, sample_video
+from diff4splat.models.latent_sampling import Conditions, SampledVideo, sample_video
 from diff4splat.models.latents_to_scene import VideoLatent, canonical_scene
 from diff4splat.models.picture import Picture, load_picture, smaller
 from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
@@ -35,6 +36,7 @@ from diff4splat.models.prompt import require_prompt
 from diff4splat.models.reconstruction import Canonical, deform
 from diff4splat.models.settings import GenerationSettings, require_seed
 from diff4splat.models.still import drop_still_tracks, seen_as_still_px
+from diff4splat.models.video_motion import told_offsets
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
@@ -152,11 +154,22 @@ class Diff4SplatPipeline:
         self, request: Request, context: CameraPath, log: RunLog
     ) -> tuple[Canonical, Motion]:
         """What the networks make of the picture."""
-        latent = self._sample(request, self._conditions(request, context, log), log)
-        video = VideoLatent(latent=latent, picture=request.picture, cameras=context.cameras)
+        made = self._sample(request, self._conditions(request, context, log), log)
+        video = VideoLatent(latent=made.latent, picture=request.picture, cameras=context.cameras)
         with log.phases.phase("reconstruct"):
             canonical = canonical_scene(self.model, video, request.settings.min_opacity, log)
-        return canonical, self._motion(canonical, context, log)
+        told = self._told(canonical, made, request.picture)
+        return canonical, self._motion(canonical, context, told, log)
+
+    def _told(
+        self, canonical: Canonical, made: SampledVideo, picture: Picture
+    ) -> Float[Tensor, "t h w 3"] | None:
+        """What the video model says of motion, if it says something and there is room for it."""
+        if not self.model.config.dit.motion or made.motion.shape[2] < 2:
+            return None
+        raw_distance = canonical.maps.gaussians[:, -1, :1]
+        depth = key_depth(raw_distance, self.model.config.activation)[0, 0]
+        return told_offsets(made.motion, picture.rgb, depth)
 
     def _from_picture(
         self, request: Request, context: CameraPath, log: RunLog
@@ -201,20 +214,20 @@ class Diff4SplatPipeline:
             self.model = with_text_encoder(self.model)
             return self.model.networks.text_encoder.encode_prompt(prompt)
 
-    def _sample(
-        self, request: Request, conditions: Conditions, log: RunLog
-    ) -> Float[Tensor, "1 c t h w"]:
+    def _sample(self, request: Request, conditions: Conditions, log: RunLog) -> SampledVideo:
         settings, dit = request.settings, self.model.networks.dit
         with log.phases.phase("sample video", settings.steps) as advance:
             video = sample_video(dit, conditions, settings, request.seed, advance)
         if video.calls.saved:
             why = "no prompt" if conditions.text is None else settings.why_unguided
             log.left_out("guidance pass", why, f"{video.calls.saved} network calls")
-        return video.latent
+        return video
 
-    def _motion(self, canonical: Canonical, context: CameraPath, log: RunLog) -> Motion:
+    def _motion(
+        self, canonical: Canonical, context: CameraPath, told: Tensor | None, log: RunLog
+    ) -> Motion:
         units = DeformationUnits(length_unit=PLANE_DEPTH, activation=self.model.config.activation)
-        return deform(self.model.networks.deformation, canonical, context.times_s, units, log)
+        return deform(self.model.networks.deformation, canonical, context.times_s, units, log, told)
 
     def _match_colors(
         self, scene: Scene, cells: Int[Tensor, " n"], request: Request, log: RunLog

@@ -5,7 +5,7 @@ key times. The deformation network answers one time per call, so that memory doe
 number of key times times the grid.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Float, Int
@@ -15,6 +15,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config import ActivationConfig
 from diff4splat.models.deformation import DeformationNetwork
 from diff4splat.models.deformation_heads import (
+    DeformationState,
     DeformationUnits,
     deformation_state,
     keyframe_motion,
@@ -94,16 +95,35 @@ def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canoni
     )
 
 
+def _moved_on(
+    state: DeformationState,
+    told: Float[Tensor, "t h w 3"],
+    canonical: Canonical,
+    fraction: float,
+) -> DeformationState:
+    """The state with the told offsets at a fraction of the clip."""
+    place = fraction * (len(told) - 1)
+    before = min(int(place), len(told) - 2)
+    now = torch.lerp(told[before], told[before + 1], place - before).flatten(0, 1)
+    own = canonical.cells < len(now)
+    more = now[canonical.cells[own]]
+    return replace(state, offsets=state.offsets.index_add(0, own.nonzero()[:, 0], more))
+
+
 def deform(
     network: DeformationNetwork | DetailDeformation,
     canonical: Canonical,
     key_times_s: Float[Tensor, " k"],
     units: DeformationUnits,
     log: RunLog,
+    told: Float[Tensor, "t h w 3"] | None = None,
 ) -> Motion:
-    """Key-framed motion of the kept Gaussians, or none when the network is still the identity."""
+    """Key-framed motion of the kept Gaussians, or none when the network is still the identity.
+
+    ``told`` offsets of the first frame's cells, evenly spread in time, are added to its answers.
+    """
     start_s, stop_s = float(key_times_s[0]), float(key_times_s[-1])
-    if network.is_identity:
+    if network.is_identity and told is None:
         log.left_out(
             "deformation network",
             "its output layers are zero, so nothing can move",
@@ -115,7 +135,9 @@ def deform(
     states = []
     with log.phases.phase("deform", len(key_times_s)) as advance:
         for raw in network.at_times(canonical.maps.tokens, fractions[:, None]):
-            states.append(deformation_state(raw[0].float(), raw_scale, canonical.cells, units))
+            state = deformation_state(raw[0].float(), raw_scale, canonical.cells, units)
+            fraction = float(fractions[len(states)])
+            states.append(state if told is None else _moved_on(state, told, canonical, fraction))
             advance()
     everything = torch.arange(len(canonical.cells), device=raw_scale.device)
     return keyframe_motion(states, key_times_s, everything)

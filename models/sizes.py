@@ -53,6 +53,7 @@ def small_size() -> ModelConfig:
             camera_width=64,
             predicts="clean",
             draft=True,
+            motion=True,
         ),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
         deformation=DeformationConfig(width=64, blocks=3, octaves=3, noise_px=4.0),

@@ -11,6 +11,8 @@ gives it level 0.
     level ── sinusoid, MLP ─ modulation ───┘ │
     text ─── MLP ─ cross-attention ──────────┘
 
+``c`` includes the channels of a motion, where the model makes one (``video_motion``).
+
 Where it predicts clean latents, the last linear layer answers what to add to the draft (to 0, where
 there is none), and the velocity follows from that: a fresh model leads any noise to the draft.
 """
@@ -68,8 +70,9 @@ class VideoDiT(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        dit, channels = config.dit, config.vae.latent_channels
+        dit, channels = config.dit, config.vae.latent_channels + config.motion_channels
         self.config = dit
+        self.motion_channels = config.motion_channels
         self.patch_embedding = nn.Linear(channels * TOKEN_PATCH**2, dit.width)
         if dit.draft:
             self.draft_embedding = zero_(nn.Linear(channels * TOKEN_PATCH**2, dit.width))

@@ -33,6 +33,8 @@ class LossWeights:
     flow_level: float = 0.0
     """Velocity errors at levels below count as if they were made here (ours); 0 is the paper. Where
     clean latents are predicted, small levels would otherwise outweigh all others."""
+    flow_motion: float = 1.0
+    """How much a channel of motion counts, beside 1 for one of the latent (ours)."""
     flow_energy: float = 0.0
     """Latent channels count as their share in pictures to this power (ours); 0 is the paper."""
     photometric: float = 1.0

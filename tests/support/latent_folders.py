@@ -23,6 +23,7 @@ def make_pack(
     return LatentPack(
         latent=latent,
         draft=latent + 0.5 if draft else None,
+        motion=latent[:, :0],
         cameras=Camera(
             focal_px=torch.full((count, FRAMES, 2), 20.0) + number[:, None, None],
             center_px=torch.full((count, FRAMES, 2), 12.0),

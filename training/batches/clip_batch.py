@@ -38,6 +38,8 @@ class ClipBatch:
     track_offset: Float[Tensor, "b m n 3"]
     """Where the point is at the target time, relative to where it is at its own frame's."""
     track_valid: Bool[Tensor, "b n"]
+    motion: Float[Tensor, "b 3 t hc wc"]
+    """Where what the first frame shows goes to, per cell (``motion_truth``)."""
     is_static: Bool[Tensor, " b"]
     captions: tuple[str, ...]
 

@@ -14,6 +14,7 @@ from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.training.batches.augment import augmented
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.batches.motion_truth import motion_truth
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
@@ -59,6 +60,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         track_cell=tracks.cell[None],
         track_offset=tracks.offset[None],
         track_valid=tracks.valid[None],
+        motion=motion_truth(clip, settings.input_stride)[None],
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
     )

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
@@ -22,8 +24,10 @@ from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.draft import draft_latent
 from diff4splat.models.picture import Picture
 from diff4splat.models.pretrained import Model
+from diff4splat.models.video_motion import packed_motion
 from diff4splat.report.phases import Phases
 from diff4splat.training.batches.augment import mirrored
+from diff4splat.training.batches.motion_truth import motion_truth
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.window import from_first_camera
@@ -107,8 +111,16 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
     return LatentPack(
         latent=latent,
         draft=draft_latent(model, picture, cameras) if model.config.dit.draft else None,
+        motion=true_motion(model, clip, data),
         cameras=stack_cameras([cameras]),
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
         model=model.weights_sha256,
     )
+
+
+def true_motion(model: Model, clip: Clip, data: DataSettings) -> Float[Tensor, "1 m t h w"]:
+    """For a model that makes one; otherwise without channels."""
+    cells = motion_truth(clip, data.input_stride)[None]
+    packed = packed_motion(cells, model.config.vae.space_stride)
+    return packed[:, : model.config.motion_channels]

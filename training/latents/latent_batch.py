@@ -21,6 +21,8 @@ class LatentBatch:
     latent: Float[Tensor, "b c t h w"]
     draft: Float[Tensor, "b c t h w"] | None
     """None for a model that sees no draft."""
+    motion: Float[Tensor, "b m t h w"]
+    """True motion (``video_motion``); no channels for a model that makes none."""
     cameras: Camera
     """Batch shape (b, f); the first of each sample is the identity."""
     captions: tuple[str, ...]
@@ -35,6 +37,7 @@ class LatentBatch:
             sample_index=self.sample_index.to(device),
             latent=self.latent.to(device),
             draft=None if self.draft is None else self.draft.to(device),
+            motion=self.motion.to(device),
             cameras=self.cameras.to(device),
         )
 
@@ -47,6 +50,7 @@ def collate_latents(samples: list[LatentBatch]) -> LatentBatch:
         source=tuple(name for sample in samples for name in sample.source),
         latent=torch.cat([sample.latent for sample in samples]),
         draft=torch.cat(drafts) if drafts else None,
+        motion=torch.cat([sample.motion for sample in samples]),
         cameras=join_cameras([sample.cameras for sample in samples]),
         captions=tuple(text for sample in samples for text in sample.captions),
     )

@@ -32,6 +32,7 @@ class _Source:
             source=(self.name,),
             latent=pack.latent[own],
             draft=None if pack.draft is None else pack.draft[own],
+            motion=pack.motion[own],
             cameras=pack.cameras[own],
             captions=(pack.captions[place],),
         )

@@ -1,7 +1,7 @@
 """A folder of encoded clips: one tensor file per pack of clips.
 
-    FOLDER/latents-00000.safetensors, …   latent, draft (float32), focal_px, center_px, pose,
-                                          is_static; captions and model in the metadata
+    FOLDER/latents-00000.safetensors, …   latent, draft, motion (float32), focal_px, center_px,
+                                          pose, is_static; captions and model in the metadata
 
 Axes: ``n`` clips of a pack, ``c t h w`` latents, ``f`` video frames.
 """
@@ -20,7 +20,7 @@ from diff4splat.geometry.camera import Camera, join_cameras
 from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
 
 PATTERN = "latents-*.safetensors"
-TENSORS = ("latent", "draft", "focal_px", "center_px", "pose", "is_static")
+TENSORS = ("latent", "draft", "motion", "focal_px", "center_px", "pose", "is_static")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +29,7 @@ class LatentPack:
 
     latent: Float[Tensor, "n c t h w"]
     draft: Float[Tensor, "n c t h w"] | None
+    motion: Float[Tensor, "n m t h w"]
     cameras: Camera
     """Batch shape (n, f)."""
     is_static: Bool[Tensor, " n"]
@@ -51,6 +52,7 @@ def write_pack(pack: LatentPack, folder: Path, number: int) -> None:
     cameras = pack.cameras
     tensors = {
         "latent": pack.latent.float(),
+        "motion": pack.motion.float(),
         "focal_px": cameras.focal_px,
         "center_px": cameras.center_px,
         "pose": cameras.world_from_camera,
@@ -82,6 +84,7 @@ def join_packs(packs: Sequence[LatentPack]) -> LatentPack:
     return LatentPack(
         latent=torch.cat([pack.latent for pack in packs]),
         draft=torch.cat(drafts) if drafts else None,
+        motion=torch.cat([pack.motion for pack in packs]),
         cameras=join_cameras([pack.cameras for pack in packs]),
         is_static=torch.cat([pack.is_static for pack in packs]),
         captions=tuple(text for pack in packs for text in pack.captions),
@@ -114,7 +117,9 @@ def require_alike(packs: Sequence[LatentPack], where: str) -> None:
     Raises:
         InputError: they are not.
     """
-    kinds = {(pack.model, pack.versions, pack.draft is None) for pack in packs}
+    kinds = {
+        (pack.model, pack.versions, pack.draft is None, pack.motion.shape[1]) for pack in packs
+    }
     if len(kinds) > 1:
         raise InputError(
             f"{where}: expected latents that one model made in one way, got those of {len(kinds)} "
@@ -134,6 +139,7 @@ def _read_pack(file: Path) -> LatentPack:
         return LatentPack(
             latent=stored["latent"],
             draft=stored.get("draft"),
+            motion=stored["motion"],
             cameras=cameras,
             is_static=stored["is_static"].bool(),
             captions=_captions(metadata, len(stored["latent"])),

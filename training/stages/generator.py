@@ -25,6 +25,7 @@ from diff4splat.models.config import ModelConfig
 from diff4splat.models.draft import draft_latent
 from diff4splat.models.picture import Picture
 from diff4splat.models.text_encoder import tokenize
+from diff4splat.models.video_motion import packed_motion, with_still_motion
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.losses.flow_matching import flow_matching
@@ -87,9 +88,14 @@ class GeneratorStage(ModelStage):
             source=batch.source,
             latent=self.encode(batch),
             draft=self._drafts(batch) if self.plan.model.dit.draft else None,
+            motion=self._motion(batch),
             cameras=batch.cameras,
             captions=batch.captions,
         )
+
+    def _motion(self, batch: ClipBatch) -> Float[Tensor, "b m t h w"]:
+        model = self.plan.model
+        return packed_motion(batch.motion, model.vae.space_stride)[:, : model.motion_channels]
 
     def _drafts(self, batch: ClipBatch) -> Float[Tensor, "b c t h w"]:
         rows = []
@@ -119,23 +125,27 @@ class GeneratorStage(ModelStage):
         )
 
     @cached_property
-    def _channels(self) -> Float[Tensor, " c"] | None:
-        """How much each latent channel counts; None is all alike."""
-        power = self.plan.recipe.losses.flow_energy
-        if power == 0 or self.vae.code is None:
-            return None
-        share = self.vae.code.energy() * self.vae.latent_std.square()
-        return share.pow(power) / share.pow(power).mean()
+    def _channels(self) -> Float[Tensor, " c"]:
+        """How much each channel counts: those of the latent 1 on average."""
+        losses, model = self.plan.recipe.losses, self.plan.model
+        share = torch.ones_like(self.vae.latent_std)
+        if self.vae.code is not None:
+            share = (self.vae.code.energy() * self.vae.latent_std.square()).pow(losses.flow_energy)
+        motion = share.new_full((model.motion_channels,), losses.flow_motion)
+        return torch.cat([share / share.mean(), motion])
 
     def noisy(self, batch: LatentBatch) -> NoisyVideo:
         """Noise and level of every sample."""
         uniform = torch.cat([torch.rand(1, generator=own) for own in self.draw(batch, "level")])
         level = draw_levels(uniform, LevelDraw(shift=self.plan.recipe.level_shift))
+        clean = self.clean(batch)
         return NoisyVideo(
-            clean=batch.latent,
-            noise=self.noise(batch, batch.latent, "noise"),
-            level=level.to(batch.latent),
+            clean=clean, noise=self.noise(batch, clean, "noise"), level=level.to(clean)
         )
+
+    def clean(self, batch: LatentBatch) -> Float[Tensor, "b c t h w"]:
+        """What the video model makes: latents, and motion behind them."""
+        return torch.cat([batch.latent, batch.motion], 1)
 
     def velocity(
         self, batch: LatentBatch, video: NoisyVideo, without_text: bool = False
@@ -152,7 +162,9 @@ class GeneratorStage(ModelStage):
     ) -> Float[Tensor, "b c t h w"]:
         """The model's answer for any latent."""
         text, mask = (None, None) if without_text else self._text(batch)
-        return self.dit(latent, levels, camera_rays(batch.cameras), text, mask, batch.draft)
+        channels, draft = self.plan.model.motion_channels, batch.draft
+        draft = None if draft is None else with_still_motion(draft, channels)
+        return self.dit(latent, levels, camera_rays(batch.cameras), text, mask, draft)
 
     def _text(self, batch: LatentBatch) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
         captions = [caption or UNSAID for caption in self._captions(batch)]
@@ -195,15 +207,19 @@ class GeneratorStage(ModelStage):
         for level in JUDGED_LEVELS:
             video = self._at_level(batch, level)
             guess = clean_from_velocity(video.latent, self.velocity(batch, video), video.level)
-            guess = torch.cat([batch.latent[:, :, :1], guess[:, :, 1:]], 2)
+            guess = torch.cat([batch.latent[:, :, :1], self.latents(guess)[:, :, 1:]], 2)
             rows.append((f"from level {level:g}", self._shown(guess)))
         return panel(rows)
+
+    def latents(self, made: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b d t h w"]:
+        """Without the motion behind them."""
+        return made[:, : self.plan.model.vae.latent_channels]
 
     def _shown(self, latent: Float[Tensor, "b c t h w"]) -> list[Tensor]:
         return list(shown_video(self.vae.decode(latent[:1]))[0].clamp(0, 1))
 
     def _at_level(self, batch: LatentBatch, level: float) -> NoisyVideo:
-        clean = batch.latent
+        clean = self.clean(batch)
         levels = clean.new_full((len(clean),), level)
         return NoisyVideo(clean=clean, noise=self.noise(batch, clean, "judged"), level=levels)
 

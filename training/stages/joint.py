@@ -45,7 +45,7 @@ class JointStage(GeneratorStage, DynamicStage):
     @torch.no_grad()
     def regenerated(self, batch: LatentBatch) -> Float[Tensor, "b c t h w"]:
         """The clip's latents after a detour through noise."""
-        clean = batch.latent
+        clean = self.clean(batch)
         draws = [torch.rand(1, generator=own) for own in self.draw(batch, "detour")]
         start = DEEPEST * torch.cat(draws).to(clean)
         video = NoisyVideo(clean=clean, noise=self.noise(batch, clean, "detour noise"), level=start)
@@ -55,7 +55,7 @@ class JointStage(GeneratorStage, DynamicStage):
             velocity = self.velocity_at(batch, latent, at.levels)
             moved = latent - (start / STEPS)[:, None, None, None, None] * velocity
             latent = torch.cat([clean[:, :, :1], moved[:, :, 1:]], 2)
-        return latent
+        return self.latents(latent)
 
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:

@@ -36,6 +36,7 @@ OTHER_VALUES = {
     "range": [2.0, 9.0],
     "predicts": "clean",
     "draft": True,
+    "motion": True,
 }
 """Valid values where doubling the old one is not."""
 
@@ -65,7 +66,7 @@ def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
 def test_models_stored_before_there_were_details_have_none() -> None:
     data = json.loads(test_size().to_json())
     del data["detail"], data["vae"]["linear_code"], data["ldrm"]["reads"]
-    del data["dit"]["predicts"], data["dit"]["draft"]
+    del data["dit"]["predicts"], data["dit"]["draft"], data["dit"]["motion"]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
 

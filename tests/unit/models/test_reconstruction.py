@@ -77,3 +77,23 @@ def test_a_network_that_cannot_move_anything_is_not_run() -> None:
     assert isinstance(motion, StaticMotion)
     assert motion.time_range_s == (0.0, 2.0)
     assert [omission.what for omission in log.omissions] == ["deformation network"]
+
+
+def test_what_the_video_model_tells_is_added() -> None:
+    whole, told = canonical(), torch.zeros(3, 32, 32, 3)
+    told[1, :, 16:, 0], told[2, :, 16:, 0] = 1.0, 4.0
+    plain = deform(moving_network(), whole, KEY_TIMES_S, UNITS, RunLog())
+    motion = deform(moving_network(), whole, KEY_TIMES_S, UNITS, RunLog(), told)
+    more = (motion.offsets - plain.offsets).unflatten(1, (5, 32, 32))
+    torch.testing.assert_close(more[:, 0], told, atol=1e-5, rtol=0)
+    assert not bool(more[:, 1:].any()), "later frames are where they were seen"
+
+
+def test_told_motion_moves_what_no_network_does_and_blends_in_time() -> None:
+    whole, told = canonical(), torch.zeros(2, 32, 32, 3)
+    told[1, 3, 5] = torch.tensor([1.0, 2.0, -3.0])
+    motion = deform(DeformationNetwork(CONFIG), whole, KEY_TIMES_S, UNITS, RunLog(), told)
+    assert isinstance(motion, KeyframeMotion)
+    found = motion.offsets[:, 3 * 32 + 5]
+    torch.testing.assert_close(found, torch.tensor([[0.0] * 3, [0.5, 1, -1.5], [1, 2, -3]]))
+    assert int((motion.offsets.abs().sum((0, 2)) > 0).sum()) == 1

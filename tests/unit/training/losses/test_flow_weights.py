@@ -121,8 +121,19 @@ def test_channels_count_by_their_share_in_pictures() -> None:
 
 
 def test_a_power_of_zero_or_no_code_counts_all_channels_alike() -> None:
-    assert coded(0.0)._channels is None
-    assert make_stage(stage_recipe("generator", flow_energy=0.5))._channels is None
+    alike = torch.ones(4)
+    torch.testing.assert_close(coded(0.0)._channels, alike)
+    without_code = make_stage(stage_recipe("generator", flow_energy=0.5))
+    torch.testing.assert_close(without_code._channels, alike)
+
+
+def test_channels_of_motion_count_as_much_as_the_recipe_says() -> None:
+    model = recipe_by_name("test").model
+    model = replace(model, dit=replace(model.dit, motion=True))
+    stage = make_stage(stage_recipe("generator", flow_motion=7.0), model=model)
+    torch.testing.assert_close(stage._channels, torch.tensor([1.0] * 4 + [7.0] * 12))
+    batch = make_batch(stage_recipe("generator"))
+    assert stage.clean(stage.encoded(batch)).shape[1] == 16
 
 
 def test_the_generator_weighs_its_channels() -> None:

@@ -1,0 +1,81 @@
+"""The motion that a video model learns to tell is that of the objects in the first frame."""
+
+from dataclasses import replace
+
+import torch
+
+from diff4splat.data.clip import Clip, ClipNote, Tracks, View
+from diff4splat.geometry.camera import pinhole
+from diff4splat.models.video_motion import UNIT
+from diff4splat.training.batches.augment import mirrored
+from diff4splat.training.batches.motion_truth import motion_truth
+
+SIDE, FRAMES, DEPTH = 16, 9, 4.0
+
+
+def square(way: tuple[float, float, float]) -> Clip:
+    """A square of 8 pixels in the upper left that goes ``way``, before something that stands."""
+    cameras = pinhole(20.0, (SIDE, SIDE)).with_pose(torch.eye(4).repeat(FRAMES, 1, 1))
+    instances = torch.ones(FRAMES, SIDE, SIDE, dtype=torch.uint8)
+    instances[:, :8, :8] = 2
+    progress = torch.linspace(0, 1, FRAMES)[:, None, None]
+    start = torch.tensor([[-1.0, -1.0, DEPTH], [-0.5, -0.5, DEPTH], [1.0, 1.0, DEPTH]])
+    ways = torch.tensor([way, way, (0.0, 0.0, 0.0)])
+    places = torch.tensor([[3.0, 3.0], [5.0, 5.0], [12.0, 12.0]]).repeat(FRAMES, 1, 1)
+    view = View(
+        rgb=torch.zeros(FRAMES, SIDE, SIDE, 3, dtype=torch.uint8),
+        depth=torch.full((FRAMES, SIDE, SIDE), DEPTH),
+        cameras=cameras,
+        instances=instances,
+        track_uv=places,
+        track_visible=torch.ones(FRAMES, 3, dtype=torch.bool),
+    )
+    tracks = Tracks(
+        positions=start + progress * ways,
+        instances=torch.tensor([2, 2, 1], dtype=torch.uint8),
+        found_at=torch.zeros(3, 2, dtype=torch.long),
+    )
+    note = ClipNote(identifier="square", source="test", license="CC0-1.0")
+    return Clip(note=note, times_s=torch.arange(FRAMES) / 8, views=(view,), tracks=tracks)
+
+
+def test_an_object_goes_where_its_points_go() -> None:
+    found = motion_truth(square((0.8, 0.0, -0.4)), 1)
+    assert found.shape == (3, 3, 4, 4)
+    wanted = torch.tensor([0.8, 0.0, -0.4]) / DEPTH / UNIT
+    for time, share in enumerate((0.0, 0.5, 1.0)):
+        inside = found[:, time, :2, :2].flatten(1).mT
+        torch.testing.assert_close(inside, (share * wanted).expand(4, 3))
+    assert not bool(found[:, :, 2:].any()) and not bool(found[:, :, :, 2:].any())
+
+
+def test_videos_may_skip_frames() -> None:
+    whole, halved = (motion_truth(square((0.8, 0.0, 0.0)), stride) for stride in (1, 2))
+    assert halved.shape[1] == 2
+    torch.testing.assert_close(halved[:, 1], whole[:, 2])
+
+
+def test_in_a_mirror_it_goes_the_other_way() -> None:
+    clip = square((0.8, 0.2, 0.0))
+    flip = torch.tensor([-1.0, 1.0, 1.0])[:, None, None, None]
+    torch.testing.assert_close(
+        motion_truth(mirrored(clip), 1), flip * motion_truth(clip, 1).flip(-1)
+    )
+
+
+def test_without_depth_masks_or_tracks_nothing_moves() -> None:
+    clip = square((0.8, 0.0, 0.0))
+    (view,) = clip.views
+    blind = replace(view, depth=torch.zeros_like(view.depth))
+    maskless = replace(view, instances=None)
+    for poor in (
+        replace(clip, tracks=None),
+        replace(clip, views=(blind,)),
+        replace(clip, views=(maskless,)),
+    ):
+        found = motion_truth(poor, 1)
+        assert not bool(found.any()) and bool(found.isfinite().all())
+
+
+def test_what_hardly_moves_stands() -> None:
+    assert not bool(motion_truth(square((0.01, 0.0, 0.0)), 1).any())
