@@ -58,9 +58,9 @@ GUIDANCES = tuple(
     for guidance in (
         UNGUIDED,
         Guidance(weight=2.0, low=0.2, high=1.0),
-        Guidance(weight=4.0, low=0.2, high=0.9),
-        Guidance(weight=4.0, low=0.2, high=1.0),
-        Guidance(weight=7.0, low=0.2, high=1.0),
+        Guidance(weight=5.0, low=0.2, high=1.0),
+        Guidance(weight=5.0, low=0.2, high=0.9),
+        Guidance(weight=8.0, low=0.2, high=1.0),
     )
 )
 
@@ -140,7 +140,7 @@ def main() -> None:
     """Both tables as Markdown."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="small")
-    parser.add_argument("--clips", type=int, default=24)
+    parser.add_argument("--clips", type=int, default=16)
     parser.add_argument("--out", type=Path, required=True, help="markdown file")
     options = parser.parse_args()
     model, protocol = with_text_encoder(load_model(options.model)), kept_back(options.clips)

@@ -142,6 +142,9 @@ class DitConfig:
     """Also sees a draft of the video, and corrects it if it predicts clean latents (ours;
     docs/adr/0016)."""
 
+    pooled_text: bool = False
+    """The mean of the text states also modulates every block, as the noise level does (Stable
+    Diffusion 3, arXiv 2403.03206): what a text means for all tokens need not pass attention."""
     motion: bool = False
     """Also makes, beside the latent, where what the first frame shows goes to (ours;
     docs/adr/0018)."""
@@ -153,7 +156,7 @@ class DitConfig:
         require_heads(self, smallest=6)
         known = self.predicts in ("velocity", "clean")
         require(known, "DitConfig.predicts", "velocity or clean", self.predicts)
-        for name in ("draft", "motion"):
+        for name in ("draft", "motion", "pooled_text"):
             value = getattr(self, name)
             require(isinstance(value, bool), f"DitConfig.{name}", "true or false", value)
         require(

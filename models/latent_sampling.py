@@ -91,7 +91,7 @@ def _velocity(
 ) -> VelocityFn:
     # Cameras and text are embedded once: they are the same at every level.
     embedded = dit.prepare(conditions.plucker, conditions.text, draft=conditions.draft)
-    unconditional = _branch(dit, replace(embedded, text=None))
+    unconditional = _branch(dit, replace(embedded, text=None, pooled_text=None))
     if conditions.text is None:
         return guided(None, unconditional, UNGUIDED, calls)
     return guided(_branch(dit, embedded), unconditional, guidance, calls)

@@ -17,7 +17,7 @@ ENOUGH_STEPS = 6
 class GenerationSettings:
     """Sampling, guidance and what to leave out of the scene."""
 
-    steps: int = 16
+    steps: int = 8
     sampler: str = "multistep2"
     schedule: Schedule | None = None
     """None takes the better one for the number of steps, as measured in docs/samplers.md."""

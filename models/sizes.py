@@ -54,6 +54,7 @@ def small_size() -> ModelConfig:
             predicts="clean",
             draft=True,
             motion=True,
+            pooled_text=True,
         ),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
         deformation=DeformationConfig(width=64, blocks=3, octaves=3, noise_px=4.0),

@@ -47,6 +47,8 @@ class DitConditions:
     text: Float[Tensor, "b s d"] | None = None
     text_mask: Bool[Tensor, "b s"] | None = None
     """True where a text token is real; None when all are."""
+    pooled_text: Float[Tensor, "b d"] | None = None
+    """Added to the embedding of the level."""
     draft: Float[Tensor, "b c t h w"] | None = None
     """Latent of a draft of the video."""
     draft_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
@@ -78,6 +80,8 @@ class VideoDiT(nn.Module):
             self.draft_embedding = zero_(nn.Linear(channels * TOKEN_PATCH**2, dit.width))
         self.camera_adapter = CameraAdapter(dit.width, dit.camera_width, config.vae.space_stride)
         self.text_projection = TextProjection(config.text.width, dit.width)
+        if dit.pooled_text:
+            self.pooled_text = zero_(nn.Linear(dit.width, dit.width))
         self.level_mlp = EmbeddingMlp(dit.frequency_width, dit.width)
         self.level_modulation = ZeroModulation(dit.width, dit.width, MODULATIONS)
         self.blocks = nn.ModuleList([DitBlock(dit) for _ in range(dit.blocks)])
@@ -113,13 +117,26 @@ class VideoDiT(nn.Module):
             want, got = ("one", "none") if self.config.draft else ("none", "one")
             raise ShapeError(f"draft: expected {want}, got {got}; DitConfig.draft decides")
         seen = None if draft is None else self.draft_embedding(patchify(draft, PATCH))
+        states = None if text is None else self.text_projection(text)
         return DitConditions(
             camera=None if camera is None else self.camera_adapter(camera),
-            text=None if text is None else self.text_projection(text),
+            text=states,
             text_mask=text_mask,
+            pooled_text=None if states is None else self._pooled(states, text_mask),
             draft=draft,
             draft_tokens=seen,
         )
+
+    def _pooled(
+        self, states: Float[Tensor, "b s d"], mask: Bool[Tensor, "b s"] | None
+    ) -> Float[Tensor, "b d"] | None:
+        """From the mean over real tokens."""
+        if not self.config.pooled_text:
+            return None
+        if mask is None:
+            return self.pooled_text(states.mean(1))
+        real = mask[..., None].to(states)
+        return self.pooled_text((states * real).sum(1) / real.sum(1).clamp_min(1))
 
     def velocity(
         self,
@@ -138,6 +155,8 @@ class VideoDiT(nn.Module):
             tuple(tokens.shape[1:4]), self.config.width // self.config.heads, tokens.device
         )
         embedding = self.level_mlp(level_embedding(level, self.config.frequency_width))
+        if conditions.pooled_text is not None:
+            embedding = embedding + conditions.pooled_text[:, None]
         modulation = self.level_modulation(embedding)
         tokens = tokens.flatten(2, 3)
         for block in self.blocks:

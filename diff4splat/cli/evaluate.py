@@ -30,7 +30,7 @@ class Evaluate:
     """Measure the first so many clips only; the table then says that it is a subset."""
     features: str | None = None
     """LPIPS weights that you have, as `vgg:FILE` or `alex:TRUNK,HEADS`; if left out, a stand-in."""
-    steps: int = 16
+    steps: int = 8
     """Steps of the sampler."""
     fresh: bool = False
     """Measure again what an earlier run into the same folder has measured."""

@@ -41,13 +41,13 @@ class Generate:
     """Side of a square with as many pixels as the picture will have; if left out, the model's."""
     fov: float | None = None
     """Horizontal field of view in degrees; if left out, from EXIF, else a 30 mm lens."""
-    steps: int = 16
+    steps: int = 8
     """Steps of the sampler."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
     """How the flow is integrated; `diff4splat report error-time` compares them."""
     shift: float = 1.0
     """Above 1 spends more steps on noisy levels."""
-    guidance: float = 4.0
+    guidance: float = 5.0
     """How strongly to follow the prompt; 1 switches guidance off."""
     min_opacity: float = 0.005
     """Fainter Gaussians are dropped."""

@@ -44,7 +44,7 @@ class Guidance:
         return self.weight != 1 and self.low <= level <= self.high
 
 
-DEFAULT_GUIDANCE = Guidance(weight=4.0, low=0.2, high=0.9)
+DEFAULT_GUIDANCE = Guidance(weight=5.0, low=0.2, high=1.0)
 """What a prompted generation uses unless told otherwise."""
 
 

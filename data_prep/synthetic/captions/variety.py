@@ -10,7 +10,7 @@ from diff4splat.data_prep.synthetic.captions.grammar import (
 )
 from diff4splat.errors import InputError
 
-PLAIN, SHORT, REWORDED = 0.2, 0.4, 0.7
+PLAIN, SHORT, REWORDED = 0.4, 0.65, 0.85
 """Below the first draw: a plain sentence; below the second: without place and camera; below the
 third: other words; above: as it stands."""
 

@@ -37,6 +37,7 @@ OTHER_VALUES = {
     "predicts": "clean",
     "draft": True,
     "motion": True,
+    "pooled_text": True,
 }
 """Valid values where doubling the old one is not."""
 
@@ -66,7 +67,8 @@ def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
 def test_models_stored_before_there_were_details_have_none() -> None:
     data = json.loads(test_size().to_json())
     del data["detail"], data["vae"]["linear_code"], data["ldrm"]["reads"]
-    del data["dit"]["predicts"], data["dit"]["draft"], data["dit"]["motion"]
+    for later in ("predicts", "draft", "motion", "pooled_text"):
+        del data["dit"][later]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
 
