@@ -33,7 +33,7 @@ from diff4splat.models.latents_to_scene import VideoLatent, canonical_scene
 from diff4splat.models.picture import Picture, load_picture, smaller
 from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
 from diff4splat.models.prompt import require_prompt
-from diff4splat.models.reconstruction import Canonical, deform
+from diff4splat.models.reconstruction import Canonical, deform, told_motion
 from diff4splat.models.settings import GenerationSettings, require_seed
 from diff4splat.models.still import drop_still_tracks, seen_as_still_px
 from diff4splat.models.video_motion import told_offsets
@@ -156,9 +156,15 @@ class Diff4SplatPipeline:
         """What the networks make of the picture."""
         made = self._sample(request, self._conditions(request, context, log), log)
         video = VideoLatent(latent=made.latent, picture=request.picture, cameras=context.cameras)
+        alone = self.model.tells_motion and request.settings.pictures == "first"
+        if alone:
+            video = replace(video, latent=made.latent[:, :, :1], cameras=context.cameras[:1])
         with log.phases.phase("reconstruct"):
             canonical = canonical_scene(self.model, video, request.settings.min_opacity, log)
         told = self._told(canonical, made, request.picture)
+        if alone and told is not None:
+            log.left_out("sampled pictures", "the draft is nearer to the truth", "later key frames")
+            return canonical, told_motion(canonical, context.times_s, told)
         return canonical, self._motion(canonical, context, told, log)
 
     def _told(

@@ -87,6 +87,11 @@ class Model:
         return _runs_video_model(self.config, self.trained)
 
     @property
+    def tells_motion(self) -> bool:
+        """Whether the video model says where things go and sees a draft of the rest."""
+        return self.config.dit.motion and self.config.dit.draft
+
+    @property
     def side_px(self) -> int:
         """Longer side of pictures read from files."""
         return _side_px(self.config, self.trained)

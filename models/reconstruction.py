@@ -110,6 +110,21 @@ def _moved_on(
     return replace(state, offsets=state.offsets.index_add(0, own.nonzero()[:, 0], more))
 
 
+def told_motion(
+    canonical: Canonical, key_times_s: Float[Tensor, " k"], told: Float[Tensor, "t h w 3"]
+) -> Motion:
+    """Key-framed motion of the kept Gaussians by nothing but ``told`` offsets."""
+    count = len(canonical.cells)
+    still = DeformationState(
+        offsets=told.new_zeros(count, 3),
+        rotations=told.new_tensor([1.0, 0.0, 0.0, 0.0]).repeat(count, 1),
+        log_scale_offsets=told.new_zeros(count, 3),
+    )
+    fractions = torch.linspace(0, 1, len(key_times_s)).tolist()
+    states = [_moved_on(still, told, canonical, fraction) for fraction in fractions]
+    return keyframe_motion(states, key_times_s, torch.arange(count, device=told.device))
+
+
 def deform(
     network: DeformationNetwork | DetailDeformation,
     canonical: Canonical,

@@ -1,6 +1,7 @@
 """What a user may choose about one generation; everything else is in the model's configuration."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, Guidance
@@ -25,6 +26,9 @@ class GenerationSettings:
     """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
     guidance: Guidance = DEFAULT_GUIDANCE
     """Used only when there is a prompt."""
+    pictures: Literal["first", "sampled"] = "first"
+    """What is reconstructed where the video model corrects a draft and tells motion: the picture,
+    moved as told, or the sampled video as well (docs/adr/0018)."""
     min_opacity: float = MIN_OPACITY
     still_px: float = 0.05
     """Gaussians that never move by more than this many pixels of the input view stand still."""
@@ -34,6 +38,8 @@ class GenerationSettings:
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
             raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
+        if self.pictures not in ("first", "sampled"):
+            raise ConfigError(f"pictures: expected first or sampled, got {self.pictures!r}")
         find_sampler(self.sampler)
         require_levels(self.levels)
         if not 0 <= self.color_steps <= 100:
