@@ -2,11 +2,14 @@
 
 Axes: ``b c t h w`` inside networks, pictures ``h w 3`` outside; this file is where they meet.
 
-    picture ─ vae ─────────┐
-    prompt ── text encoder ┼─ sample ─ latents ─┐
-    path ──── Plücker maps ┴────────────────────┼─ reconstruct ─ prune ─ deform ─ match ─ Scene
-    picture on a plane ─────────────────────────┘
+    picture ─ smaller ─┬─ vae ────┐
+                       ├─ draft ──┤   prompt ── text encoder ─┐
+                       │          └─── path ─── Plücker maps ─┴─ sample ─ latents, motion ─┐
+                       └─ (or a plane) ────────────────────────────────────────────────────┤
+    picture ── finer, match ── Scene ◄── move ◄── prune ◄── reconstruct ◄──────────────────┘
 
+Where the video model sees a draft and tells motion, the picture alone is reconstructed and moved as
+told, unless the settings ask for the sampled video as well.
 A model of which some parts are trained, but not the video model, shows the picture on its plane,
 standing still: see ``Model.runs_video_model``.
 """

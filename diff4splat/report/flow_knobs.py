@@ -94,7 +94,7 @@ def levels_knob() -> Knob:
 
 def guidance_knob() -> Knob:
     """At which noise levels to evaluate the unconditional branch."""
-    intervals = ((0.0, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.9), (0.2, 0.8), (0.4, 0.7))
+    intervals = ((0.0, 1.0), (0.2, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.9), (0.2, 0.8), (0.4, 0.7))
     settings = tuple(
         Guidance(weight=GUIDANCE_WEIGHT, low=low, high=high) for low, high in intervals
     )

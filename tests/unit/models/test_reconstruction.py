@@ -10,7 +10,13 @@ from diff4splat.models.deformation import DeformationNetwork
 from diff4splat.models.deformation_heads import DeformationUnits
 from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
-from diff4splat.models.reconstruction import Canonical, deform, prune_cells, reconstruct
+from diff4splat.models.reconstruction import (
+    Canonical,
+    deform,
+    prune_cells,
+    reconstruct,
+    told_motion,
+)
 from diff4splat.models.sizes import size_by_name
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -97,3 +103,13 @@ def test_told_motion_moves_what_no_network_does_and_blends_in_time() -> None:
     found = motion.offsets[:, 3 * 32 + 5]
     torch.testing.assert_close(found, torch.tensor([[0.0] * 3, [0.5, 1, -1.5], [1, 2, -3]]))
     assert int((motion.offsets.abs().sum((0, 2)) > 0).sum()) == 1
+
+
+def test_told_motion_alone_needs_no_network() -> None:
+    whole, told = canonical(), torch.zeros(2, 32, 32, 3)
+    told[1, 3, 5] = torch.tensor([1.0, 2.0, -3.0])
+    alone = told_motion(whole, KEY_TIMES_S, told)
+    asked = deform(DeformationNetwork(CONFIG), whole, KEY_TIMES_S, UNITS, RunLog(), told)
+    torch.testing.assert_close(alone.offsets, asked.offsets)
+    torch.testing.assert_close(alone.rotations, asked.rotations)
+    torch.testing.assert_close(alone.log_scale_offsets, asked.log_scale_offsets)
