@@ -5,6 +5,7 @@ scale · R x + translation. Under it
 
     mean' = scale · R mean + translation     quat' = R ⊗ quat     scale' = scale · scale
     offset' = scale · R offset               rotation' = rotation (it stands right of quat)
+    velocity' = scale · R velocity           colour waves turn like sh; times stay
     sh' = the same lobes turned by R         camera pose' = (R · rotation, similarity of the centre)
 
 so that editing commutes with ``state_at``.
@@ -22,9 +23,10 @@ from diff4splat.geometry import quaternion, rigid
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians, concatenate
-from diff4splat.scene.motion import keyframe_algebra
+from diff4splat.scene.motion import keyframe_algebra, spacetime_algebra
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.protocol import Motion
+from diff4splat.scene.motion.spacetime import SpacetimeMotion
 from diff4splat.scene.scene import Provenance, Scene
 
 MIN_OPACITY = 0.005
@@ -117,14 +119,24 @@ def prune(scene: Scene, min_opacity: float = MIN_OPACITY) -> Scene:
 
 
 def static_if_still(
-    scene: Scene, *, offset: float = 0.0, angle_rad: float = 0.0, log_scale: float = 0.0
+    scene: Scene,
+    *,
+    offset: float = 0.0,
+    angle_rad: float = 0.0,
+    log_scale: float = 0.0,
+    opacity: float = 0.0,
 ) -> Scene:
-    """Drop the keys of Gaussians that no key moves, turns or stretches by more than a tolerance.
+    """Let Gaussians stand that never leave their canonical state by more than a tolerance.
 
-    ``offset`` is in scene units. The state at every key changes by no more than the tolerances;
-    with all of them 0 nothing changes. When nothing moves, the motion becomes ``StaticMotion``.
+    ``offset`` is in scene units. The state at every key, or at any time of a native 4D motion,
+    changes by no more than the tolerances; with all of them 0 nothing changes. When nothing moves,
+    the motion becomes ``StaticMotion``.
     """
     motion = scene.motion
+    if isinstance(motion, SpacetimeMotion):
+        change = spacetime_algebra.largest_change(motion, scene.gaussians)
+        moves = ~change.within(offset, opacity)
+        return replace(scene, motion=spacetime_algebra.keep_moving(motion, moves))
     if not isinstance(motion, KeyframeMotion):
         return scene
     still = keyframe_algebra.largest_change(motion).within(offset, angle_rad, log_scale)
@@ -138,8 +150,8 @@ def merge(first: Scene, second: Scene) -> Scene:
     resampled to all of them, which changes nothing between keys because linear motion stays linear.
 
     Raises:
-        ConfigError: a motion without key frames that is not static, or cubic key frames at
-            different times, which have no exact common form.
+        ConfigError: motions without an exact common form: of different kinds, cubic key frames at
+            different times, or native 4D ones of different ranges, gates or periods.
     """
     means = first.gaussians.means
     second = second.to(means.device).to(means.dtype)
@@ -147,7 +159,7 @@ def merge(first: Scene, second: Scene) -> Scene:
     parts = [_pad_harmonics(scene.gaussians, degree) for scene in (first, second)]
     return Scene(
         gaussians=concatenate(parts),
-        motion=keyframe_algebra.join(first.motion, second.motion, len(first.gaussians)),
+        motion=_join_motions(first.motion, second.motion, len(first.gaussians), degree),
         path=first.path,
         provenance=_merge_provenance(first.provenance, second.provenance),
     )
@@ -157,8 +169,17 @@ def _transform_motion(motion: Motion, similarity: Similarity) -> Motion:
     if isinstance(motion, KeyframeMotion):
         offsets = similarity.directions(motion.offsets) * similarity.scale
         return replace(motion, offsets=offsets)
+    if isinstance(motion, SpacetimeMotion):
+        matrix = quaternion.to_matrix(similarity.rotation.double())
+        return spacetime_algebra.turn(motion, matrix, similarity.scale)
     keyframe_algebra.require_editable(motion, "transform")
     return motion
+
+
+def _join_motions(first: Motion, second: Motion, count: int, degree: int) -> Motion:
+    if isinstance(first, SpacetimeMotion) or isinstance(second, SpacetimeMotion):
+        return spacetime_algebra.join(first, second, count, degree)
+    return keyframe_algebra.join(first, second, count)
 
 
 def _transform_path(path: CameraPath, similarity: Similarity) -> CameraPath:

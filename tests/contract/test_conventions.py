@@ -27,6 +27,7 @@ from diff4splat.report.run_log import RunLog
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.motion.spacetime import SpacetimeMotion
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 
@@ -189,6 +190,28 @@ def test_deformation() -> None:
     torch.testing.assert_close(moved.means, torch.tensor([[1.0, 0, 1]]))
     torch.testing.assert_close(moved.scales, still.scales * 2)
     torch.testing.assert_close(moved.quats[0], quaternion.multiply(first, second))
+
+
+def test_native_4d() -> None:
+    still = ball((0.0, 0.0, 1.0), (0.5, 0.5, 0.5))
+    motion = SpacetimeMotion(
+        moving_index=torch.tensor([0]),
+        velocities=torch.tensor([[2.0, 0, 0]]),
+        time_centers_s=torch.tensor([1.0]),
+        time_deviations_s=torch.tensor([0.25]),
+        time_range_s=(0.0, 2.0),
+        color_waves=torch.ones(1, 1, 1, 3),
+        period_s=2.0,
+    )
+    center = motion.state_at(still, 1.0)
+    assert center.means.tolist() == still.means.tolist()
+    assert center.opacities.tolist() == [1.0]
+    early, late = motion.state_at(still, 0.75), motion.state_at(still, 1.25)
+    torch.testing.assert_close(late.means, torch.tensor([[0.5, 0, 1]]))
+    torch.testing.assert_close(late.opacities, torch.tensor([-0.5]).exp())
+    torch.testing.assert_close(early.sh, late.sh)
+    torch.testing.assert_close(early.opacities, late.opacities)
+    assert torch.equal(late.scales, still.scales)
 
 
 def test_level() -> None:

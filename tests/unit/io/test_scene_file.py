@@ -182,7 +182,7 @@ def test_a_motion_without_a_codec_is_refused_by_name(
 ) -> None:
     monkeypatch.delitem(CODECS, "static")
     scene = replace(oracles_io.scene(), motion=Drift())
-    with pytest.raises(InputError, match="expected one of keyframes, got Drift"):
+    with pytest.raises(InputError, match=r"expected one of .*keyframes, .*got Drift"):
         save_scene(scene, tmp_path / "s.safetensors")
 
 

@@ -143,7 +143,7 @@ def test_metadata_that_is_no_object(file: Path, text: str) -> None:
         (("path", "size_px"), [0, 4], "path.size_px: expected 1 to 16384 pixels per side"),
         (("motion",), "still", "'motion': expected an object"),
         (("motion", "kind"), ..., "'kind': expected text, got nothing"),
-        (("motion", "kind"), "jelly", "expected one of keyframes, static, got 'jelly'; update"),
+        (("motion", "kind"), "jelly", "got 'jelly'; update diff4splat"),
         (("motion", "interpolation"), "guess", "expected linear or cubic, got 'guess'"),
     ],
 )

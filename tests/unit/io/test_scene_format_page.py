@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import oracles_io
+import oracles_spacetime
 import pytest
 
 from diff4splat.io.scene_file import save_scene
@@ -30,10 +31,11 @@ def test_the_tables_name_every_tensor_with_its_shape() -> None:
     rows = re.findall(
         r"^\| `(\w+)` \| (\w(?:, \w)*) \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE
     )
-    sizes = {"n": 4, "k": 4, "m": 2, "t": 3, "f": 2}
+    sizes = {"n": 4, "k": 4, "m": 2, "t": 3, "w": 2, "f": 2}
     want = {
         name: tuple(sizes[axis] if axis in sizes else int(axis) for axis in shape.split(", "))
         for name, shape in rows
     }
-    got = {name: tuple(value.shape) for name, value in read_tensors(oracles_io.GOLDEN).items()}
+    files = (oracles_io.GOLDEN, oracles_spacetime.GOLDEN)
+    got = {name: tuple(value.shape) for file in files for name, value in read_tensors(file).items()}
     assert want == got
