@@ -1,0 +1,44 @@
+"""What a person may choose when a capture is read; every format takes the same options."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from diff4splat.errors import ConfigError
+from diff4splat.paths.names import unknown_name
+
+FormatName = Literal["dnerf", "neu3d", "hypernerf", "colmap", "transforms", "clips"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """None leaves the choice to the format."""
+
+    format: str = "auto"
+    """``auto`` looks at the files, otherwise a ``FormatName``."""
+    hold_out: tuple[int, ...] | None = None
+    """Cameras to hold out, counted from 0 in the order of their names. D-NeRF counts files instead:
+    1 is val, 2 is test."""
+    downscale: int = 1
+    """Each so many by so many pixels become their mean."""
+    frame_step: int = 1
+    """Only every so manieth time is taken."""
+    background: tuple[float, float, float] | None = None
+    """RGB in [0, 1] behind transparent pixels. None is white for D-NeRF; elsewhere it means that
+    transparent pixels say nothing."""
+    fps: float | None = None
+    """For formats that count frames instead of seconds."""
+    clip: str | None = None
+    """Which clip of a folder of shards."""
+
+    def __post_init__(self) -> None:
+        if self.format not in ("auto", *get_args(FormatName)):
+            names = ("auto", *get_args(FormatName))
+            raise ConfigError(unknown_name("format", self.format, names))
+        for name in ("downscale", "frame_step"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name}: expected at least 1, got {getattr(self, name)}")
+        if self.fps is not None and not (math.isfinite(self.fps) and self.fps > 0):
+            raise ConfigError(f"fps: expected a finite rate above 0, got {self.fps:g}")
+        if self.background is not None and not all(0 <= level <= 1 for level in self.background):
+            raise ConfigError(f"background: expected RGB from 0 to 1, got {self.background}")

@@ -1,0 +1,133 @@
+"""Frames of ``transforms*.json``: poses, lenses, times and files, for D-NeRF and nerfstudio alike.
+
+Axes: ``f`` frames. ``transform_matrix`` is world_from_camera with OpenGL camera axes (x right,
+y up, z back); a frame's own value goes before the one given for all.
+"""
+
+from collections import ChainMap
+from collections.abc import Mapping
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.data_prep.readers.json_file import read_object
+from diff4splat.data_prep.readers.lens import Lens
+from diff4splat.data_prep.readers.picture_file import PictureFile
+from diff4splat.data_prep.readers.places import picture_at
+from diff4splat.errors import FileFormatError
+from diff4splat.geometry.camera import pinhole
+from diff4splat.paths.formats.axes import swap_opengl_opencv
+from diff4splat.paths.formats.checks import exact_poses
+from diff4splat.paths.formats.json_fields import (
+    FrameRecord,
+    frame_records,
+    kind_of,
+    number_list,
+    optional_number,
+    picture_size,
+)
+from diff4splat.paths.formats.pinhole_fields import pinhole_px
+
+_FOCAL_KEYS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
+_BENT = ("k1", "k2", "k3", "p1", "p2")
+"""Distortion that can be removed; other coefficients are refused by name."""
+
+Record = Mapping[str, object]
+
+
+def load_frames(file: Path) -> tuple[dict[str, object], list[FrameRecord]]:
+    """The file's object and its frames, each with what is given for all mixed in.
+
+    Raises:
+        FileFormatError: missing, not JSON, or without frames.
+    """
+    root = read_object(file)
+    shared = {key: value for key, value in root.items() if key != "frames"}
+    frames = [
+        FrameRecord(
+            fields=dict(ChainMap(frame.fields, shared)), label=frame.label, where=frame.where
+        )
+        for frame in frame_records(root, "frames", str(file))
+    ]
+    return root, frames
+
+
+def poses_of(frames: list[FrameRecord], file: Path) -> Float[Tensor, "f 4 4"]:
+    """world_from_camera, OpenCV axes, float64.
+
+    Raises:
+        FileFormatError: a matrix is missing, not finite, or no rotation and translation.
+    """
+    matrices = torch.tensor([_matrix(frame) for frame in frames], dtype=torch.float64)
+    exact = exact_poses(matrices, [frame.label for frame in frames], str(file))
+    return swap_opengl_opencv(exact)
+
+
+def picture_of(frame: FrameRecord, folder: Path) -> PictureFile:
+    """The picture under ``file_path``.
+
+    Raises:
+        FileFormatError: no name, no such file, or one outside the folder.
+    """
+    return PictureFile(file=picture_at(folder, file_name(frame, "file_path"), frame.where))
+
+
+def file_name(frame: FrameRecord, key: str) -> str:
+    """The text under ``key``.
+
+    Raises:
+        FileFormatError: it is no text.
+    """
+    name = frame.fields.get(key)
+    if not isinstance(name, str):
+        raise FileFormatError(
+            f"{frame.where}: '{key}': expected the path of a file, got {kind_of(name)}; add it"
+        )
+    return name
+
+
+def time_of(frame: FrameRecord, advice: str) -> float:
+    """The number under ``time``.
+
+    Raises:
+        FileFormatError: there is none; ``advice`` says what to do.
+    """
+    time_s = optional_number(frame.fields, "time", frame.where)
+    if time_s is None:
+        raise FileFormatError(f"{frame.where}: expected 'time', got none; {advice}")
+    return time_s
+
+
+def lens_of(frame: FrameRecord, picture_px: tuple[int, int]) -> Lens:
+    """The lens of a frame; ``picture_px`` stands in where the file says no size.
+
+    Raises:
+        FileFormatError: no focal length, or a camera model that cannot be straightened.
+    """
+    record, where = frame.fields, frame.where
+    if all(record.get(key) is None for key in _FOCAL_KEYS):
+        raise FileFormatError(
+            f"{where}: expected a focal length ({', '.join(_FOCAL_KEYS)}), got none; add one"
+        )
+    size_px = picture_size(record, ("h", "w"), where) or picture_px
+    straight = {key: value for key, value in record.items() if key not in _BENT}
+    fl_x, fl_y, cx, cy = pinhole_px(straight, where, pinhole(1.0, size_px))
+    k1, k2, k3, p1, p2 = (optional_number(record, key, where) or 0.0 for key in _BENT)
+    return Lens(
+        focal_px=(fl_x, fl_y),
+        center_px=(cx, cy),
+        size_px=size_px,
+        radial=(k1, k2, k3),
+        tangential=(p1, p2),
+    )
+
+
+def _matrix(frame: FrameRecord) -> list[list[float]]:
+    where = f"{frame.where}: 'transform_matrix'"
+    rows = frame.fields.get("transform_matrix")
+    if not isinstance(rows, list) or len(rows) != 4:
+        got = f"{len(rows)} rows" if isinstance(rows, list) else "none"
+        raise FileFormatError(f"{where}: expected 4 rows of 4 numbers, got {got}; repair the file")
+    return [number_list(row, 4, where) for row in rows]
