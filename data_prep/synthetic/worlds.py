@@ -19,6 +19,7 @@ from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
 from diff4splat.data_prep.synthetic.layout.plan import Placed, Plan
 from diff4splat.data_prep.synthetic.lights import lighting
 from diff4splat.data_prep.synthetic.narration import facts_of, note_of
+from diff4splat.data_prep.synthetic.rig import rig_shots
 from diff4splat.data_prep.synthetic.rounding import POSE_BITS, to_grid
 from diff4splat.data_prep.synthetic.splits import Split, SplitName, load_split
 from diff4splat.data_prep.synthetic.surroundings import Surroundings, furnish
@@ -48,6 +49,8 @@ class WorldRecipe:
     views: int = 3
     fps: float = 8.0
     """17 frames make 2 seconds."""
+    rig: bool = False
+    """Cameras stand all around the stage; otherwise each goes its own way near the input view."""
     families: Names = None
     textures: Names = None
     motions: Names = None
@@ -56,7 +59,7 @@ class WorldRecipe:
 
     def __post_init__(self) -> None:
         _require_range("frames", self.frames, 2, 1000)
-        _require_range("views", self.views, 1, 8)
+        _require_range("views", self.views, 4 if self.rig else 1, 64 if self.rig else 8)
         _require_range("size_px", min(self.size_px), 8, 4096)
         _require_range("size_px", max(self.size_px), 8, 4096)
         for name in ("still_share", "against_share", "frozen_share"):
@@ -160,8 +163,9 @@ def _framing(recipe: WorldRecipe, split: Split, draws: Draws, is_still: bool) ->
     radius = math.exp(draws.between(*(math.log(limit) for limit in kind.stage_m)))
     fov_deg = draws.between(35.0, 72.0)
     lens = Lens(size_px=recipe.size_px, fov_deg=fov_deg, frames=recipe.frames, fps=recipe.fps)
-    shots = draw_shots(kind, lens, radius, recipe.views, draws.child("shots"))
-    if is_still:
+    arrange = rig_shots if recipe.rig else draw_shots
+    shots = arrange(kind, lens, radius, recipe.views, draws.child("shots"))
+    if is_still and not recipe.rig:
         shots[0] = replace(shots[0], path=draw_path(draws.child("path"), may_stand=False))
     views = tuple(film(shot, lens, 0.28 * radius) for shot in shots)
     eyes = np.concatenate([view.position.numpy() for view in views])
@@ -192,7 +196,8 @@ def _moving(stage: Stage, draws: Draws, is_still: bool) -> list[Placed]:
 
 def world_identifier(recipe: WorldRecipe, index: int) -> str:
     """What the clip of a world is called."""
-    return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}"
+    rig = f"-rig{recipe.views}" if recipe.rig else ""
+    return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{rig}"
 
 
 def _shows_something_new(split: Split, scenery: Scenery, objects) -> bool:

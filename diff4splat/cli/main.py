@@ -7,9 +7,11 @@ from typing import Annotated, NoReturn
 
 import tyro
 
+from diff4splat.cli.bake import Bake
 from diff4splat.cli.convert import Convert
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
+from diff4splat.cli.fit import Fit
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.pack import Pack
@@ -30,7 +32,9 @@ Prepare = (
 Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
 Command = (
     Annotated[Generate, subcommand("generate")]
+    | Annotated[Fit, subcommand("fit")]
     | Annotated[Render, subcommand("render")]
+    | Annotated[Bake, subcommand("bake")]
     | Annotated[Convert, subcommand("convert")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]

@@ -31,6 +31,10 @@ class PrepareSynthetic:
     """Frames per clip, 1 + 4 k for training."""
     views: int = 3
     """Cameras per clip; the first is the input."""
+    rig: bool = False
+    """Cameras stand all around, for per-scene fitting; the last two are good to hold out."""
+    motions: tuple[str, ...] = ()
+    """Only worlds with these motions, such as slides or bends; if left out, any."""
     tracks: int = 512
     """Points followed through every clip."""
     workers: int = 1
@@ -55,6 +59,8 @@ class PrepareSynthetic:
             frames=self.frames,
             size_px=(self.size, self.size),
             views=self.views,
+            rig=self.rig,
+            motions=self.motions or None,
         )
         job = WorldJob(
             folder=self.out,

@@ -1,0 +1,1 @@
+"""Fits of procedural worlds: quality on held-out views, ablations, memory."""

@@ -1,0 +1,116 @@
+"""What the fine stage sets out with: coarse Gaussians, and for native 4D one set per time slice.
+
+Axes: ``n`` Gaussians, ``p`` points. A pulse cannot show what the whole time range shows, so that
+moving things need Gaussians in every slice. Where the capture has depth they are put on the pixels
+of that time which the standing Gaussians do not explain; elsewhere the moving ones are repeated.
+"""
+
+import math
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+
+from diff4splat.data.capture.capture import Capture, PointCloud
+from diff4splat.geometry.depth import unproject
+from diff4splat.render.api import render
+from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.training.per_scene.canonical import raw_points
+from diff4splat.training.per_scene.model import SceneModel
+from diff4splat.training.per_scene.motions.protocol import LearnedMotion
+from diff4splat.training.per_scene.motions.spacetime import Pulses
+from diff4splat.training.per_scene.pictures import FrameStore, Schedule
+from diff4splat.training.per_scene.settings import FitSettings
+
+OVERLAP = 0.6
+"""Deviation of a starting pulse over the distance between pulses."""
+SLICES_SHARE = 0.75
+"""Of the budget, for all Gaussians at the start: the rest is room to split."""
+UNEXPLAINED = 0.06
+"""Mean colour error of a pixel that standing Gaussians do not explain."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Departure:
+    """What the fine stage begins with."""
+
+    rows: dict[str, Tensor]
+    moves: Bool[Tensor, " n"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """Where the pictures come from."""
+
+    capture: Capture
+    store: FrameStore
+    schedule: Schedule
+    settings: FitSettings
+
+
+def depart(
+    model: SceneModel, moves: Bool[Tensor, " n"], motion: LearnedMotion, around: Surroundings
+) -> Departure:
+    """The Gaussians of the coarse stage; native 4D has moving ones once per time slice."""
+    rows = model.rows(torch.arange(len(model)))
+    if not isinstance(motion, Pulses) or not bool(moves.any()):
+        return Departure(rows=rows, moves=moves)
+    still = (~moves).nonzero().flatten()
+    moving = {name: value[moves] for name, value in rows.items()}
+    room = max(
+        int(SLICES_SHARE * around.settings.density.budget) - len(still), len(moving["means"])
+    )
+    slices = around.settings.time_slices
+    standing = model.canonical(around.settings.harmonics).select(still)
+    parts = [{name: value[still] for name, value in rows.items()} | motion.columns(len(still))]
+    for number in range(slices):
+        center_s = motion.start_s + motion.duration_s * (number + 0.5) / slices
+        here = _unexplained(standing, around, center_s, room // slices) or moving
+        parts.append(here | _pulses(motion, len(here["means"]), center_s, slices))
+    joined = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+    return Departure(rows=joined, moves=torch.arange(len(joined["means"])) >= len(still))
+
+
+def _pulses(motion: Pulses, count: int, center_s: float, slices: int) -> dict[str, Tensor]:
+    deviation_s = OVERLAP * motion.duration_s / slices
+    return dict(motion.columns(count)) | {
+        "time_centers_s": torch.full((count,), center_s),
+        "log_deviations": torch.full((count,), math.log(deviation_s)),
+    }
+
+
+@torch.no_grad()
+def _unexplained(
+    standing: Gaussians, around: Surroundings, time_s: float, count: int
+) -> dict[str, Tensor] | None:
+    """Points on pixels near a time that ``standing`` gets wrong; None without depth."""
+    if not around.settings.use_depth:
+        return None
+    nearest_s = min(around.schedule.times_s, key=lambda other_s: abs(other_s - time_s))
+    frames = around.schedule.frames_at[nearest_s]
+    clouds = [_wrong_pixels(standing, around, index) for index in frames]
+    if any(cloud is None for cloud in clouds):
+        return None
+    positions = torch.cat([cloud.positions for cloud in clouds])
+    if len(positions) == 0:
+        return None
+    generator = torch.Generator().manual_seed(around.settings.seed)
+    drawn = torch.randperm(len(positions), generator=generator)[:count]
+    rgb = torch.cat([cloud.rgb for cloud in clouds])
+    points = PointCloud(positions=positions[drawn], rgb=rgb[drawn])
+    return raw_points(points, around.settings.harmonics)
+
+
+def _wrong_pixels(standing: Gaussians, around: Surroundings, index: int) -> PointCloud | None:
+    frame, camera = around.store.read(index), around.capture.cameras[index]
+    if frame.depth is None:
+        return None
+    settings = RenderSettings(background=around.capture.background or (0.0, 0.0, 0.0))
+    made = render(standing, camera, settings=settings).rgb
+    wrong = ((made - frame.rgb).abs().mean(-1) > UNEXPLAINED) & (frame.depth > 0)
+    if frame.counts is not None:
+        wrong = wrong & frame.counts
+    points = unproject(camera.to(torch.float32), frame.depth)
+    return PointCloud(positions=points[wrong], rgb=frame.rgb[wrong])

@@ -1,0 +1,94 @@
+"""How well a scene shows frames that it has not seen.
+
+Axes: ``h w`` pixels. As published comparisons do: pictures of eight bits, one PSNR and SSIM per
+frame, then the mean; PSNR over all pixels that count.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.data.capture.capture import Capture, Frame
+from diff4splat.metrics.image import psnr
+from diff4splat.metrics.structure import WINDOW_PX, ssim
+from diff4splat.render.api import render
+from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.training.per_scene.pictures import FrameStore
+
+BEST_PSNR_DB = 99.0
+"""Of equal pictures, whose PSNR is infinite."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameQuality:
+    """One frame."""
+
+    frame: int
+    camera: int
+    time_s: float
+    psnr_db: float
+    ssim: float | None
+    """None where the picture is smaller than the window, or was not asked for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judge:
+    """Renders frames of a capture and compares."""
+
+    capture: Capture
+    store: FrameStore
+    backend: str = "auto"
+
+    def frames(
+        self,
+        state_at: Callable[[float], Gaussians],
+        indices: Sequence[int],
+        with_ssim: bool = False,
+        advance: Callable[[], None] = lambda: None,
+    ) -> list[FrameQuality]:
+        """Quality of each frame."""
+        found = []
+        for index in indices:
+            made = self.picture(state_at(float(self.capture.times_s[index])), index)
+            found.append(self._compare(made, index, with_ssim))
+            advance()
+        return found
+
+    @torch.no_grad()
+    def picture(self, state: Gaussians, index: int) -> Float[Tensor, "h w 3"]:
+        """What the scene shows in place of a frame, rounded to eight bits."""
+        settings = RenderSettings(background=self.capture.background or (0.0, 0.0, 0.0))
+        camera = self.capture.cameras[index]
+        made = render(state, camera, settings=settings, backend=self.backend).rgb
+        return (made.clamp(0, 1) * 255).round() / 255
+
+    def _compare(self, made: Float[Tensor, "h w 3"], index: int, with_ssim: bool) -> FrameQuality:
+        frame = self.store.read(index)
+        structure = None
+        if with_ssim and min(made.shape[:2]) >= WINDOW_PX:
+            structure = float(ssim(made, frame.rgb))
+        return FrameQuality(
+            frame=index,
+            camera=int(self.capture.camera_index[index]),
+            time_s=float(self.capture.times_s[index]),
+            psnr_db=min(_psnr(made, frame), BEST_PSNR_DB),
+            ssim=structure,
+        )
+
+
+def mean_psnr_db(qualities: Sequence[FrameQuality]) -> float | None:
+    """Mean over frames; None without frames."""
+    if not qualities:
+        return None
+    return sum(quality.psnr_db for quality in qualities) / len(qualities)
+
+
+def _psnr(made: Float[Tensor, "h w 3"], frame: Frame) -> float:
+    if frame.counts is None:
+        return float(psnr(made, frame.rgb))
+    error = (made - frame.rgb)[frame.counts].double().square().mean()
+    return float(-10 * torch.log10(error)) if error > 0 else BEST_PSNR_DB

@@ -1,0 +1,71 @@
+"""A scene while it is learned: the table of numbers, its motion, and who takes part in the motion.
+
+Axes: ``n`` Gaussians.
+"""
+
+from collections.abc import Mapping
+
+import torch
+from jaxtyping import Bool, Int
+from torch import Tensor
+
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.protocol import Motion
+from diff4splat.training.per_scene.canonical import COLUMNS, activated
+from diff4splat.training.per_scene.motions.protocol import LearnedMotion
+from diff4splat.training.per_scene.settings import Rates
+from diff4splat.training.per_scene.table import ParameterTable
+
+
+class SceneModel:
+    """Gaussians and a motion; ``moves`` says whom the motion carries."""
+
+    def __init__(
+        self, rows: Mapping[str, Tensor], motion: LearnedMotion, moves: Bool[Tensor, " n"]
+    ) -> None:
+        """``rows`` are canonical numbers; columns of the motion that they lack get its start."""
+        count = len(moves)
+        columns = {**motion.columns(count), **rows}
+        wanted = (*COLUMNS, *motion.columns(0))
+        self.table = ParameterTable({name: columns[name] for name in wanted}, motion.shared())
+        self.learned, self.moves = motion, moves
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    @property
+    def moving_index(self) -> Int[Tensor, " m"]:
+        """Of the Gaussians that the motion carries."""
+        return self.moves.nonzero().flatten()
+
+    def motion(self, degree: int) -> Motion:
+        """The motion as it is now; differentiable."""
+        return self.learned.motion(self.table, self.moving_index, degree)
+
+    def canonical(self, degree: int) -> Gaussians:
+        """The Gaussians without motion; differentiable."""
+        return activated(self.table, degree)
+
+    def state_at(self, time_s: float, degree: int) -> Gaussians:
+        """The Gaussians at a time; differentiable."""
+        return self.motion(degree).state_at(self.canonical(degree), time_s)
+
+    def rates(self, rates: Rates, extent: float, progress: float) -> dict[str, float]:
+        """The learning rate of every tensor."""
+        found = {name: getattr(rates, name).at(progress) for name in COLUMNS}
+        found["means"] *= extent
+        return found | dict(self.learned.rates(rates, extent, progress))
+
+    def keep(self, kept: Bool[Tensor, " n"]) -> None:
+        """Drop all other Gaussians."""
+        self.table.keep(kept)
+        self.moves = self.moves[kept]
+
+    def append(self, rows: Mapping[str, Tensor], moves: Bool[Tensor, " m"]) -> None:
+        """Add Gaussians."""
+        self.table.append(rows)
+        self.moves = torch.cat([self.moves, moves])
+
+    def rows(self, index: Int[Tensor, " m"]) -> dict[str, Tensor]:
+        """All numbers of some Gaussians, detached."""
+        return {name: self.table[name].detach()[index] for name in self.table.columns}

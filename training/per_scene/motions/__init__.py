@@ -1,0 +1,1 @@
+"""Motions that can be learned: which numbers they have, and which ``Motion`` these make."""
