@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diff4splat.geometry.camera import Camera
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +36,7 @@ class Bake:
         if not self.tolerance_px > 0:
             raise ConfigError(f"--tolerance-px: expected more than 0, got {self.tolerance_px:g}")
         scene = load_scene(self.scene)
-        cameras = scene.path.cameras
+        cameras = distinct(scene.path.cameras)
         with ConsolePhases().phase("bake"):
             if self.keys is None:
                 baked, error = bake_within(
@@ -52,3 +55,13 @@ class Bake:
                 f"{error.opacity_lost:.3g} in opacity and {error.color_lost:.3g} in harmonics"
             )
         note(f"wrote {self.out}")
+
+
+def distinct(cameras: "Camera") -> "Camera":
+    """Each view once: a standing camera would be looked through once per frame."""
+    import torch
+
+    views = torch.cat([cameras.world_from_camera.flatten(1), cameras.focal_px], 1)
+    _, groups = views.unique(dim=0, return_inverse=True)
+    first = [int((groups == group).nonzero()[0]) for group in range(int(groups.max()) + 1)]
+    return cameras[torch.tensor(sorted(first))]

@@ -58,22 +58,51 @@ def depart(
     if not isinstance(motion, Pulses) or not bool(moves.any()):
         return Departure(rows=rows, moves=moves)
     still = (~moves).nonzero().flatten()
+    standing = {name: value[still] for name, value in rows.items()} | motion.columns(len(still))
     moving = {name: value[moves] for name, value in rows.items()}
-    room = max(
-        int(SLICES_SHARE * around.settings.density.budget) - len(still), len(moving["means"])
-    )
-    slices = around.settings.time_slices
-    standing = model.canonical(around.settings.harmonics).select(still)
-    parts = [{name: value[still] for name, value in rows.items()} | motion.columns(len(still))]
-    for number in range(slices):
-        center_s = motion.start_s + motion.duration_s * (number + 0.5) / slices
-        here = _unexplained(standing, around, center_s, room // slices) or moving
-        parts.append(here | _pulses(motion, len(here["means"]), center_s, slices))
-    joined = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+    room = max(int(SLICES_SHARE * around.settings.density.budget) - len(still), 2)
+    seen = model.canonical(around.settings.harmonics).select(still)
+    slices = _found(seen, motion, around, room) or _repeated(moving, around.settings, room)
+    parts = [standing]
+    for number, here in enumerate(slices):
+        parts.append(here | _pulses(motion, len(here["means"]), number, len(slices)))
+    joined = {name: torch.cat([part[name] for part in parts]) for name in standing}
     return Departure(rows=joined, moves=torch.arange(len(joined["means"])) >= len(still))
 
 
-def _pulses(motion: Pulses, count: int, center_s: float, slices: int) -> dict[str, Tensor]:
+def _found(
+    standing: Gaussians, motion: Pulses, around: Surroundings, room: int
+) -> list[dict[str, Tensor]] | None:
+    """What depth shows in each slice; None where one has none."""
+    count = around.settings.time_slices
+    if not around.settings.use_depth:
+        return None
+    slices = []
+    for number in range(count):
+        center_s = motion.start_s + motion.duration_s * (number + 0.5) / count
+        points = _unexplained(standing, around, center_s, max(room // count, 1))
+        if points is None:
+            return None
+        slices.append(points)
+    return slices
+
+
+def _repeated(
+    moving: dict[str, Tensor], settings: FitSettings, room: int
+) -> list[dict[str, Tensor]]:
+    """The moving Gaussians in each slice; in fewer slices, and not all, where room is short."""
+    total = len(moving["means"])
+    count = min(max(room // total, 2), settings.time_slices)
+    generator = torch.Generator().manual_seed(settings.seed)
+    slices = []
+    for _ in range(count):
+        some = torch.randperm(total, generator=generator)[: max(room // count, 1)]
+        slices.append({name: value[some] for name, value in moving.items()})
+    return slices
+
+
+def _pulses(motion: Pulses, count: int, number: int, slices: int) -> dict[str, Tensor]:
+    center_s = motion.start_s + motion.duration_s * (number + 0.5) / slices
     deviation_s = OVERLAP * motion.duration_s / slices
     return dict(motion.columns(count)) | {
         "time_centers_s": torch.full((count,), center_s),
@@ -86,8 +115,6 @@ def _unexplained(
     standing: Gaussians, around: Surroundings, time_s: float, count: int
 ) -> dict[str, Tensor] | None:
     """Points on pixels near a time that ``standing`` gets wrong; None without depth."""
-    if not around.settings.use_depth:
-        return None
     nearest_s = min(around.schedule.times_s, key=lambda other_s: abs(other_s - time_s))
     frames = around.schedule.frames_at[nearest_s]
     clouds = [_wrong_pixels(standing, around, index) for index in frames]

@@ -116,6 +116,8 @@ class FitSettings:
     )
     time_slices: int = 8
     """Native 4D: pulses that share the time range at the start."""
+    picture_memory_mb: int = 1024
+    """Pictures kept in memory; the others are read again when they are needed."""
     checkpoint_every: int = 1000
     judge_every: int = 500
 
@@ -124,6 +126,7 @@ class FitSettings:
             "fine_steps": self.fine_steps, "views_per_step": self.views_per_step,
             "points": self.points, "density.budget": self.density.budget,
             "time_slices": self.time_slices,
+            "picture_memory_mb": self.picture_memory_mb,
         }  # fmt: skip
         for name, value in counts.items():
             if value < 1:
