@@ -1,6 +1,7 @@
 """Seeding, dtypes and switches shared by all tests."""
 
 import os
+import signal
 from collections.abc import Iterator
 
 # As the command line does, and before torch is loaded: waiting threads sleep.
@@ -9,6 +10,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import jaxtyping
 import pytest
 import torch
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # Shells start background jobs deaf to interrupts; tests of interrupts would wait for ever.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True)
