@@ -31,7 +31,7 @@ def colors(first, last, listed, means, sh, position, values):
     for place in range(first, last):
         i = listed[place]
         if sh.shape[1] > 1:
-            _evaluate(triple(means, i), position, sh.shape[1], basis, slopes)
+            evaluate(triple(means, i), position, sh.shape[1], basis, slopes)
         for channel in range(3):
             values[i, channel] = max(_color(basis, sh, i, channel), 0.0)
 
@@ -44,7 +44,7 @@ def colors_backward(
     basis, slopes, turn = np.empty(16), np.empty((16, 3)), np.empty(3)
     for place in range(first, last):
         i = listed[place]
-        distance = _evaluate(triple(means, i), position, sh.shape[1], basis, slopes)
+        distance = evaluate(triple(means, i), position, sh.shape[1], basis, slopes)
         turn[:] = 0
         for channel in range(3):
             if _color(basis, sh, i, channel) >= 0:
@@ -80,7 +80,7 @@ def _turn_backward(mean, position, distance, turn, mean_grads, i, camera):
 
 
 @device
-def _evaluate(mean, position, count, basis, slopes):
+def evaluate(mean, position, count, basis, slopes):
     """Basis functions and their gradients in the direction of a mean; returns the distance."""
     basis[0] = _C0
     if count == 1:

@@ -1,0 +1,1 @@
+"""Ray tracing of Gaussians: any rays in, colours and distances out."""

@@ -1,0 +1,160 @@
+"""What rays see of Gaussians, still or moving: compiled where possible, else by brute force.
+
+Axes: ``r`` rays, ``n`` Gaussians.
+"""
+
+from collections.abc import Collection
+from dataclasses import fields
+from importlib.util import find_spec
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from diff4splat.errors import ConfigError, InputError, ShapeError
+from diff4splat.render.support import usable_gaussians
+from diff4splat.render.trace import reference
+from diff4splat.render.trace.moving import MovingCloud, usable_motion
+from diff4splat.render.trace.rays import Rays
+from diff4splat.render.trace.reference import Seen
+from diff4splat.render.trace.settings import TraceOutput, TraceSettings, require_outputs
+from diff4splat.scene.gaussians import Gaussians
+
+DEFAULTS = TraceSettings()
+BACKENDS = ("auto", "compiled", "reference")
+_MOST_GAUSSIANS = 1 << 24
+
+
+def trace(
+    gaussians: Gaussians,
+    rays: Rays,
+    *,
+    outputs: Collection[str] = ("rgb",),
+    settings: TraceSettings = DEFAULTS,
+    moving: MovingCloud | None = None,
+    backend: str = "auto",
+) -> TraceOutput:
+    """What each of ``rays`` sees; gradients reach Gaussians, motion, rays and background.
+
+    ``moving`` carries each Gaussian to the time of the ray that meets it. ``backend`` "compiled" is
+    for float32 on a CPU, "reference" for everything, "auto" the first of them that can.
+
+    Raises:
+        ConfigError: an unknown output or back end, or one that cannot do this.
+        ShapeError: dtypes or devices differ, half precision, or another number of velocities.
+        InputError: Gaussians that move, and rays without times.
+    """
+    wanted = require_outputs(outputs)
+    _require_uniform(gaussians, rays, moving)
+    look = _backend(backend, gaussians)
+    kept, dropped = _usable(gaussians, moving)
+    if dropped:
+        index = kept.nonzero().squeeze(1)
+        gaussians = gaussians.select(index)
+        moving = None if moving is None else moving.select(index)
+    existing = rays if rays.valid is None else rays.select(rays.valid.nonzero().squeeze(1))
+    with torch.autocast(rays.origins.device.type, enabled=False):
+        seen = look(gaussians, existing, settings, moving)
+        answers = _named(wanted, seen, settings)
+        if rays.valid is not None:
+            answers = {name: _scattered(value, rays.valid) for name, value in answers.items()}
+    return TraceOutput(
+        **answers, dropped_nonfinite=sum(dropped.values()), dropped_by_parameter=dropped
+    )
+
+
+def refusal(gaussians: Gaussians) -> str | None:
+    """Why the compiled tracer cannot take ``gaussians``, or None."""
+    means = gaussians.means
+    if means.device.type != "cpu":
+        return f"expected CPU tensors, got {means.device}"
+    if means.dtype != torch.float32:
+        return f"expected float32, got {means.dtype}"
+    if len(gaussians) >= _MOST_GAUSSIANS:
+        return f"expected fewer than {_MOST_GAUSSIANS} Gaussians, got {len(gaussians)}"
+    if find_spec("numba") is None:
+        return "expected the package numba, got none; install it"
+    return None
+
+
+def _backend(name: str, gaussians: Gaussians):
+    """What looks along rays.
+
+    Raises:
+        ConfigError: the name is unknown, or the compiled tracer refuses.
+    """
+    if name not in BACKENDS:
+        raise ConfigError(f"backend: expected one of {', '.join(BACKENDS)}, got {name!r}")
+    reason = refusal(gaussians) if name != "reference" else "not asked for"
+    if name == "compiled" and reason is not None:
+        raise ConfigError(f"backend 'compiled': {reason}; use backend='auto'")
+    if reason is not None:
+        return reference.look
+    # Numba is loaded with the first rays, not with the library.
+    from diff4splat.render.trace.function import look
+    from diff4splat.render.trace.warm import ensure_compiled
+
+    ensure_compiled()
+    return look
+
+
+def _require_uniform(gaussians: Gaussians, rays: Rays, moving: MovingCloud | None) -> None:
+    """One arithmetic fits everything, and what moves is seen at some time.
+
+    Raises:
+        ShapeError: it does not.
+        InputError: rays have no times.
+    """
+    tensors = [rays.origins, *(getattr(gaussians, f.name) for f in fields(gaussians))]
+    if moving is not None:
+        tensors += [moving.velocities, moving.time_centers_s, moving.time_deviations_s]
+        if len(moving) != len(gaussians):
+            raise ShapeError(
+                f"moving: expected as many as Gaussians, {len(gaussians)}, got {len(moving)}"
+            )
+        if rays.time_s is None:
+            raise InputError("rays: expected time_s, because Gaussians move, got None")
+    kinds = {(tensor.dtype, tensor.device) for tensor in tensors}
+    if len(kinds) != 1 or tensors[0].dtype not in (torch.float32, torch.float64):
+        got = ", ".join(sorted(f"{dtype} on {device}" for dtype, device in kinds))
+        raise ShapeError(
+            f"trace: expected one dtype, float32 or float64, on one device, got {got}; call .to()"
+        )
+
+
+def _usable(
+    gaussians: Gaussians, moving: MovingCloud | None
+) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
+    """Which Gaussians can be drawn, and counts of the others by their first bad parameter."""
+    kept, dropped = usable_gaussians(gaussians)
+    if moving is not None:
+        own, more = usable_motion(moving, kept)
+        kept, dropped = kept & own, dropped | more
+    return kept, dropped
+
+
+def _named(
+    wanted: frozenset[str], seen: Seen, settings: TraceSettings
+) -> dict[str, Float[Tensor, "r ..."] | Int[Tensor, " r"]]:
+    """The answers asked for."""
+    answers = {"median_distance": seen.median, "alpha": seen.weight, "hits": seen.hits}
+    if "rgb" in wanted:
+        answers["rgb"] = seen.rgb + seen.light[:, None] * _background(settings, seen.light)
+    if "distance" in wanted:
+        weight = torch.where(seen.weight > 0, seen.weight, 1.0)
+        answers["distance"] = seen.distance_sum / weight
+    return {name: answers[name] for name in wanted}
+
+
+def _background(settings: TraceSettings, like: Float[Tensor, " r"]) -> Float[Tensor, "3"]:
+    if isinstance(settings.background, Tensor):
+        return settings.background.to(like)
+    return like.new_tensor(settings.background)
+
+
+def _scattered(
+    values: Float[Tensor, "m ..."] | Int[Tensor, " m"], valid: Bool[Tensor, " r"]
+) -> Float[Tensor, "r ..."] | Int[Tensor, " r"]:
+    """Answers in the rows of the valid rays, 0 in the others."""
+    rows = values.new_zeros(len(valid), *values.shape[1:])
+    return rows.index_copy(0, valid.nonzero().squeeze(1), values)

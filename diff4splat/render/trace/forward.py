@@ -1,0 +1,109 @@
+"""The way forward: primitives → tree → packets → hits → what rays see.
+
+Every stage is spread over threads in parts whose results do not depend on which thread does them.
+"""
+
+import math
+
+import numpy as np
+
+from diff4splat.render.raster.canvas import empty
+from diff4splat.render.raster.threads import ranges, spread
+from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART, boxes_between
+from diff4splat.render.trace.leaves import gather_leaves
+from diff4splat.render.trace.packets import bundle_rays
+from diff4splat.render.trace.primitives import prepare
+from diff4splat.render.trace.settings import TraceSettings
+from diff4splat.render.trace.shade import SEEN, shade
+from diff4splat.render.trace.tables import (
+    MOVING_COLUMNS,
+    STILL_COLUMNS,
+    Cloud,
+    Floats,
+    Integers,
+    Motion,
+    Rules,
+    Sight,
+    Tree,
+    World,
+)
+from diff4splat.render.trace.tree import build
+
+PACKETS_PER_PART = 16
+_BYTES_PER_HIT, _SHARES = 12, 16
+"""A packet may use a sixteenth of the memory, whatever the threads: that says where it is cut."""
+_LEAST_EXPONENT = -125.0
+"""Smaller powers of 2 are no normal numbers in float32."""
+_LARGEST_ALPHA = 1 - 2.0**-24
+"""In float32; light is divided by 1 - alpha on the way back."""
+
+
+def make_rules(settings: TraceSettings, squared_gate: float) -> Rules:
+    """What of the settings the kernels need."""
+    drop = math.inf if settings.min_response is None else -math.log(settings.min_response)
+    quartic = settings.kernel_degree == 4
+    # Whole numbers would compile every kernel again.
+    return Rules(
+        log2_cutoff=max(math.log2(settings.alpha_cutoff), _LEAST_EXPONENT),
+        alpha_max=min(float(settings.alpha_max), _LARGEST_ALPHA),
+        dark=settings.dark,
+        near=float(settings.near_distance),
+        least_drop=drop,
+        squared_limit=math.sqrt(18 * drop) if quartic else 2 * drop,
+        squared_gate=squared_gate,
+        quartic=quartic,
+        toward_mean=settings.color_direction == "mean",
+    )
+
+
+def make_world(cloud: Cloud, motion: Motion, colors: Floats, times: Floats, rules: Rules) -> World:
+    """What rays between the earliest and the latest of ``times`` can look at."""
+    count, moves = len(cloud.means), len(motion.velocities) > 0
+    primitives = np.zeros((count, MOVING_COLUMNS if moves else STILL_COLUMNS))
+    reach = np.empty(count)
+
+    def work(first: int, last: int) -> None:
+        prepare(first, last, cloud, motion, rules, primitives, reach)
+
+    spread(work, ranges(count, PRIMITIVES_PER_PART))
+    earliest, latest = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
+    tree = build(boxes_between(primitives, reach, earliest, latest))
+    moment = 0.5 * (earliest + latest)
+    leaves = gather_leaves(tree, primitives, reach, moment)
+    return World(primitives, tree, leaves, moment, colors)
+
+
+def see(sight: Sight) -> tuple[Floats, Integers]:
+    """What every ray sees (r × 7), and how many hits that is."""
+    count = len(sight.rays.origins)
+    seen, hits = empty(count, SEEN), np.empty(count, np.int32)
+
+    def work(first: int, last: int) -> None:
+        shade(first, last, sight, seen, hits)
+
+    spread(work, ranges(len(sight.rays.starts) - 1, PACKETS_PER_PART))
+    return seen, hits
+
+
+def make_sight(
+    world: World,
+    arrays: tuple[Floats, Floats, Floats],
+    settings: TraceSettings,
+    rules: Rules,
+    bands: int,
+) -> Sight:
+    """Rays (origins, directions, times) cut into packets."""
+    return Sight(
+        world,
+        bundle_rays(*arrays, _viewed_size(world.tree, arrays[0])),
+        rules,
+        bands,
+        settings.memory_bytes // (_BYTES_PER_HIT * _SHARES),
+    )
+
+
+def _viewed_size(tree: Tree, origins: Floats) -> float:
+    """Half size of the scene, and how far away the first ray begins."""
+    corners = tree.nodes[-1:][np.isfinite(tree.nodes[-1:])]
+    away = origins[:1].astype(np.float64) - tree.anchor
+    return max(float(np.abs(corners).max(initial=0.0) + np.abs(away).max(initial=0.0)), 1e-30)

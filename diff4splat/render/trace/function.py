@@ -1,0 +1,141 @@
+"""Tracing as one differentiable operation on float32 CPU tensors.
+
+Axes: ``n`` Gaussians, ``k`` harmonics, ``r`` rays, 7 columns as in `shade`.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from torch.nn.functional import pad
+
+from diff4splat.render.raster.lanes import LANES
+from diff4splat.render.trace.backward import Gradients, gradients
+from diff4splat.render.trace.forward import make_rules, make_sight, make_world, see
+from diff4splat.render.trace.moving import MovingCloud
+from diff4splat.render.trace.rays import Rays
+from diff4splat.render.trace.reference import Seen
+from diff4splat.render.trace.settings import TraceSettings
+from diff4splat.render.trace.shade import DISTANCE, LIGHT, MEDIAN, RGB, WEIGHT
+from diff4splat.render.trace.tables import Cloud, Floats, Motion, Sight
+from diff4splat.render.trace.tint import PLAIN_COLUMNS
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.harmonics import DEGREE_ZERO
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Arrays:
+    """The inputs as kernels read them."""
+
+    cloud: Cloud
+    sh: Tensor
+    motion: Motion
+    origins: Floats
+    directions: Floats
+    times: Floats
+
+
+def look(
+    gaussians: Gaussians, rays: Rays, settings: TraceSettings, moving: MovingCloud | None
+) -> Seen:
+    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable."""
+    means = gaussians.means
+    motion = (means.new_empty(0, 3), means.new_empty(0), means.new_empty(0))
+    times, gate = means.new_empty(0), None
+    if moving is not None and rays.time_s is not None:
+        motion = moving.velocities, moving.time_centers_s, moving.time_deviations_s
+        times, gate = rays.time_s, moving.gate_reach**2
+    table, hits = _Trace.apply(
+        settings,
+        gate,
+        *(means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh),
+        *motion,
+        *(rays.origins, rays.directions, times),
+    )
+    return Seen(
+        rgb=table[:, RGB : RGB + 3],
+        distance_sum=table[:, DISTANCE],
+        weight=table[:, WEIGHT],
+        light=table[:, LIGHT],
+        median=table[:, MEDIAN],
+        hits=hits,
+    )
+
+
+class _Trace(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any, settings: TraceSettings, squared_gate: float | None, *tensors: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        sight = _sight(_unpack(tensors), settings, squared_gate)
+        seen, hits = see(sight)
+        if any(ctx.needs_input_grad):
+            ctx.save_for_backward(*tensors)
+            ctx.sight, ctx.memory_bytes = sight, settings.memory_bytes
+        counts = torch.from_numpy(hits).long()
+        ctx.mark_non_differentiable(counts)
+        return torch.from_numpy(seen), counts
+
+    @staticmethod
+    def backward(ctx: Any, table: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:
+        if torch.is_grad_enabled():
+            raise RuntimeError(
+                "trace: expected create_graph=False, got True; use backend='reference' to "
+                "differentiate twice"
+            )
+        own = _unpack(ctx.saved_tensors)
+        made = gradients(
+            ctx.sight, own.cloud, own.motion, table.contiguous().numpy(), ctx.memory_bytes
+        )
+        to_rays = torch.from_numpy(made.rays)
+        return (
+            None,
+            None,
+            *map(torch.from_numpy, made.cloud),
+            _sh_gradient(own.sh, made),
+            *map(torch.from_numpy, made.motion),
+            to_rays[:, :3],
+            to_rays[:, 3:6],
+            to_rays[:, 6] if len(own.times) else None,
+        )
+
+
+def _unpack(tensors: tuple[Tensor, ...]) -> _Arrays:
+    plain = [tensor.detach().contiguous() for tensor in tensors]
+    arrays: list[np.ndarray] = [tensor.numpy() for tensor in plain]
+    return _Arrays(
+        cloud=Cloud(*arrays[:4]),
+        sh=plain[4],
+        motion=Motion(*arrays[5:8]),
+        origins=arrays[8],
+        directions=arrays[9],
+        times=arrays[10],
+    )
+
+
+def _sight(own: _Arrays, settings: TraceSettings, squared_gate: float | None) -> Sight:
+    rules = make_rules(settings, np.inf if squared_gate is None else squared_gate)
+    world = make_world(own.cloud, own.motion, _color_table(own.sh), own.times, rules)
+    return make_sight(
+        world, (own.origins, own.directions, own.times), settings, rules, own.sh.shape[1]
+    )
+
+
+def _color_table(sh: Float[Tensor, "n k 3"]) -> Floats:
+    """Plain colours, or sixteen coefficients of a channel side by side."""
+    if sh.shape[1] == 1:
+        return pad(_plain_colors(sh), (0, PLAIN_COLUMNS - 3)).flatten().numpy()
+    return pad(sh.mT, (0, LANES - sh.shape[1])).flatten().numpy()
+
+
+def _plain_colors(sh: Float[Tensor, "n 1 3"]) -> Float[Tensor, "n 3"]:
+    return 0.5 + DEGREE_ZERO * sh[:, 0]
+
+
+def _sh_gradient(sh: Float[Tensor, "n k 3"], made: Gradients) -> Float[Tensor, "n k 3"]:
+    if sh.shape[1] == 1:
+        return (DEGREE_ZERO * torch.from_numpy(made.plain_colors)).to(sh)[:, None]
+    return torch.from_numpy(made.lobes).view(-1, 3, LANES)[..., : sh.shape[1]].mT.contiguous()

@@ -1,0 +1,76 @@
+"""Kernel: what of a primitive sixteen lanes ask before it is a candidate of a packet.
+
+Groups are as in the tree. A primitive lies behind a plane with normal n where n · (mean - origin)
+exceeds |reach · S Rᵀ n|: the exact extent of the ellipsoid along n.
+"""
+
+import numpy as np
+
+from diff4splat.render.raster.canvas import empty
+from diff4splat.render.raster.jit import exact
+from diff4splat.render.raster.lanes import LANES
+from diff4splat.render.raster.threads import ranges, spread
+from diff4splat.render.trace.compiled import kernel
+from diff4splat.render.trace.tables import (
+    CENTER,
+    LEAF_AXES,
+    LEAF_MEAN,
+    LEAF_SLACK,
+    LEAF_VELOCITY,
+    MEAN,
+    MOVING_ROWS,
+    SPREAD,
+    STILL_ROWS,
+    VELOCITY,
+    WHITEN,
+    Doubles,
+    Floats,
+    Tree,
+)
+from diff4splat.render.trace.tree import ROOM
+
+_GROUPS_PER_PART = 256
+
+
+def gather_leaves(tree: Tree, primitives: Doubles, reach: Doubles, moment: float) -> Floats:
+    """The primitives of ``tree``, group by group, with means at the time ``moment``."""
+    groups = -(-len(tree.order) // LANES)
+    rows = MOVING_ROWS if primitives.shape[1] > VELOCITY else STILL_ROWS
+    leaves = empty(groups, rows, LANES)
+
+    def work(first: int, last: int) -> None:
+        fill_leaves(first, last, tree, primitives, reach, moment, leaves)
+
+    spread(work, ranges(groups, _GROUPS_PER_PART))
+    return leaves
+
+
+@kernel
+def fill_leaves(first, last, tree, primitives, reach, moment, leaves):
+    """Fill groups ``first`` to ``last``; behind the last primitive there is none that is met."""
+    for group in range(first, last):
+        for lane in range(LANES):
+            if group * LANES + lane < len(tree.order):
+                _fill(leaves, group, lane, tree, primitives, reach, moment)
+            else:
+                leaves[group, :, lane] = np.nan
+
+
+@exact
+def _fill(leaves, group, lane, tree, primitives, reach, moment):
+    i = tree.order[group * LANES + lane]
+    size, largest = 0.0, 0.0
+    for axis in range(3):
+        mean = primitives[i, MEAN + axis] - tree.anchor[axis]
+        if primitives.shape[1] > VELOCITY:
+            velocity = primitives[i, VELOCITY + axis]
+            mean += velocity * (moment - primitives[i, CENTER])
+            leaves[group, LEAF_VELOCITY + axis, lane] = velocity
+        leaves[group, LEAF_MEAN + axis, lane] = mean
+        size += abs(mean)
+        scale = primitives[i, SPREAD + axis]
+        largest = max(largest, scale)
+        for column in range(3):
+            turned = primitives[i, WHITEN + 3 * axis + column] * scale
+            leaves[group, LEAF_AXES + 3 * axis + column, lane] = reach[i] * scale * turned
+    leaves[group, LEAF_SLACK, lane] = ROOM * (size + reach[i] * largest)

@@ -1,0 +1,130 @@
+"""What can be asked of the tracer, and what it answers.
+
+Axes: ``r`` rays. With D the distance of a ray from a mean in standard deviations, the response is
+exp(-D² / 2) for kernel degree 2 and exp(-D⁴ / 18) for degree 4: both are exp(-4.5) at D = 3
+(3D Gaussian Ray Tracing, SIGGRAPH Asia 2024).
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Literal
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.errors import ConfigError
+
+OUTPUTS = ("rgb", "distance", "median_distance", "alpha", "hits")
+"""Everything that the tracer can answer per ray."""
+KERNEL_DEGREES = (2, 4)
+_LEAST_MEMORY, _LEAST_LIGHT = 1 << 20, 1e-30
+_DARK_ROOM = 1 + 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraceSettings:
+    """How rays see Gaussians. Scenes that were fitted with other numbers look different."""
+
+    kernel_degree: int = 2
+    """2 for Gaussians, which rasterisers draw too; 4 for the flatter ones of 3DGRT."""
+    alpha_cutoff: float = 1 / 255
+    """Contributions to a ray below this are nothing; it also bounds the support."""
+    alpha_max: float = 0.99
+    """Largest opacity of one contribution; below 1 so that the light behind has a gradient."""
+    light_cutoff: float = 1e-4
+    """A ray that sees no more than this of what lies behind is done; (1 - alpha_max)² ends it
+    behind two opaque Gaussians."""
+    near_distance: float = 0.01
+    """A Gaussian whose response peaks no further from the origin than this is not there."""
+    min_response: float | None = None
+    """Smaller responses are nothing whatever the opacity; None is no such rule."""
+    color_direction: Literal["ray", "mean"] = "ray"
+    """Harmonics are seen along the ray (3DGRT), or from its origin to the mean (as by the
+    rasteriser)."""
+    background: tuple[float, float, float] | Float[Tensor, "3"] = (0.0, 0.0, 0.0)
+    """RGB behind the scene; a tensor gets a gradient."""
+    memory_bytes: int = 256 << 20
+    """What tracing may allocate beyond inputs, outputs, search tree and gradients."""
+
+    def __post_init__(self) -> None:
+        accepted = {
+            "kernel_degree": self.kernel_degree in KERNEL_DEGREES,
+            "alpha_cutoff": 0 < self.alpha_cutoff < 1,
+            "alpha_max": self.alpha_cutoff < self.alpha_max < 1,
+            "light_cutoff": _LEAST_LIGHT <= self.light_cutoff < 1,
+            "near_distance": 0 <= self.near_distance < math.inf,
+            "min_response": self.min_response is None or 0 < self.min_response < 1,
+            "color_direction": self.color_direction in ("ray", "mean"),
+            "background": _is_finite_rgb(self.background),
+            "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
+        }
+        for name, fine in accepted.items():
+            if not fine:
+                raise ConfigError(
+                    f"TraceSettings.{name}: expected {_EXPECTED[name]}, got {getattr(self, name)}"
+                )
+
+    @property
+    def dark(self) -> float:
+        """Light below this is none: a shade above the cutoff, so that rounding decides no pair."""
+        return self.light_cutoff * _DARK_ROOM
+
+    @classmethod
+    def preset_3dgrt(cls) -> "TraceSettings":
+        """The defaults that 3D Gaussian Ray Tracing trains with."""
+        return cls(kernel_degree=4, min_response=0.0113, light_cutoff=1e-3)
+
+
+def _is_finite_rgb(background: tuple[float, ...] | Tensor) -> bool:
+    if isinstance(background, Tensor):
+        return background.shape == (3,) and bool(torch.isfinite(background.detach()).all())
+    return len(background) == 3 and all(map(math.isfinite, background))
+
+
+_EXPECTED = {
+    "kernel_degree": "2 or 4",
+    "alpha_cutoff": "a number above 0 and below 1",
+    "alpha_max": "a number above alpha_cutoff and below 1",
+    "light_cutoff": f"at least {_LEAST_LIGHT} and below 1",
+    "near_distance": "a finite number of at least 0",
+    "min_response": "None or a number above 0 and below 1",
+    "color_direction": "'ray' or 'mean'",
+    "background": "three finite numbers",
+    "memory_bytes": f"at least {_LEAST_MEMORY}",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraceOutput:
+    """What was asked for, None for the rest. Rays that are not valid have 0 everywhere."""
+
+    rgb: Float[Tensor, "r 3"] | None = None
+    distance: Float[Tensor, " r"] | None = None
+    """Expected distance along the ray, Σ w τ / Σ w; 0 where nothing is seen."""
+    median_distance: Float[Tensor, " r"] | None = None
+    """τ of the Gaussian behind which at most half of the light is left; 0 where more is left."""
+    alpha: Float[Tensor, " r"] | None = None
+    """Σ w"""
+    hits: Int[Tensor, " r"] | None = None
+    """How many Gaussians were blended before the light ran out."""
+    dropped_nonfinite: int = 0
+    """Gaussians left out because a parameter is NaN, infinite, or too large to be squared."""
+    dropped_by_parameter: dict[str, int] = field(default_factory=dict)
+    """The same, by the first such parameter."""
+
+
+def require_outputs(outputs: Collection[str]) -> frozenset[str]:
+    """The set of ``outputs`` when all of them are known.
+
+    Raises:
+        ConfigError: none is named, or a name is unknown.
+    """
+    known = ", ".join(OUTPUTS)
+    if isinstance(outputs, str) or not outputs:
+        raise ConfigError(f"outputs: expected a collection of names among {known}, got {outputs!r}")
+    unknown = sorted(set(outputs) - set(OUTPUTS))
+    if unknown:
+        raise ConfigError(f"outputs: expected names among {known}, got {', '.join(unknown)}")
+    return frozenset(outputs)

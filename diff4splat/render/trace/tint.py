@@ -1,0 +1,113 @@
+"""The colour of a primitive as one ray sees it: 0.5 + Σ_k sh_k Y_k(direction).
+
+Sixteen coefficients of a channel lie side by side, so one channel is one product of lanes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from diff4splat.render.raster.harmonics import evaluate as evaluate_harmonics
+from diff4splat.render.raster.jit import exact
+from diff4splat.render.raster.lanes import LANES, total
+from diff4splat.render.raster.memory import aligned_floats
+from diff4splat.render.trace.tables import CENTER, MEAN, MOVING_COLUMNS, VELOCITY, Doubles, Floats
+from diff4splat.render.trace.vectors import address, double_at, float_at, lanes_at
+
+PLAIN_COLUMNS = 4
+"""Columns of a table of plain colours."""
+
+
+class Brush(NamedTuple):
+    """Memory for the harmonics in one direction."""
+
+    basis: Floats
+    """Sixteen lanes, zeros behind the bands there are."""
+    values: Doubles
+    slopes: Doubles
+    """Gradients of the values in the direction (16 × 3)."""
+
+
+class Tint(NamedTuple):
+    """Addresses of what colours are made of."""
+
+    colors: int
+    table: int
+    columns: int
+    origins: int
+    directions: int
+    times: int
+    basis: int
+    bands: int
+    toward_mean: bool
+    brush: Brush
+
+
+@exact
+def begin_tint():
+    """Memory for one thread."""
+    basis = aligned_floats(LANES)
+    basis[:] = 0
+    return Brush(basis, np.zeros(16), np.zeros((16, 3)))
+
+
+@exact
+def tint_of(sight, brush):
+    """How the rays of ``sight`` see its world."""
+    world, rays = sight.world, sight.rays
+    return Tint(
+        address(world.colors),
+        address(world.primitives),
+        world.primitives.shape[1],
+        address(rays.origins),
+        address(rays.directions),
+        address(rays.times),
+        address(brush.basis),
+        sight.bands,
+        sight.rules.toward_mean and sight.bands > 1,
+        brush,
+    )
+
+
+@exact
+def turn(tint, i, ray):
+    """Evaluate the harmonics for primitive ``i`` seen by ``ray``."""
+    if tint.bands > 1:
+        direction = toward(tint, i, ray) if tint.toward_mean else triple_at(tint.directions, ray)
+        values = tint.brush.values
+        evaluate_harmonics(direction, (0.0, 0.0, 0.0), tint.bands, values, tint.brush.slopes)
+        for k in range(tint.bands):
+            tint.brush.basis[k] = values[k]
+
+
+@exact
+def toward(tint, i, ray):
+    """From the origin of a ray to a mean at the ray's time; not of unit length."""
+    x, y, z = triple_at(tint.origins, ray)
+    row = tint.table + 8 * tint.columns * i
+    x, y, z = double_at(row, MEAN) - x, double_at(row, MEAN + 1) - y, double_at(row, MEAN + 2) - z
+    if tint.columns == MOVING_COLUMNS:
+        since = np.float64(float_at(tint.times, ray)) - double_at(row, CENTER)
+        x += since * double_at(row, VELOCITY)
+        y += since * double_at(row, VELOCITY + 1)
+        z += since * double_at(row, VELOCITY + 2)
+    return x, y, z
+
+
+@exact
+def triple_at(place, row):
+    """Three float32 of a row, in float64."""
+    return (
+        np.float64(float_at(place, 3 * row)),
+        np.float64(float_at(place, 3 * row + 1)),
+        np.float64(float_at(place, 3 * row + 2)),
+    )
+
+
+@exact
+def color(tint, i, channel):
+    """One channel of a primitive before it is held above 0."""
+    if tint.bands == 1:
+        return np.float64(float_at(tint.colors, i * PLAIN_COLUMNS + channel))
+    row = lanes_at(tint.colors, (i * 3 + channel) * LANES)
+    return 0.5 + np.float64(total(row * lanes_at(tint.basis, 0)))
