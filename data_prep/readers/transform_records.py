@@ -24,11 +24,11 @@ from diff4splat.paths.formats.json_fields import (
     FrameRecord,
     frame_records,
     kind_of,
-    number_list,
     optional_number,
     picture_size,
 )
 from diff4splat.paths.formats.pinhole_fields import pinhole_px
+from diff4splat.paths.formats.transforms_json import pose_matrix
 
 _FOCAL_KEYS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
 _BENT = ("k1", "k2", "k3", "p1", "p2")
@@ -60,7 +60,7 @@ def poses_of(frames: list[FrameRecord], file: Path) -> Float[Tensor, "f 4 4"]:
     Raises:
         FileFormatError: a matrix is missing, not finite, or no rotation and translation.
     """
-    matrices = torch.tensor([_matrix(frame) for frame in frames], dtype=torch.float64)
+    matrices = torch.tensor([pose_matrix(frame) for frame in frames], dtype=torch.float64)
     exact = exact_poses(matrices, [frame.label for frame in frames], str(file))
     return swap_opengl_opencv(exact)
 
@@ -122,12 +122,3 @@ def lens_of(frame: FrameRecord, picture_px: tuple[int, int]) -> Lens:
         radial=(k1, k2, k3),
         tangential=(p1, p2),
     )
-
-
-def _matrix(frame: FrameRecord) -> list[list[float]]:
-    where = f"{frame.where}: 'transform_matrix'"
-    rows = frame.fields.get("transform_matrix")
-    if not isinstance(rows, list) or len(rows) != 4:
-        got = f"{len(rows)} rows" if isinstance(rows, list) else "none"
-        raise FileFormatError(f"{where}: expected 4 rows of 4 numbers, got {got}; repair the file")
-    return [number_list(row, 4, where) for row in rows]

@@ -122,11 +122,14 @@ class _Fit:
             standing = None
         if self.settings.motion != "static":
             loop = self._fine(standing, loop.model if loop else None)
-            for share in self.settings.stillness.checks:
+            checks = self.settings.stillness.checks
+            for share in sorted({*checks, 1.0}):
                 if loop.progress > share:
                     continue
                 if not self._run(loop, round(share * loop.course.steps)):
                     return self._result(loop, finished=False)
+                if share not in checks:
+                    continue
                 taken = take_out_still(loop.model, self.capture, self.settings, loop.degree)
                 if taken is not None:
                     self.omissions.add(taken)

@@ -131,6 +131,11 @@ class FitSettings:
         for name, value in counts.items():
             if value < 1:
                 raise ConfigError(f"{name}: expected at least 1, got {value}")
+        checks = self.stillness.checks
+        if not all(0 < share <= 1 for share in checks):
+            raise ConfigError(
+                f"stillness.checks: expected shares above 0 and up to 1, got {checks}"
+            )
         if self.coarse_steps < 0 or not 0 <= self.harmonics <= 3:
             raise ConfigError(
                 "coarse_steps and harmonics: expected at least 0 and 0 to 3, got "

@@ -1,5 +1,6 @@
 """One stage of a fit: steps, more and fewer Gaussians, judgements and checkpoints."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -114,11 +115,11 @@ class StageLoop:
         time_s, frames = course.schedule.frames(number)
         loss, state = course.objective.loss(self.model, time_s, frames, self.degree)
         self._loss = float(loss.detach())
-        if not self.guard.accepts(self._loss):
-            return
-        loss.backward()
-        if not self._gradients_finite():
-            self.guard.accepts(float("nan"))
+        finite = math.isfinite(self._loss)
+        if finite:
+            loss.backward()
+            finite = self._gradients_finite()
+        if not self.guard.accepts(self._loss if finite else math.nan):
             self.model.table.optimizer.zero_grad(set_to_none=True)
             return
         self.pull.add(state, course.objective.capture.cameras[torch.tensor(frames)])

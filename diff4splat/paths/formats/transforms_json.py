@@ -42,7 +42,7 @@ def parse(text: str, source: PathSource) -> CameraPath:
     root = load_object(text, source.name)
     frames = frame_records(root, "frames", source.name)
     labels = [frame.label for frame in frames]
-    matrices = torch.tensor([_matrix(frame) for frame in frames], dtype=torch.float64)
+    matrices = torch.tensor([pose_matrix(frame) for frame in frames], dtype=torch.float64)
     poses = swap_opengl_opencv(exact_poses(matrices, labels, source.name))
     times_s = number_for_all(frames, "time", source.name)
     if times_s is None:
@@ -71,7 +71,12 @@ def dump(path: CameraPath) -> str:
     return json.dumps(root, indent=1) + "\n"
 
 
-def _matrix(frame: FrameRecord) -> list[list[float]]:
+def pose_matrix(frame: FrameRecord) -> list[list[float]]:
+    """The four rows of ``transform_matrix``.
+
+    Raises:
+        FileFormatError: naming the frame.
+    """
     where = f"{frame.where}: 'transform_matrix'"
     value = frame.fields.get("transform_matrix")
     if not isinstance(value, list) or len(value) != 4:

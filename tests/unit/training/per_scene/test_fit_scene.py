@@ -120,6 +120,21 @@ def test_divergence_keeps_the_last_good_state(tmp_path: Path, monkeypatch):
     assert all(bool(torch.isfinite(value).all()) for value in kept.tensors.values())
 
 
+def test_gradients_that_stay_broken_end_the_fit_too(tmp_path: Path, monkeypatch):
+    from diff4splat.training.per_scene.stage_loop import StageLoop
+
+    monkeypatch.setattr(StageLoop, "_gradients_finite", lambda self: False)
+    with pytest.raises(DivergenceError, match="steps in a row"):
+        fit_scene(run(tmp_path, coarse_steps=40))
+
+
+def test_without_checks_for_stillness_the_fine_stage_still_runs(tmp_path: Path):
+    without = replace(SETTINGS.stillness, checks=())
+    fit_scene(run(tmp_path, coarse_steps=5, fine_steps=20, judge_every=20, stillness=without))
+    log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert [(line["stage"], line["step"]) for line in log] == [("fine", 20)]
+
+
 def test_a_few_broken_pictures_cost_their_steps_only(tmp_path: Path):
     capture = ball_capture()
     capture.frames.shown[0].rgb[3, 3] = float("nan")
