@@ -9,10 +9,11 @@ import re
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diff4splat.cli import installation, worlds
+from diff4splat.cli import fields, installation, worlds
 from diff4splat.errors import Diff4SplatError
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ EXTRAS = (
 )
 """(package, what it is for, how to add it)."""
 _WIDTH = 20
+TRACER, FIELDS = "renderer trace", "hexplane fields"
 
 Rows = Iterable[tuple[str, str]]
 
@@ -33,7 +35,7 @@ class Doctor:
     """Check the installation: versions, back ends, extras, and that a picture comes out right."""
 
     warm: bool = False
-    """Only compile, which otherwise happens before the first picture and the first world."""
+    """Only compile, which otherwise happens before the first picture, rays, field and world."""
 
     def run(self) -> None:
         """Print the table, or compile."""
@@ -45,27 +47,31 @@ class Doctor:
         installation.load_libraries()
         print_rows(torch_rows())
         print_rows(backend_rows())
-        print_rows([("worlds", worlds.readiness())])
+        print_rows(compiled_rows())
         print_rows(extra_rows())
         print_rows([("self-test", installation.self_test())])
 
 
 def warm_up() -> None:
-    """Compile what draws worlds and the CPU renderer, and say how long each took and where it lies.
+    """Compile all that has kernels, and say how long each took and where it lies.
 
     Raises:
         Diff4SplatError: the renderer cannot run here.
     """
-    from diff4splat.cli.renderer import COMPILED, compile_renderer
+    from diff4splat.cli.renderer import COMPILED, compile_ahead, compile_renderer
     from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS as DRAWING
     from diff4splat.data_prep.synthetic.drawing.warm import compile_drawing
     from diff4splat.render.raster.jit import KERNELS
+    from diff4splat.render.trace import warm as tracer
+    from diff4splat.render.trace.compiled import KERNELS as TRACING
 
     warm_one("worlds", compile_drawing, DRAWING)
+    warm_one(FIELDS, partial(compile_ahead, fields), fields.kernels())
     reason = installation.refusal(COMPILED, "cpu")
     if reason is not None:
         raise Diff4SplatError(f"renderer {COMPILED}: {reason}")
     warm_one(f"renderer {COMPILED}", compile_renderer, KERNELS)
+    warm_one(TRACER, partial(compile_ahead, tracer), TRACING)
 
 
 def warm_one(
@@ -135,6 +141,13 @@ def backend_rows() -> Rows:
             reason = installation.refusal(name, device)
             state = installation.readiness(name) if reason is None else f"refuses: {reason}"
             yield f"renderer {name}", state if len(devices) == 1 else f"{device}: {state}"
+
+
+def compiled_rows() -> Rows:
+    """What else has kernels to compile."""
+    yield TRACER, installation.tracer_readiness()
+    yield FIELDS, installation.compiled_or_not(fields.is_ready(), fields.COMPILE_S)
+    yield "worlds", worlds.readiness()
 
 
 def extra_rows() -> Rows:

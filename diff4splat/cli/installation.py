@@ -11,10 +11,13 @@ if TYPE_CHECKING:
 
 COMPILE_S = 20
 """Seconds that compiling the CPU renderer takes on a laptop."""
+COMPILE_TRACER_S = 40
+"""The same of the ray tracer."""
 LIBRARIES = (
     "diff4splat.models.pipeline",
     "diff4splat.report.scene_folder",
     "diff4splat.render.raster.warm",
+    "diff4splat.render.trace.warm",
 )
 """Modules that load every library a command needs."""
 TOLERANCE = 1e-4
@@ -75,9 +78,25 @@ def readiness(backend: str) -> str:
     """Whether a picture can be had at once."""
     from diff4splat.cli.renderer import COMPILED, is_compiled
 
-    if backend == COMPILED and not is_compiled():
-        return f"will compile on first use (about {COMPILE_S} s); now: diff4splat doctor --warm"
-    return "ready"
+    return compiled_or_not(backend != COMPILED or is_compiled(), COMPILE_S)
+
+
+def compiled_or_not(ready: bool, seconds: int) -> str:
+    """What is said of kernels that take so many seconds to compile."""
+    if ready:
+        return "ready"
+    return f"will compile on first use (about {seconds} s); now: diff4splat doctor --warm"
+
+
+def tracer_readiness() -> str:
+    """Whether rays can be traced at once, or at all."""
+    from diff4splat.render.trace.support import refusal as tracer_refusal
+
+    if (reason := tracer_refusal(speck("cpu"))) is not None:
+        return f"refuses: {reason}"
+    from diff4splat.render.trace import warm
+
+    return compiled_or_not(warm.is_ready(), COMPILE_TRACER_S)
 
 
 def self_test() -> str:

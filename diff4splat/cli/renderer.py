@@ -1,6 +1,7 @@
 """The renderer as commands see it: compiled before it is needed, and asked what it left out."""
 
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,6 +34,11 @@ def compile_renderer(phases: "Phases") -> tuple[str, ...]:
     """Load or compile every kernel with a progress bar; returns the names of the compiled ones."""
     from diff4splat.render.raster import warm
 
+    return compile_ahead(warm, phases)
+
+
+def compile_ahead(warm: ModuleType, phases: "Phases") -> tuple[str, ...]:
+    """The same with any module that has ``kernel_count`` and ``warm``."""
     compiled = []
     with phases.phase("compile", warm.kernel_count()) as advance:
 

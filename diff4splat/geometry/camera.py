@@ -1,7 +1,8 @@
 """Pinhole cameras: intrinsics in pixels of a stated size, plus a pose.
 
 Axes: ``*b`` batch (none for one camera, ``t`` for a path). Pixel (row i, column j) has its centre
-at (x, y) = (j + 0.5, i + 0.5). In OpenCV camera axes: u = f_x x/z + c_x, v = f_y y/z + c_y.
+at (x, y) = (j + 0.5, i + 0.5). In OpenCV camera axes: u = f_x x/z + c_x, v = f_y y/z + c_y. Behind
+another lens than a pinhole, focal lengths are pixels per unit of that lens's image plane.
 """
 
 import math

@@ -55,7 +55,7 @@ class RenderSettings:
 
     def __post_init__(self) -> None:
         accepted = {
-            "background": _is_finite_rgb(self.background),
+            "background": is_finite_rgb(self.background),
             "dilation_px2": 0 <= self.dilation_px2 < math.inf,
             "alpha_cutoff": 0 < self.alpha_cutoff < 1,
             "alpha_max": self.alpha_cutoff < self.alpha_max < 1,
@@ -65,14 +65,25 @@ class RenderSettings:
             "tile_px": self.tile_px is None or self.tile_px >= 1,
             "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
         }
-        for name, fine in accepted.items():
-            if not fine:
-                raise ConfigError(
-                    f"RenderSettings.{name}: expected {_EXPECTED[name]}, got {getattr(self, name)}"
-                )
+        require_accepted(self, accepted, _EXPECTED)
 
 
-def _is_finite_rgb(background: tuple[float, ...] | Tensor) -> bool:
+def require_accepted(settings: object, accepted: dict[str, bool], expected: dict[str, str]) -> None:
+    """Every field of ``settings`` is ``accepted``.
+
+    Raises:
+        ConfigError: one is not; ``expected`` says what it should be.
+    """
+    for name, fine in accepted.items():
+        if not fine:
+            raise ConfigError(
+                f"{type(settings).__name__}.{name}: expected {expected[name]}, "
+                f"got {getattr(settings, name)}"
+            )
+
+
+def is_finite_rgb(background: tuple[float, ...] | Tensor) -> bool:
+    """Whether a background is three finite numbers."""
     if isinstance(background, Tensor):
         return background.shape == (3,) and bool(torch.isfinite(background.detach()).all())
     return len(background) == 3 and all(map(math.isfinite, background))
@@ -123,18 +134,18 @@ class RenderJob:
     flow_camera: Camera
 
 
-def require_outputs(outputs: Collection[str]) -> frozenset[str]:
-    """The set of ``outputs`` when all of them are known.
+def require_outputs(outputs: Collection[str], known: Collection[str] = OUTPUTS) -> frozenset[str]:
+    """The set of ``outputs`` when all of them are ``known``.
 
     Raises:
         ConfigError: none is named, or a name is unknown.
     """
-    known = ", ".join(OUTPUTS)
+    names = ", ".join(known)
     if isinstance(outputs, str) or not outputs:
-        raise ConfigError(f"outputs: expected a collection of names among {known}, got {outputs!r}")
-    unknown = sorted(set(outputs) - set(OUTPUTS))
+        raise ConfigError(f"outputs: expected a collection of names among {names}, got {outputs!r}")
+    unknown = sorted(set(outputs) - set(known))
     if unknown:
-        raise ConfigError(f"outputs: expected names among {known}, got {', '.join(unknown)}")
+        raise ConfigError(f"outputs: expected names among {names}, got {', '.join(unknown)}")
     return frozenset(outputs)
 
 

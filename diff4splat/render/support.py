@@ -70,11 +70,22 @@ def usable_gaussians(gaussians: Gaussians) -> tuple[Bool[Tensor, " n"], dict[str
     dropped = {}
     for field in fields(gaussians):
         values = getattr(gaussians, field.name)[:, None].flatten(1)
+        if _all_below(values, largest):
+            continue
         fine = usable & (values.abs() < largest).all(1)
         if count := int(usable.sum() - fine.sum()):
             dropped[field.name] = count
         usable = fine
     return usable, dropped
+
+
+def _all_below(values: Float[Tensor, "n c"], largest: float) -> bool:
+    """Whether all are finite and can be squared: one pass, which is nearly always enough."""
+    if values.numel() == 0:
+        return True
+    low, high = torch.aminmax(values)
+    # Both comparisons fail for NaN.
+    return bool((high < largest) & (low > -largest))
 
 
 def _thin_axis_px(prints: Footprints) -> Float[Tensor, " n"]:

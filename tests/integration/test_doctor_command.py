@@ -13,7 +13,7 @@ import pytest
 import torch
 from PIL import Image
 
-from diff4splat.cli import doctor, installation, worlds
+from diff4splat.cli import doctor, fields, installation, worlds
 from diff4splat.cli.console import ConsolePhases
 from diff4splat.cli.main import run
 from diff4splat.data_prep.synthetic.drawing import warm as drawing
@@ -23,6 +23,8 @@ from diff4splat.io.scene_file import save_scene
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.backends import BACKENDS
 from diff4splat.render.raster import backend, warm
+from diff4splat.render.trace import support
+from diff4splat.render.trace import warm as tracer
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
@@ -30,8 +32,11 @@ from diff4splat.training.recipe import SourceSettings
 
 KERNELS = ("project", "blend")
 DRAWING = ("shade", "hide", "read")
+TRACING = ("prepare", "shade", "rewind", "finish")
+FIELDS = ("read", "accumulate")
+OTHERS = {"worlds", "renderer trace", "hexplane fields"}
 ALL_ROWS = {
-    "diff4splat", "python", "platform", "cpu", "memory", "torch", "cuda", "worlds", "self-test",
+    "diff4splat", "python", "platform", "cpu", "memory", "torch", "cuda", "self-test", *OTHERS,
 }  # fmt: skip
 
 
@@ -51,6 +56,18 @@ def cold(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def cold_drawing(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The same of what draws worlds."""
     return not_compiled(monkeypatch, drawing, DRAWING)
+
+
+@pytest.fixture
+def cold_tracer(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The same of the ray tracer."""
+    return not_compiled(monkeypatch, tracer, TRACING)
+
+
+@pytest.fixture
+def cold_fields(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The same of HexPlane fields."""
+    return not_compiled(monkeypatch, fields, FIELDS)
 
 
 def not_compiled(
@@ -112,13 +129,23 @@ def test_a_healthy_installation(capsys: pytest.CaptureFixture) -> None:
 
 
 def test_what_is_not_compiled_is_said_and_not_compiled(
-    cold: list[str], cold_drawing: list[str], capsys: pytest.CaptureFixture
+    cold: list[str],
+    cold_drawing: list[str],
+    cold_tracer: list[str],
+    cold_fields: list[str],
+    capsys: pytest.CaptureFixture,
 ) -> None:
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
-    assert f"will compile on first use (about {worlds.COMPILE_S} s)" in table["worlds"]
-    assert "doctor --warm" in table["worlds"]
-    assert cold_drawing == []
+    seconds = {
+        "worlds": worlds.COMPILE_S,
+        "renderer trace": installation.COMPILE_TRACER_S,
+        "hexplane fields": fields.COMPILE_S,
+    }
+    for name, value in seconds.items():
+        assert f"will compile on first use (about {value} s)" in table[name]
+        assert "doctor --warm" in table[name]
+    assert cold_drawing == cold_tracer == cold_fields == []
     assert (
         f"will compile on first use (about {installation.COMPILE_S} s)" in table["renderer raster"]
     )
@@ -204,28 +231,54 @@ def test_a_package_that_is_missing_comes_with_its_pip_line(
 
 
 def test_warm_compiles_once(
-    cold: list[str], cold_drawing: list[str], capsys: pytest.CaptureFixture
+    cold: list[str],
+    cold_drawing: list[str],
+    cold_tracer: list[str],
+    cold_fields: list[str],
+    capsys: pytest.CaptureFixture,
 ) -> None:
     assert run(["doctor", "--warm"]) == 0
     shown = capsys.readouterr()
     assert "renderer raster: compiled 2 kernels in" in shown.err
     assert "worlds: compiled 3 kernels in" in shown.err
+    assert "renderer trace: compiled 4 kernels in" in shown.err
+    assert "hexplane fields: compiled 2 kernels in" in shown.err
+    assert shown.err.count("compile   ") == 4
     assert shown.out == ""
     assert cold == list(KERNELS)
     assert cold_drawing == list(DRAWING)
+    assert cold_tracer == list(TRACING)
+    assert cold_fields == list(FIELDS)
     assert run(["doctor"]) == 0
-    assert rows(capsys.readouterr().out)["worlds"] == "ready"
+    table = rows(capsys.readouterr().out)
+    assert {table[name] for name in OTHERS} == {"ready"}
 
 
 def test_warm_says_when_there_was_nothing_to_do(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr(warm, "warm", lambda advance: 0.1)
-    monkeypatch.setattr(drawing, "warm", lambda advance: 0.1)
+    for module in (warm, drawing, tracer, fields):
+        monkeypatch.setattr(module, "warm", lambda advance: 0.1)
     assert run(["doctor", "--warm"]) == 0
     shown = capsys.readouterr().err
-    assert "renderer raster: was already compiled; loaded in" in shown
-    assert "worlds: was already compiled; loaded in" in shown
+    for name in ("renderer raster", *OTHERS):
+        assert f"{name}: was already compiled; loaded in" in shown
+
+
+def test_a_tracer_that_refuses_says_why(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(support, "refusal", lambda gaussians: "expected the package numba")
+    assert run(["doctor"]) == 0
+    table = rows(capsys.readouterr().out)
+    assert table["renderer trace"] == "refuses: expected the package numba"
+
+
+def test_warming_reaches_the_kernels_of_fields() -> None:
+    assert fields.warm() >= 0
+    assert fields.is_ready()
+    assert fields.kernel_count() == 2
+    assert all(kernel.signatures for kernel in fields.kernels())
 
 
 def test_warm_says_when_nothing_can_be_kept(
@@ -351,5 +404,7 @@ def test_a_fresh_machine_compiles_for_good(tmp_path: Path) -> None:
     first = doctor_says()
     assert f"renderer raster: compiled {warm.kernel_count()} kernels in" in first
     assert f"worlds: compiled {drawing.kernel_count()} kernels in" in first
+    assert "renderer trace: compiled" in first
+    assert f"hexplane fields: compiled {fields.kernel_count()} kernels in" in first
     assert str(tmp_path) in first
-    assert doctor_says().count("was already compiled; loaded in") == 2
+    assert doctor_says().count("was already compiled; loaded in") == 4

@@ -4,8 +4,6 @@ Kernels compile when they are first called and are then loaded from disk. A tiny
 forwards and backwards with everything that can be asked for, calls each of them once.
 """
 
-import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -17,6 +15,7 @@ from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.render.compiling import compile_aloud, warmed
 from diff4splat.render.raster import jit
 from diff4splat.render.raster.function import rasterize
 from diff4splat.render.raster.plan import make_plan, make_view
@@ -44,14 +43,7 @@ def warm(advance: Callable[[str], None] = lambda name: None) -> float:
 
     Returns the seconds.
     """
-    began = time.perf_counter()
-    with (
-        jit.announced(jit.KERNELS, advance),
-        torch.inference_mode(False),
-        torch.enable_grad(),
-    ):
-        _draw_tiny_scene()
-    return time.perf_counter() - began
+    return warmed(jit.KERNELS, advance, _draw_tiny_scene)
 
 
 def ensure_compiled() -> None:
@@ -62,18 +54,8 @@ def ensure_compiled() -> None:
 
 @cache
 def _compile_once() -> None:
-    if is_ready():
-        return
-    _show("diff4splat: compiling the CPU renderer, once for this machine:")
-    seconds = warm(lambda name: _show(f" {name}"))
-    _show(f"\ndiff4splat: ready after {seconds:.0f} s; later runs load it from disk\n")
-
-
-def _show(text: str) -> None:
-    # A program without a console has no error stream.
-    if sys.stderr is not None:
-        sys.stderr.write(text)
-        sys.stderr.flush()
+    if not is_ready():
+        compile_aloud("the CPU renderer", warm)
 
 
 def _draw_tiny_scene() -> None:

@@ -5,24 +5,25 @@ Axes: ``r`` rays, ``n`` Gaussians.
 
 from collections.abc import Collection
 from dataclasses import fields
-from importlib.util import find_spec
+from functools import partial
 
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError, ShapeError
-from diff4splat.render.support import usable_gaussians
+from diff4splat.render.settings import require_outputs
 from diff4splat.render.trace import reference
-from diff4splat.render.trace.moving import MovingCloud, usable_motion
+from diff4splat.render.trace.hierarchy import SearchTree
+from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.reference import Seen
-from diff4splat.render.trace.settings import TraceOutput, TraceSettings, require_outputs
+from diff4splat.render.trace.settings import OUTPUTS, TraceOutput, TraceSettings
+from diff4splat.render.trace.support import refusal, usable
 from diff4splat.scene.gaussians import Gaussians
 
 DEFAULTS = TraceSettings()
 BACKENDS = ("auto", "compiled", "reference")
-_MOST_GAUSSIANS = 1 << 24
 
 
 def trace(
@@ -33,21 +34,28 @@ def trace(
     settings: TraceSettings = DEFAULTS,
     moving: MovingCloud | None = None,
     backend: str = "auto",
+    tree: SearchTree | None = None,
 ) -> TraceOutput:
     """What each of ``rays`` sees; gradients reach Gaussians, motion, rays and background.
 
     ``moving`` carries each Gaussian to the time of the ray that meets it. ``backend`` "compiled" is
     for float32 on a CPU, "reference" for everything, "auto" the first of them that can.
+    A ``tree`` made by `hierarchy.span` saves time and changes no answer, whatever has moved since.
 
     Raises:
-        ConfigError: an unknown output or back end, or one that cannot do this.
+        ConfigError: an unknown output or back end, one that cannot do this, or the tree of a scene
+            with more or fewer Gaussians.
         ShapeError: dtypes or devices differ, half precision, or another number of velocities.
         InputError: Gaussians that move, and rays without times.
     """
-    wanted = require_outputs(outputs)
+    wanted = require_outputs(outputs, OUTPUTS)
     _require_uniform(gaussians, rays, moving)
     look = _backend(backend, gaussians)
-    kept, dropped = _usable(gaussians, moving)
+    kept, dropped = usable(gaussians, moving)
+    if tree is not None:
+        known = tree.among(kept)
+        # Brute force tries every Gaussian and needs no order.
+        look = look if look is reference.look else partial(look, known=known)
     if dropped:
         index = kept.nonzero().squeeze(1)
         gaussians = gaussians.select(index)
@@ -61,20 +69,6 @@ def trace(
     return TraceOutput(
         **answers, dropped_nonfinite=sum(dropped.values()), dropped_by_parameter=dropped
     )
-
-
-def refusal(gaussians: Gaussians) -> str | None:
-    """Why the compiled tracer cannot take ``gaussians``, or None."""
-    means = gaussians.means
-    if means.device.type != "cpu":
-        return f"expected CPU tensors, got {means.device}"
-    if means.dtype != torch.float32:
-        return f"expected float32, got {means.dtype}"
-    if len(gaussians) >= _MOST_GAUSSIANS:
-        return f"expected fewer than {_MOST_GAUSSIANS} Gaussians, got {len(gaussians)}"
-    if find_spec("numba") is None:
-        return "expected the package numba, got none; install it"
-    return None
 
 
 def _backend(name: str, gaussians: Gaussians):
@@ -120,17 +114,6 @@ def _require_uniform(gaussians: Gaussians, rays: Rays, moving: MovingCloud | Non
         raise ShapeError(
             f"trace: expected one dtype, float32 or float64, on one device, got {got}; call .to()"
         )
-
-
-def _usable(
-    gaussians: Gaussians, moving: MovingCloud | None
-) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
-    """Which Gaussians can be drawn, and counts of the others by their first bad parameter."""
-    kept, dropped = usable_gaussians(gaussians)
-    if moving is not None:
-        own, more = usable_motion(moving, kept)
-        kept, dropped = kept & own, dropped | more
-    return kept, dropped
 
 
 def _named(

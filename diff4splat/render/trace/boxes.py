@@ -35,6 +35,11 @@ def boxes_between(primitives: Doubles, reach: Doubles, earliest: float, latest: 
     return made
 
 
+def nothing(count: int) -> Boxes:
+    """So many boxes that hold nothing."""
+    return Boxes(np.full((count, 3), np.inf), np.full((count, 3), -np.inf))
+
+
 def united(parts: Sequence[Boxes]) -> Boxes:
     """The boxes around several, as of the keys that an interval of a motion contains.
 

@@ -19,6 +19,7 @@ from diff4splat.render.trace.tables import (
     MOVING_COLUMNS,
     STILL_COLUMNS,
     Cloud,
+    Doubles,
     Floats,
     Integers,
     Motion,
@@ -27,7 +28,7 @@ from diff4splat.render.trace.tables import (
     Tree,
     World,
 )
-from diff4splat.render.trace.tree import build
+from diff4splat.render.trace.tree import NOTHING_KNOWN, build
 
 PACKETS_PER_PART = 16
 _BYTES_PER_HIT, _SHARES = 12, 16
@@ -56,8 +57,8 @@ def make_rules(settings: TraceSettings, squared_gate: float) -> Rules:
     )
 
 
-def make_world(cloud: Cloud, motion: Motion, colors: Floats, times: Floats, rules: Rules) -> World:
-    """What rays between the earliest and the latest of ``times`` can look at."""
+def make_primitives(cloud: Cloud, motion: Motion, rules: Rules) -> tuple[Doubles, Doubles]:
+    """What rays meet (n × 16, or 24 if it moves), and how many deviations it reaches (n)."""
     count, moves = len(cloud.means), len(motion.velocities) > 0
     primitives = np.zeros((count, MOVING_COLUMNS if moves else STILL_COLUMNS))
     reach = np.empty(count)
@@ -66,8 +67,24 @@ def make_world(cloud: Cloud, motion: Motion, colors: Floats, times: Floats, rule
         prepare(first, last, cloud, motion, rules, primitives, reach)
 
     spread(work, ranges(count, PRIMITIVES_PER_PART))
+    return primitives, reach
+
+
+def make_world(
+    cloud: Cloud,
+    motion: Motion,
+    colors: Floats,
+    times: Floats,
+    rules: Rules,
+    known: Integers = NOTHING_KNOWN,
+) -> World:
+    """What rays between the earliest and the latest of ``times`` can look at.
+
+    ``known`` is an order of Gaussians that may suit the search tree.
+    """
+    primitives, reach = make_primitives(cloud, motion, rules)
     earliest, latest = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
-    tree = build(boxes_between(primitives, reach, earliest, latest))
+    tree = build(boxes_between(primitives, reach, earliest, latest), known)
     moment = 0.5 * (earliest + latest)
     leaves = gather_leaves(tree, primitives, reach, moment)
     return World(primitives, tree, leaves, moment, colors)

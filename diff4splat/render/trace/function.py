@@ -20,8 +20,9 @@ from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.reference import Seen
 from diff4splat.render.trace.settings import TraceSettings
 from diff4splat.render.trace.shade import DISTANCE, LIGHT, MEDIAN, RGB, WEIGHT
-from diff4splat.render.trace.tables import Cloud, Floats, Motion, Sight
+from diff4splat.render.trace.tables import Cloud, Floats, Integers, Motion, Sight
 from diff4splat.render.trace.tint import PLAIN_COLUMNS
+from diff4splat.render.trace.tree import NOTHING_KNOWN
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import DEGREE_ZERO
 
@@ -39,9 +40,16 @@ class _Arrays:
 
 
 def look(
-    gaussians: Gaussians, rays: Rays, settings: TraceSettings, moving: MovingCloud | None
+    gaussians: Gaussians,
+    rays: Rays,
+    settings: TraceSettings,
+    moving: MovingCloud | None,
+    known: Integers = NOTHING_KNOWN,
 ) -> Seen:
-    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable."""
+    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable.
+
+    ``known`` is an order of Gaussians that may suit the search tree.
+    """
     means = gaussians.means
     motion = (means.new_empty(0, 3), means.new_empty(0), means.new_empty(0))
     times, gate = means.new_empty(0), None
@@ -51,6 +59,7 @@ def look(
     table, hits = _Trace.apply(
         settings,
         gate,
+        known,
         *(means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh),
         *motion,
         *(rays.origins, rays.directions, times),
@@ -68,9 +77,13 @@ def look(
 class _Trace(torch.autograd.Function):
     @staticmethod
     def forward(
-        ctx: Any, settings: TraceSettings, squared_gate: float | None, *tensors: Tensor
+        ctx: Any,
+        settings: TraceSettings,
+        squared_gate: float | None,
+        known: Integers,
+        *tensors: Tensor,
     ) -> tuple[Tensor, Tensor]:
-        sight = _sight(_unpack(tensors), settings, squared_gate)
+        sight = _sight(_unpack(tensors), settings, squared_gate, known)
         seen, hits = see(sight)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
@@ -92,8 +105,7 @@ class _Trace(torch.autograd.Function):
         )
         to_rays = torch.from_numpy(made.rays)
         return (
-            None,
-            None,
+            *(None, None, None),
             *map(torch.from_numpy, made.cloud),
             _sh_gradient(own.sh, made),
             *map(torch.from_numpy, made.motion),
@@ -116,9 +128,11 @@ def _unpack(tensors: tuple[Tensor, ...]) -> _Arrays:
     )
 
 
-def _sight(own: _Arrays, settings: TraceSettings, squared_gate: float | None) -> Sight:
+def _sight(
+    own: _Arrays, settings: TraceSettings, squared_gate: float | None, known: Integers
+) -> Sight:
     rules = make_rules(settings, np.inf if squared_gate is None else squared_gate)
-    world = make_world(own.cloud, own.motion, _color_table(own.sh), own.times, rules)
+    world = make_world(own.cloud, own.motion, _color_table(own.sh), own.times, rules, known)
     return make_sight(
         world, (own.origins, own.directions, own.times), settings, rules, own.sh.shape[1]
     )

@@ -28,8 +28,11 @@ from diff4splat.render.trace.tables import (
     Tree,
 )
 from diff4splat.render.trace.tree import ROOM
+from diff4splat.render.trace.vectors import address, prefetch_at
 
 _GROUPS_PER_PART = 256
+_AHEAD, _PREFETCHED = 12, 128
+"""How many primitives ahead they are fetched, and bytes at once; they lie in any order."""
 
 
 def gather_leaves(tree: Tree, primitives: Doubles, reach: Doubles, moment: float) -> Floats:
@@ -48,9 +51,13 @@ def gather_leaves(tree: Tree, primitives: Doubles, reach: Doubles, moment: float
 @kernel
 def fill_leaves(first, last, tree, primitives, reach, moment, leaves):
     """Fill groups ``first`` to ``last``; behind the last primitive there is none that is met."""
+    table, row_bytes, count = address(primitives), 8 * primitives.shape[1], len(tree.order)
     for group in range(first, last):
         for lane in range(LANES):
-            if group * LANES + lane < len(tree.order):
+            ahead = tree.order[min(group * LANES + lane + _AHEAD, count - 1)]
+            prefetch_at(table + row_bytes * np.int64(ahead))
+            prefetch_at(table + row_bytes * np.int64(ahead) + _PREFETCHED)
+            if group * LANES + lane < count:
                 _fill(leaves, group, lane, tree, primitives, reach, moment)
             else:
                 leaves[group, :, lane] = np.nan

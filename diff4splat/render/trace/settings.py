@@ -6,15 +6,13 @@ exp(-D² / 2) for kernel degree 2 and exp(-D⁴ / 18) for degree 4: both are exp
 """
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Literal
 
-import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from diff4splat.errors import ConfigError
+from diff4splat.render.settings import is_finite_rgb, require_accepted
 
 OUTPUTS = ("rgb", "distance", "median_distance", "alpha", "hits")
 """Everything that the tracer can answer per ray."""
@@ -57,14 +55,10 @@ class TraceSettings:
             "near_distance": 0 <= self.near_distance < math.inf,
             "min_response": self.min_response is None or 0 < self.min_response < 1,
             "color_direction": self.color_direction in ("ray", "mean"),
-            "background": _is_finite_rgb(self.background),
+            "background": is_finite_rgb(self.background),
             "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
         }
-        for name, fine in accepted.items():
-            if not fine:
-                raise ConfigError(
-                    f"TraceSettings.{name}: expected {_EXPECTED[name]}, got {getattr(self, name)}"
-                )
+        require_accepted(self, accepted, _EXPECTED)
 
     @property
     def dark(self) -> float:
@@ -75,12 +69,6 @@ class TraceSettings:
     def preset_3dgrt(cls) -> "TraceSettings":
         """The defaults that 3D Gaussian Ray Tracing trains with."""
         return cls(kernel_degree=4, min_response=0.0113, light_cutoff=1e-3)
-
-
-def _is_finite_rgb(background: tuple[float, ...] | Tensor) -> bool:
-    if isinstance(background, Tensor):
-        return background.shape == (3,) and bool(torch.isfinite(background.detach()).all())
-    return len(background) == 3 and all(map(math.isfinite, background))
 
 
 _EXPECTED = {
@@ -113,18 +101,3 @@ class TraceOutput:
     """Gaussians left out because a parameter is NaN, infinite, or too large to be squared."""
     dropped_by_parameter: dict[str, int] = field(default_factory=dict)
     """The same, by the first such parameter."""
-
-
-def require_outputs(outputs: Collection[str]) -> frozenset[str]:
-    """The set of ``outputs`` when all of them are known.
-
-    Raises:
-        ConfigError: none is named, or a name is unknown.
-    """
-    known = ", ".join(OUTPUTS)
-    if isinstance(outputs, str) or not outputs:
-        raise ConfigError(f"outputs: expected a collection of names among {known}, got {outputs!r}")
-    unknown = sorted(set(outputs) - set(OUTPUTS))
-    if unknown:
-        raise ConfigError(f"outputs: expected names among {known}, got {', '.join(unknown)}")
-    return frozenset(outputs)

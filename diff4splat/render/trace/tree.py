@@ -16,8 +16,9 @@ from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART, Boxes
 from diff4splat.render.trace.compiled import kernel
 from diff4splat.render.trace.sorting import hilbert, sorted_order
-from diff4splat.render.trace.tables import NODE_ROWS, Tree
+from diff4splat.render.trace.tables import NODE_ROWS, Integers, Tree
 
+NOTHING_KNOWN = np.empty(0, np.int32)
 _DEPTH = 12
 """Bits of a place along each axis."""
 _SIZE_CLASSES, _OCTAVES = 16, 3
@@ -25,43 +26,53 @@ ROOM = 1e-6
 """What a float32 corner gives way, relative to its size: more than rounding in the tests does."""
 
 
-def build(boxes: Boxes) -> Tree:
-    """The tree of the boxes that hold something; equal boxes give equal bits on any threads."""
-    listed = np.flatnonzero(boxes.lower[:, 0] <= boxes.upper[:, 0]).astype(np.int32)
+def build(boxes: Boxes, known: Integers = NOTHING_KNOWN) -> Tree:
+    """The tree of the boxes that hold something; equal boxes give equal bits on any threads.
+
+    ``known`` is an order to keep, as of boxes that have moved since: what holds nothing now leaves
+    it, what it does not list follows. It slows searching down as neighbours part, and no more.
+    """
     anchor, extent = _surroundings(boxes)
+    fresh = boxes.lower[:, 0] <= boxes.upper[:, 0]
+    known = known[fresh[known]]
+    fresh[known] = False
+    order = _neighbours(np.flatnonzero(fresh).astype(np.int32), boxes, anchor, extent)
+    tree = _shaped(np.concatenate([known, order]), anchor)
+    groups = -(-len(tree.order) // LANES)
+
+    def work(first: int, last: int) -> None:
+        fit_groups(first, last, tree, boxes)
+
+    # Whole nodes to a part, so that no two of them write into one.
+    spread(work, ranges(groups, PRIMITIVES_PER_PART))
+    fit_nodes(tree.nodes, tree.levels, groups)
+    return tree
+
+
+def _neighbours(
+    listed: Integers, boxes: Boxes, anchor: tuple[float, float, float], extent: float
+) -> Integers:
+    """The ``listed`` boxes, neighbours next to each other."""
     keys = np.empty(len(listed), np.uint64)
 
     def work(first: int, last: int) -> None:
         place_keys(first, last, listed, boxes, anchor, extent, keys)
 
     spread(work, ranges(len(listed), PRIMITIVES_PER_PART))
-    return refit(_shaped(listed[sorted_order(keys)], anchor), boxes)
-
-
-def refit(tree: Tree, boxes: Boxes) -> Tree:
-    """The same tree around boxes that have moved; it slows down as neighbours part."""
-    fitted = _shaped(tree.order, _surroundings(boxes)[0])
-    groups = -(-len(tree.order) // LANES)
-
-    def work(first: int, last: int) -> None:
-        fit_groups(first, last, fitted, boxes)
-
-    # Whole nodes to a part, so that no two of them write into one.
-    spread(work, ranges(groups, PRIMITIVES_PER_PART))
-    fit_nodes(fitted.nodes, fitted.levels, groups)
-    return fitted
+    return listed[sorted_order(keys)]
 
 
 def _surroundings(boxes: Boxes) -> tuple[tuple[float, float, float], float]:
     """Middle and largest half size of what all boxes hold."""
-    low, high = boxes.lower.min(0, initial=np.inf), boxes.upper.max(0, initial=-np.inf)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    surround(boxes.lower, boxes.upper, low, high)
     if not (low <= high).all():
         return (0.0, 0.0, 0.0), 1.0
     middle = 0.5 * (low + high)
     return tuple(middle.tolist()), max(float((high - middle).max()), 1e-300)
 
 
-def _shaped(order: np.ndarray, anchor: tuple[float, float, float]) -> Tree:
+def _shaped(order: Integers, anchor: tuple[float, float, float]) -> Tree:
     """A tree with room for all nodes."""
     levels, count = [0], -(-len(order) // LANES)
     while count:
@@ -75,6 +86,15 @@ def _shaped(order: np.ndarray, anchor: tuple[float, float, float]) -> Tree:
         levels=np.array(levels, np.int64),
         anchor=anchor,
     )
+
+
+@kernel
+def surround(lower, upper, low, high):
+    """The box around all boxes into ``low`` and ``high``; NumPy takes long over three columns."""
+    for i in range(len(lower)):
+        for axis in range(3):
+            low[axis] = min(low[axis], lower[i, axis])
+            high[axis] = max(high[axis], upper[i, axis])
 
 
 @kernel

@@ -4,14 +4,13 @@ Kernels compile when they are first called and are then loaded from disk. One ra
 Gaussian, forwards and backwards, calls each of them once.
 """
 
-import sys
-import time
 from collections.abc import Callable
 from functools import cache
 from threading import Lock
 
 import torch
 
+from diff4splat.render.compiling import compile_aloud, warmed
 from diff4splat.render.raster import jit
 from diff4splat.render.trace.compiled import KERNELS
 from diff4splat.render.trace.function import look
@@ -38,10 +37,7 @@ def warm(advance: Callable[[str], None] = lambda name: None) -> float:
 
     Returns the seconds.
     """
-    began = time.perf_counter()
-    with jit.announced(KERNELS, advance), torch.inference_mode(False), torch.enable_grad():
-        _trace_one_ray()
-    return time.perf_counter() - began
+    return warmed(KERNELS, advance, _trace_one_ray)
 
 
 def ensure_compiled() -> None:
@@ -52,18 +48,8 @@ def ensure_compiled() -> None:
 
 @cache
 def _compile_once() -> None:
-    if is_ready():
-        return
-    _show("diff4splat: compiling the ray tracer, once for this machine:")
-    seconds = warm(lambda name: _show(f" {name}"))
-    _show(f"\ndiff4splat: ready after {seconds:.0f} s; later runs load it from disk\n")
-
-
-def _show(text: str) -> None:
-    # A program without a console has no error stream.
-    if sys.stderr is not None:
-        sys.stderr.write(text)
-        sys.stderr.flush()
+    if not is_ready():
+        compile_aloud("the ray tracer", warm)
 
 
 def _trace_one_ray() -> None:

@@ -7,7 +7,7 @@ import torch
 from oracles_trace import ANSWERS, MOTION, PARAMETERS, answers, bundle, leaves, motion, scene
 
 from diff4splat.errors import ConfigError, InputError, ShapeError
-from diff4splat.render.trace import api
+from diff4splat.render.trace import support
 from diff4splat.render.trace.api import trace
 from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.settings import TraceSettings
@@ -88,7 +88,7 @@ def test_auto_compiles_for_float32_and_not_for_float64() -> None:
 
 
 def test_without_numba_the_reference_steps_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(api, "find_spec", lambda name: None)
+    monkeypatch.setattr(support, "find_spec", lambda name: None)
     cloud, rays = scene(dtype=torch.float32), bundle(dtype=torch.float32)
     assert torch.equal(trace(cloud, rays).rgb, trace(cloud, rays, backend="reference").rgb)
     with pytest.raises(ConfigError, match="expected the package numba, got none"):

@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from diff4splat.errors import ConfigError
-from diff4splat.render.trace.settings import TraceSettings, require_outputs
+from diff4splat.render.settings import require_outputs
+from diff4splat.render.trace.settings import OUTPUTS, TraceSettings
 
 
 def test_defaults_draw_gaussians_as_a_rasteriser_does() -> None:
@@ -57,7 +58,7 @@ def test_an_unknown_direction_of_colours_is_refused() -> None:
 
 @pytest.mark.usefixtures("as_shipped")
 def test_outputs_must_be_known_names() -> None:
-    assert require_outputs(["rgb", "hits"]) == {"rgb", "hits"}
+    assert require_outputs(["rgb", "hits"], OUTPUTS) == {"rgb", "hits"}
     for bad in ("rgb", [], ["rgb", "normal"]):
         with pytest.raises(ConfigError, match="outputs: expected"):
-            require_outputs(bad)
+            require_outputs(bad, OUTPUTS)

@@ -17,7 +17,7 @@ from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.settings import TraceSettings
 from diff4splat.render.trace.sorting import hilbert, sorted_order
 from diff4splat.render.trace.tables import Cloud, Motion, Rules, Sight, World
-from diff4splat.render.trace.tree import build, refit
+from diff4splat.render.trace.tree import build
 from diff4splat.render.trace.warm import ensure_compiled
 from diff4splat.scene.gaussians import Gaussians
 
@@ -126,7 +126,7 @@ def test_refitting_keeps_the_order_and_holds_the_new_boxes() -> None:
     middle = generator.normal(size=(300, 3))
     tree = build(Boxes(middle - 0.1, middle + 0.1))
     moved = Boxes(middle + 4.9, middle + 5.3)
-    fitted, fresh = refit(tree, moved), build(moved)
+    fitted, fresh = build(moved, tree.order), build(moved)
     assert np.array_equal(fitted.order, tree.order)
     root = fitted.nodes[-1]
     low = root[:3].min(1) + fitted.anchor

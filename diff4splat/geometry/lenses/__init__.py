@@ -1,0 +1,1 @@
+"""Lenses: between image-plane coordinates and directions, both ways; see ``protocol``."""

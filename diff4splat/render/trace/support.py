@@ -1,0 +1,41 @@
+"""What the compiled tracer can take, and which Gaussians rays can meet.
+
+Axes: ``n`` Gaussians.
+"""
+
+from importlib.util import find_spec
+
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+
+from diff4splat.render.support import usable_gaussians
+from diff4splat.render.trace.moving import MovingCloud, usable_motion
+from diff4splat.scene.gaussians import Gaussians
+
+_MOST_GAUSSIANS = 1 << 24
+
+
+def refusal(gaussians: Gaussians) -> str | None:
+    """Why the compiled tracer cannot take ``gaussians``, or None."""
+    means = gaussians.means
+    if means.device.type != "cpu":
+        return f"expected CPU tensors, got {means.device}"
+    if means.dtype != torch.float32:
+        return f"expected float32, got {means.dtype}"
+    if len(gaussians) >= _MOST_GAUSSIANS:
+        return f"expected fewer than {_MOST_GAUSSIANS} Gaussians, got {len(gaussians)}"
+    if find_spec("numba") is None:
+        return "expected the package numba, got none; install it"
+    return None
+
+
+def usable(
+    gaussians: Gaussians, moving: MovingCloud | None
+) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
+    """Which Gaussians can be drawn, and counts of the others by their first bad parameter."""
+    kept, dropped = usable_gaussians(gaussians)
+    if moving is not None:
+        own, more = usable_motion(moving, kept)
+        kept, dropped = kept & own, dropped | more
+    return kept, dropped
