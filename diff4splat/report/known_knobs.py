@@ -1,6 +1,6 @@
 """The knobs that come with the library; other packages register theirs beside them."""
 
-from diff4splat.report import flow_knobs, render_knobs, scene_knobs
+from diff4splat.report import camera_knobs, flow_knobs, render_knobs, scene_knobs
 from diff4splat.report.knobs import Knob, KnobRegistry
 
 _BUILDERS = (
@@ -15,6 +15,10 @@ _BUILDERS = (
     render_knobs.light_knob,
     render_knobs.dilation_knob,
     render_knobs.precision_knob,
+    camera_knobs.chunk_knob,
+    camera_knobs.aperture_knob,
+    camera_knobs.exposure_knob,
+    camera_knobs.trace_light_knob,
 )
 
 

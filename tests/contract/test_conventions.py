@@ -11,6 +11,8 @@ from diff4splat.flow.path import add_noise, velocity
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.geometry.depth import depth_from_distance, distance_from_depth, unproject
+from diff4splat.geometry.lenses.pinhole import Pinhole
+from diff4splat.geometry.optics import Optics, Shutter
 from diff4splat.geometry.rays import camera_rays, pixel_centers, plucker_map, world_rays
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.deformation import DeformationNetwork
@@ -23,6 +25,7 @@ from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.sizes import size_by_name
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
+from diff4splat.render.physical.lines import line_shares
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
@@ -106,6 +109,14 @@ def test_depth() -> None:
         render(ball((0.3, 0, 2.0)), pinhole(8.0, (8, 8)), outputs=("depth",)).depth.max(),
         torch.tensor(2.0),
     )
+
+
+def test_lens() -> None:
+    camera = pinhole(8.0, (6, 8), F64)
+    pixels = pixel_centers(camera.size_px, camera.focal_px)
+    directions, exist = Pinhole().directions((pixels - camera.center_px) / camera.focal_px)
+    assert exist.all()
+    torch.testing.assert_close(directions, world_rays(camera)[1])
 
 
 def test_pluecker() -> None:
@@ -212,6 +223,13 @@ def test_native_4d() -> None:
     torch.testing.assert_close(early.sh, late.sh)
     torch.testing.assert_close(early.opacities, late.opacities)
     assert torch.equal(late.scales, still.scales)
+
+
+def test_frame_time() -> None:
+    optics = Optics(shutter=Shutter(readout_s=0.2), exposure_s=0.1)
+    assert optics.window_s(3.0) == pytest.approx((2.85, 3.15))
+    assert line_shares(3, "top-to-bottom").tolist() == [0.0, 0.5, 1.0]
+    assert line_shares(3, "bottom-to-top").tolist() == [1.0, 0.5, 0.0]
 
 
 def test_level() -> None:

@@ -5,13 +5,17 @@ are scene units, times seconds, depth is z with 0 for "nothing there". Pictures 
 for, so that a long capture need not fit into memory.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera
+from diff4splat.geometry.optics import Optics
+from diff4splat.geometry.physical_camera import PhysicalCamera
+from diff4splat.geometry.pose_track import PoseTrack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +80,10 @@ class Capture:
     """Which camera took the frame; a camera may move."""
     held_out: Bool[Tensor, " f"]
     frames: Frames
+    optics: Optics | None = None
+    """Of all cameras, where they are more than pinholes."""
+    tracks: Mapping[int, PoseTrack] = field(default_factory=dict)
+    """Where each camera is at any time, by its index; the others stand at the pose of the frame."""
     points: PointCloud | None = None
     background: tuple[float, float, float] | None = None
     """What lies behind the scene where the source says so, such as white for D-NeRF."""
@@ -92,6 +100,14 @@ class Capture:
     def learnt(self) -> Int[Tensor, " m"]:
         """Indices of the frames that are learnt from."""
         return (~self.held_out).nonzero().flatten()
+
+    def physical_camera(self, index: int) -> PhysicalCamera:
+        """The camera of one frame with its optics and its way."""
+        return PhysicalCamera(
+            camera=self.cameras[index],
+            optics=Optics() if self.optics is None else self.optics,
+            track=self.tracks.get(int(self.camera_index[index])),
+        )
 
     @property
     def time_range_s(self) -> tuple[float, float]:

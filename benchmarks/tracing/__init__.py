@@ -1,0 +1,1 @@
+"""Our tracer against Mitsuba 3 on equal scenes and rays."""

@@ -1,0 +1,1 @@
+"""Scenes through physical cameras: lenses, apertures, shutters, exposures."""

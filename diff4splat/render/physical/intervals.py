@@ -1,0 +1,171 @@
+"""Into which intervals the time of a picture is split, so that Gaussians may go straight in each.
+
+An interval is halved until, for everything the camera sees, places in it are as near to the
+straight line, and shapes, opacities and colours as near to those halfway, as the tolerance asks
+for. Times at which a motion has a kink are ends of intervals from the start. A change of
+brightness counts as many pixels as an edge one pixel wide must move to make it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.geometry import quaternion
+from diff4splat.geometry.optics import Shutter, as_float
+from diff4splat.geometry.physical_camera import PhysicalCamera
+from diff4splat.render.physical.lines import line_count, line_shares
+from diff4splat.render.physical.settings import PhotoSettings
+from diff4splat.render.physical.straight import halfway, is_straight
+from diff4splat.render.physical.viewer import Viewer
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
+from diff4splat.scene.motion.keyframes import KeyframeMotion
+from diff4splat.scene.motion.protocol import Motion
+from diff4splat.scene.motion.spacetime import SpacetimeMotion
+from diff4splat.scene.scene import Scene
+
+_PROBES = (0.3, 0.6)
+"""Near the largest error of a bow, ½, and of an S, 0.21, which has none in its middle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Intervals:
+    """Neighbouring intervals of time, relative to the frame's."""
+
+    edges_s: tuple[float, ...]
+    error_px: float
+    """Left over, as far as it was looked at."""
+
+    def __len__(self) -> int:
+        return max(len(self.edges_s) - 1, 1)
+
+    def spans(self) -> list[tuple[float, float]]:
+        """Earliest and latest of each."""
+        if len(self.edges_s) == 1:
+            return [(self.edges_s[0], self.edges_s[0])]
+        return list(pairwise(self.edges_s))
+
+    def of(self, times_s: Float[Tensor, " r"]) -> Tensor:
+        """The interval of each time; times outside belong to the nearest one."""
+        inner = times_s.new_tensor(self.edges_s[1:-1])
+        return torch.bucketize(times_s.detach(), inner, right=True)
+
+
+@torch.no_grad()
+def choose_intervals(
+    scene: Scene, camera: PhysicalCamera, time_s: float, viewer: Viewer, settings: PhotoSettings
+) -> Intervals:
+    """Intervals for one picture of a scene that moves meanwhile."""
+    window = camera.optics.window_s(time_s)
+    first, last = (edge - time_s for edge in window)
+    if is_straight(scene):
+        return Intervals((first, last), 0.0)
+    moving = _only_moving(scene)
+    shutter = camera.optics.shutter
+    rolls = shutter is not None and as_float(shutter.readout_s) > 0
+    if rolls and settings.rows_per_chunk is not None:
+        edges = _chunk_edges(camera, shutter, settings.rows_per_chunk, first)
+        return Intervals(edges, _largest(moving, edges, time_s, viewer))
+    kinks = [kink - time_s for kink in _kinks_s(scene.motion)]
+    edges = [first, *(kink for kink in kinks if first < kink < last), last]
+    return _halved(moving, edges, time_s, viewer, settings)
+
+
+def _only_moving(scene: Scene) -> Scene:
+    moves = torch.zeros(len(scene.gaussians), dtype=torch.bool, device=scene.gaussians.means.device)
+    moves[scene.motion.moving_index] = True
+    own = scene.select(moves)
+    if isinstance(own.motion, SpacetimeMotion):
+        # Pulses are exact at any length; what is left are colours.
+        always = torch.full_like(own.motion.time_deviations_s, torch.inf)
+        own = replace(own, motion=replace(own.motion, time_deviations_s=always))
+    return own
+
+
+def _kinks_s(motion: Motion) -> Sequence[float]:
+    """Times at which a motion turns sharply."""
+    if isinstance(motion, KeyframeMotion):
+        return motion.key_times_s.tolist()
+    if isinstance(motion, HexPlaneMotion):
+        return list(motion.planes.node_times_s)
+    return []
+
+
+def _chunk_edges(
+    camera: PhysicalCamera, shutter: Shutter, rows: int, first: float
+) -> tuple[float, ...]:
+    """Halfway between the last line of a chunk and the first of the next, in order of reading."""
+    optics = camera.optics
+    shares = line_shares(line_count(camera.camera.size_px, shutter.direction), "top-to-bottom")
+    ends = [float(shares[k - 1 : k + 1].mean()) for k in range(rows, len(shares), rows)]
+    first_line = first + 0.5 * as_float(optics.exposure_s)
+    inner = (first_line + share * as_float(shutter.readout_s) for share in ends)
+    return first, *inner, first + optics.duration_s
+
+
+def _halved(
+    scene: Scene, edges: list[float], time_s: float, viewer: Viewer, settings: PhotoSettings
+) -> Intervals:
+    """Halve the interval with the largest error until all are within the tolerance."""
+    errors = {span: _error_px(scene, *span, time_s, viewer) for span in pairwise(edges)}
+    while len(errors) < settings.most_intervals:
+        worst = max(errors, key=lambda span: errors[span])
+        if errors[worst] <= settings.tolerance_px:
+            break
+        del errors[worst]
+        middle = 0.5 * (worst[0] + worst[1])
+        for span in ((worst[0], middle), (middle, worst[1])):
+            errors[span] = _error_px(scene, *span, time_s, viewer)
+    ends = sorted({edge for span in errors for edge in span})
+    return Intervals(tuple(ends), max(errors.values()))
+
+
+def _largest(scene: Scene, edges: Sequence[float], time_s: float, viewer: Viewer) -> float:
+    return max(_error_px(scene, *span, time_s, viewer) for span in pairwise(edges))
+
+
+def _error_px(
+    scene: Scene, earliest_s: float, latest_s: float, time_s: float, viewer: Viewer
+) -> float:
+    """Largest error of one interval at its ends and in between; states live no longer."""
+    if earliest_s == latest_s:
+        return 0.0
+    early, late = (scene.state_at(time_s + at) for at in (earliest_s, latest_s))
+    found = max(error_px(early, early, late, 0.0, viewer), error_px(early, late, late, 1.0, viewer))
+    for part in _PROBES:
+        state = scene.state_at(time_s + earliest_s + part * (latest_s - earliest_s))
+        found = max(found, error_px(early, state, late, part, viewer))
+    return found
+
+
+def error_px(
+    early: Gaussians, true: Gaussians, late: Gaussians, part: float, viewer: Viewer
+) -> float:
+    """How far anything that is seen is from where, or how, it should be; 0 where nothing is.
+
+    ``true`` is what stands at ``part`` of the way from ``early`` to ``late``.
+    """
+    made = halfway(early, late)
+    seen = viewer.sees(true) | viewer.sees(made)
+    if not bool(seen.any()):
+        return 0.0
+    place = (true.means - torch.lerp(early.means, late.means, part)).norm(dim=-1)
+    shape = (_root(true) - _root(made)).norm(dim=-1).amax(-1)
+    return float((viewer.pixels(place + shape, true) + _brightness(true, made))[seen].max())
+
+
+def _brightness(true: Gaussians, made: Gaussians) -> Float[Tensor, " n"]:
+    """How much opacity and colour are off; |Σ_k a_k Y_k| ≤ |a| √(K / 4π) for all K of a degree."""
+    colors = (true.sh - made.sh).square().sum(1).amax(-1) * (true.sh.shape[1] / (4 * math.pi))
+    return (true.opacities - made.opacities).abs() + made.opacities * colors.sqrt()
+
+
+def _root(gaussians: Gaussians) -> Float[Tensor, "n 3 3"]:
+    """R S Rᵀ, the square root of the covariance: of a sphere it is the same however it turns."""
+    turns = quaternion.to_matrix(gaussians.quats)
+    return (turns * gaussians.scales[:, None]) @ turns.mT
