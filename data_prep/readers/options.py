@@ -7,7 +7,7 @@ from typing import Literal, get_args
 from diff4splat.errors import ConfigError
 from diff4splat.paths.names import unknown_name
 
-FormatName = Literal["dnerf", "neu3d", "hypernerf", "colmap", "transforms", "clips"]
+FormatName = Literal["dnerf", "neu3d", "hypernerf", "colmap", "transforms", "clips", "cameras"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ class ReadOptions:
     fps: float | None = None
     """For formats that count frames instead of seconds."""
     clip: str | None = None
-    """Which clip of a folder of shards."""
+    """Which clip of a folder of shards, or which effect of data sets of cameras."""
 
     def __post_init__(self) -> None:
         if self.format not in ("auto", *get_args(FormatName)):

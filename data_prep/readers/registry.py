@@ -6,7 +6,15 @@ from pathlib import Path
 
 from diff4splat.data.capture.capture import Capture
 from diff4splat.data.capture.checks import require_usable_capture
-from diff4splat.data_prep.readers import clips, colmap, dnerf, hypernerf, neu3d, transforms
+from diff4splat.data_prep.readers import (
+    clips,
+    colmap,
+    dnerf,
+    hypernerf,
+    neu3d,
+    physical,
+    transforms,
+)
 from diff4splat.data_prep.readers.assembly import finish
 from diff4splat.data_prep.readers.options import FormatName, ReadOptions
 from diff4splat.data_prep.readers.places import Place, place_of
@@ -30,6 +38,7 @@ _READERS: dict[FormatName, _Reader] = {
         "colmap": colmap,
         "transforms": transforms,
         "clips": clips,
+        "cameras": physical,
     }.items()
 }
 
@@ -77,4 +86,5 @@ def _is_other_json(file: Path) -> bool:
     """A ``transforms.json`` by whatever name; files that other formats name decide nothing."""
     others = ("dataset.json", "metadata.json", "scene.json", "manifest.json")
     split = file.name.startswith("transforms_") and dnerf.matches(file.parent)
-    return file.suffix.lower() == ".json" and file.name not in others and not split
+    ours = file.name == "camera.json" and physical.matches(file.parent)
+    return file.suffix.lower() == ".json" and file.name not in others and not (split or ours)

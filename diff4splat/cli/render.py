@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.cli.optics_options import OpticsOptions, require_consistent
 from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.paths.camera_path import CameraPath
+    from diff4splat.report.run_log import RunLog
     from diff4splat.scene.scene import Scene
 
 
@@ -23,7 +25,7 @@ class Render:
     scene: Annotated[Path, tyro.conf.Positional]
     """A scene file."""
     out: Path = Path("render.mp4")
-    """A video (.mp4), one picture (.png) or depth (.exr)."""
+    """A video (.mp4), one picture (.png) or depth (.exr); with --dataset a folder."""
     camera: str | None = None
     """Presets or a path file; if left out, the path that the scene suggests."""
     time: float | None = None
@@ -32,7 +34,11 @@ class Render:
     """Which pose of the path a single picture shows; -1 is the last."""
     resolution: int | None = None
     """Pixels on the longer side; if left out, as the scene suggests."""
+    dataset: bool = False
+    """Write a folder of matched sequences with exact cameras: a pinhole, a fisheye, depth of field,
+    rolling shutter, motion blur, and all of these at once."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
+    optics: Annotated[OpticsOptions, tyro.conf.arg(name="")] = field(default_factory=OpticsOptions)
 
     def run(self) -> None:
         """Load, choose cameras and times, render, write."""
@@ -47,17 +53,38 @@ class Render:
         require_inputs_kept((self.scene, Path(self.camera or "")), (self.out,))
         if self.camera is None and self.options != CameraOptions():
             raise ConfigError("--frames, --fps, --amplitude, --easing: expected with --camera only")
+        if self.dataset and self.frame:
+            raise ConfigError("--frame: expected without --dataset, which has all frames")
+        if self.dataset and self.out.suffix.lower() in VIEW_SUFFIXES:
+            raise ConfigError(f"--dataset: expected a folder as --out, got {self.out}; name one")
+        if not self.dataset:
+            require_consistent(self.optics)
         scene = load_scene(self.scene)
         path = self.chosen_path(scene)
+        log = RunLog(phases=ConsolePhases())
+        if self.dataset or self.optics != OpticsOptions():
+            self.film(scene, path, log)
+            return
         if self.out.suffix.lower() == ".png":
             path = one_pose(path, self.frame)
-        log = RunLog(phases=ConsolePhases())
         if self.out.suffix.lower() in VIEW_SUFFIXES:  # others are refused, and at once
             prepare_renderer(scene.gaussians, log.phases)
         if dropped := left_out(scene, float(path.times_s[0]) if self.time is None else self.time):
             note(dropped)
         write_view(scene, path, self.out, self.time, log)
         note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
+
+    def film(self, scene: "Scene", path: "CameraPath", log: "RunLog") -> None:
+        """Through a physical camera."""
+        from diff4splat.cli.console import note
+        from diff4splat.cli.filming import film_dataset, film_file
+        from diff4splat.report.photographs import stopped
+
+        if self.dataset:
+            film_dataset(scene, path, self.optics, self.out, self.time, log)
+        else:
+            film_file(stopped(scene, self.time), path, self.optics, self.out, self.frame, log)
+        note(f"wrote {self.out}")
 
     def chosen_path(self, scene: "Scene") -> "CameraPath":
         """Cameras at the asked size, with the times at which the scene is shown."""

@@ -1,8 +1,10 @@
 """Depth videos as OpenEXR: one float32 part per frame, with its camera in the header.
 
 Axes: ``t`` frames, ``h w`` pixels. Channel ``Z`` is z-depth, ZIP-compressed without loss; 0 means
-no depth. Attributes per part: ``time_s``, ``focal_px``, ``center_px``, ``world_from_camera``,
-``unit``, ``conventions``, ``frame_count``; numbers are double precision.
+no depth. A lens that sees behind itself has no z-depth; its files have a channel ``distance``, the
+length of the ray. Attributes per part: ``time_s``, ``focal_px``, ``center_px``,
+``world_from_camera``, ``unit``, ``conventions``, ``frame_count``, and ``optics`` (JSON) of physical
+cameras; numbers are double precision.
 """
 
 import errno
@@ -26,10 +28,16 @@ from diff4splat.io.existing import require_file
 from diff4splat.io.quiet import native_stderr_silenced
 from diff4splat.paths.camera_path import CameraPath, require_usable
 
-CONVENTIONS = (
-    "Z is depth along the optical axis, 0 where unknown; OpenCV axes (x right, y down, z forward); "
+_REST = (
+    "OpenCV axes (x right, y down, z forward); "
     "pixel centres at +0.5; world_from_camera maps homogeneous column vectors"
 )
+CONVENTIONS = f"Z is depth along the optical axis, 0 where unknown; {_REST}"
+_OF_QUANTITY = {
+    "depth": ("Z", CONVENTIONS),
+    "distance": ("distance", f"distance is the length of the ray, 0 where unknown; {_REST}"),
+}
+Quantity = Literal["depth", "distance"]
 
 
 def write_depth_exr(
@@ -37,8 +45,12 @@ def write_depth_exr(
     path: CameraPath,
     file: Path | str,
     unit: Literal["scene-units", "metres"] = "scene-units",
+    quantity: Quantity = "depth",
+    optics: str | None = None,
 ) -> None:
     """Write a depth video whole or not at all; NaN, infinite and negative depth becomes 0.
+
+    ``optics`` is JSON (see ``optics_json``) of a physical camera.
 
     Raises:
         InputError: there are no frames.
@@ -53,25 +65,30 @@ def write_depth_exr(
         raise InputError(f"{file}: expected at least one frame of depth, got none")
     frames = depth.detach().cpu().float()
     frames = torch.where(torch.isfinite(frames) & (frames > 0), frames, 0.0).numpy()
+    channel, conventions = _OF_QUANTITY[quantity]
+    said = {"conventions": conventions} | ({"optics": optics} if optics else {})
     parts = [
-        OpenEXR.Part(_header(path, index, unit), {"Z": frame}, f"frame_{index:04d}")
+        OpenEXR.Part(_header(path, index, unit) | said, {channel: frame}, f"frame_{index:04d}")
         for index, frame in enumerate(frames)
     ]
     with atomic_path(file) as temporary:
         _write(parts, temporary)
-        _verify(frames, temporary, file)
+        _verify(frames, temporary, file, channel)
 
 
-def read_depth_exr(file: Path | str) -> tuple[Float[Tensor, "t h w"], CameraPath]:
+def read_depth_exr(
+    file: Path | str, quantity: Quantity = "depth"
+) -> tuple[Float[Tensor, "t h w"], CameraPath]:
     """Depth in float32 and the cameras in float64, as written by ``write_depth_exr``.
 
     Raises:
-        FileFormatError: missing, damaged, cut off, or without the camera attributes.
+        FileFormatError: missing, damaged, cut off, of another quantity, or without the camera
+            attributes.
     """
     file = Path(file)
     require_file(file, "an OpenEXR depth file")
     try:
-        headers, frames = _read(file)
+        headers, frames = _read(file, _OF_QUANTITY[quantity][0])
         return torch.from_numpy(frames), _path(headers, frames.shape[1:])
     except (FileFormatError, InputError, ShapeError) as error:
         raise FileFormatError(f"{file}: {error}") from error
@@ -107,10 +124,12 @@ def _write(parts: list[OpenEXR.Part], temporary: Path) -> None:
         raise OSError(errno.ENOSPC if full else errno.EIO, str(error)) from error
 
 
-def _verify(frames: Float32[np.ndarray, "t h w"], temporary: Path, file: Path) -> None:
+def _verify(
+    frames: Float32[np.ndarray, "t h w"], temporary: Path, file: Path, channel: str
+) -> None:
     """Read back what was written: the library does not report a full disk."""
     try:
-        complete = np.array_equal(_read(temporary)[1], frames)
+        complete = np.array_equal(_read(temporary, channel)[1], frames)
     except FileFormatError:
         complete = False
     if not complete:
@@ -128,18 +147,25 @@ def _silent() -> Iterator[io.StringIO]:
         yield said
 
 
-def _read(file: Path) -> tuple[list[dict[str, Any]], Float32[np.ndarray, "t h w"]]:
+def _read(file: Path, channel: str) -> tuple[list[dict[str, Any]], Float32[np.ndarray, "t h w"]]:
     """Headers and depth of every part."""
     try:
         with _silent() as said, OpenEXR.File(str(file), separate_channels=True) as opened:
             headers = [dict(part.header) for part in opened.parts]
-            frames = [part.channels["Z"].pixels for part in opened.parts if "Z" in part.channels]
+            found = [part.channels for part in opened.parts]
+            frames = [channels[channel].pixels for channels in found if channel in channels]
+            others = {name for channels in found for name in channels} - {channel}
     except (RuntimeError, ValueError, TypeError, MemoryError) as error:
         raise FileFormatError("expected an OpenEXR file, got a damaged or other one") from error
     # A frame that cannot be decoded is left out by the library; only the others still tell.
     counts = [header.get("frame_count") for header in headers]
     if all(count is None for count in counts) and not said.getvalue():
         raise FileFormatError("expected depth with cameras, got an OpenEXR file of another kind")
+    if not frames and others and not said.getvalue():
+        raise FileFormatError(
+            f"expected a channel '{channel}', got {', '.join(sorted(others))}: z and distance "
+            "along the ray are not the same"
+        )
     whole = all(isinstance(count, int) and count == len(frames) for count in counts)
     if said.getvalue() or not whole:
         raise FileFormatError("expected depth in every frame, got a cut off or damaged file")

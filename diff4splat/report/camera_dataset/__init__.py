@@ -1,0 +1,1 @@
+"""Matched sequences of one scene: the same path and times through cameras that differ."""
