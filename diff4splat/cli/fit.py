@@ -13,6 +13,8 @@ from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from diff4splat.data.capture.capture import Capture
     from diff4splat.scene.scene import Scene
     from diff4splat.training.per_scene.settings import FitSettings
@@ -59,8 +61,11 @@ class Fit:
     """Save and stop after so many minutes of this call."""
     no_depth: bool = False
     """Do not use depth where the data have it."""
-    renderer: Literal["auto", "raster", "reference", "gsplat"] = "auto"
-    """What draws."""
+    renderer: Literal["auto", "trace", "raster", "reference", "gsplat"] = "auto"
+    """What makes pictures; auto follows rays where cameras are more than pinholes, else draws."""
+    learn: tuple[Literal["lens", "focus", "aperture", "readout", "focal"], ...] = ()
+    """Parts of the cameras that are recovered together with the scene, from a first guess in the
+    data: lens coefficients, focus distance, aperture radius, read-out time, focal length."""
     seed: int = 0
     """Points, order of frames and splits derive from it."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
@@ -72,11 +77,13 @@ class Fit:
         """Check, read, fit, write."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.renderer import compile_ahead, prepare_renderer
+        from diff4splat.render.trace import warm as tracer
         from diff4splat.report.run_log import RunLog
         from diff4splat.training.per_scene.checkpoint import FILE
         from diff4splat.training.per_scene.fit import FitRun, fit_scene
         from diff4splat.training.per_scene.results import RESULT_FILES, FitReport, write_results
+        from diff4splat.training.per_scene.sight import Sight
 
         settings = self.settings()
         outputs = [self.out / name for name in (*RESULT_FILES, FILE)]
@@ -87,6 +94,9 @@ class Fit:
             note(line)
         if self.renderer in ("auto", "raster"):
             prepare_renderer(speck("cpu"), log.phases)
+        sight = Sight(capture=capture, backend=self.renderer, settings=settings.camera)
+        if sight.traced and not tracer.is_ready():
+            compile_ahead(tracer, log.phases)
         if self.restart:
             (self.out / FILE).unlink(missing_ok=True)
         asked = FitRun(
@@ -104,6 +114,8 @@ class Fit:
         made = write_results(report, self.out, log)
         for line in result.omissions:
             note(f"left out: {line}")
+        for line in recovered(result.learned):
+            note(line)
         note(summary(report))
         moving = len(made.motion.moving_index)
         note(f"wrote {self.out} ({len(made.gaussians):,} Gaussians, {moving:,} of them moving)")
@@ -120,7 +132,11 @@ class Fit:
         if self.minutes is not None and not self.minutes > 0:
             raise ConfigError(f"--minutes: expected more than 0, got {self.minutes:g}")
         start = FitSettings(motion=self.motion, seed=self.seed, use_depth=not self.no_depth)
-        start = replace(start, density=replace(start.density, budget=self.budget))
+        start = replace(
+            start,
+            density=replace(start.density, budget=self.budget),
+            camera=replace(start.camera, learn=self.learn),
+        )
         if self.steps is not None:
             start = replace(start, fine_steps=self.steps)
         return changed(start, [one for given in self.set for one in given])
@@ -145,6 +161,20 @@ class Fit:
         return {
             name: str(value) if isinstance(value, Path) else value for name, value in given.items()
         }
+
+
+def recovered(learned: "Mapping[str, Mapping[str, object]]") -> list[str]:
+    """One line for each part of the cameras that was learned."""
+    return [
+        f"{name}: {shown(found['start'])} at the start, {shown(found['recovered'])} recovered"
+        for name, found in learned.items()
+    ]
+
+
+def shown(value: "float | list[float]") -> str:
+    """A number, or several, in four digits."""
+    values = value if isinstance(value, list) else [value]
+    return ", ".join(f"{one:.4g}" for one in values)
 
 
 def summary(report) -> str:

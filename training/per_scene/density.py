@@ -2,7 +2,9 @@
 
 Axes: ``n`` Gaussians. The pull of a step is |∂L/∂mean| · z · (picture width / 2) / focal length, z
 meaned over the pictures of the step: the gradient of the loss in half pictures, as Kerbl et al.
-2023 measure it, without a renderer that tells it (3DGRT, arXiv 2407.07090). Splitting replaces one
+2023 measure it, without a renderer that tells it (3DGRT, arXiv 2407.07090). Where rays make the
+picture it is |∂L/∂mean| · distance · half the picture in radians, and the mean is the canonical
+one: the same numbers near the optical axis. Splitting replaces one
 Gaussian by two of 0.6 of its deviation along its longest axis, or along time, 0.8 deviations to
 both sides: 0.6² + 0.8² = 1, so mean and covariance of the pair are those of the one.
 """
@@ -16,7 +18,6 @@ from torch import Tensor
 
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
-from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.per_scene.model import SceneModel
 from diff4splat.training.per_scene.motions.spacetime import HALF, SHIFT
 from diff4splat.training.per_scene.settings import Density
@@ -28,16 +29,12 @@ class Pull:
     def __init__(self, count: int) -> None:
         self.total, self.seen = torch.zeros(count), torch.zeros(count)
 
-    def add(self, state: Gaussians, cameras: Camera) -> None:
-        """Take the gradient that the pictures of one step left at the means of its state."""
-        gradient = state.means.grad
+    def add(self, means: Float[Tensor, "n 3"], half_pictures: Float[Tensor, " n"]) -> None:
+        """Take the gradient that one step left at ``means``, where half a picture is so long."""
+        gradient = means.grad
         if gradient is None:
             return
-        poses = cameras.world_from_camera.to(gradient)
-        toward = state.means.detach() - poses[:, None, :3, 3]
-        z = (toward * poses[:, None, :3, 2]).sum(-1).clamp_min(0).mean(0)
-        half_picture = 0.5 * cameras.size_px[1] / float(cameras.focal_px[:, 0].mean())
-        pull = gradient.norm(dim=-1) * z * half_picture
+        pull = gradient.norm(dim=-1) * half_pictures
         self.total += pull
         self.seen += pull > 0
 
@@ -48,6 +45,14 @@ class Pull:
     def mean(self) -> Float[Tensor, " n"]:
         """0 for what no picture showed."""
         return self.total / self.seen.clamp_min(1)
+
+
+def flat_half_pictures(places: Float[Tensor, "n 3"], cameras: Camera) -> Float[Tensor, " n"]:
+    """Scene units per half picture at each place, meaned over pinhole cameras."""
+    poses = cameras.world_from_camera.to(places)
+    toward = places - poses[:, None, :3, 3]
+    z = (toward * poses[:, None, :3, 2]).sum(-1).clamp_min(0).mean(0)
+    return z * (0.5 * cameras.size_px[1] / float(cameras.focal_px[:, 0].mean()))
 
 
 def grow_and_prune(

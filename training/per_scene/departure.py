@@ -12,17 +12,19 @@ import torch
 from jaxtyping import Bool
 from torch import Tensor
 
-from diff4splat.data.capture.capture import Capture, PointCloud
-from diff4splat.geometry.depth import unproject
+from diff4splat.data.capture.capture import PointCloud
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.per_scene.canonical import raw_points
+from diff4splat.training.per_scene.lens_points import lifted
 from diff4splat.training.per_scene.model import SceneModel
 from diff4splat.training.per_scene.motions.protocol import LearnedMotion
 from diff4splat.training.per_scene.motions.spacetime import Pulses
+from diff4splat.training.per_scene.optics.camera_model import CameraModel
 from diff4splat.training.per_scene.pictures import FrameStore, Schedule
 from diff4splat.training.per_scene.settings import FitSettings
+from diff4splat.training.per_scene.sight import Sight
 
 OVERLAP = 0.6
 """Deviation of a starting pulse over the distance between pulses."""
@@ -44,10 +46,12 @@ class Departure:
 class Surroundings:
     """Where the pictures come from."""
 
-    capture: Capture
+    sight: Sight
     store: FrameStore
     schedule: Schedule
     settings: FitSettings
+    known: CameraModel | None = None
+    """What was learned of the cameras."""
 
 
 def depart(
@@ -131,13 +135,17 @@ def _unexplained(
 
 
 def _wrong_pixels(standing: Gaussians, around: Surroundings, index: int) -> PointCloud | None:
-    frame, camera = around.store.read(index), around.capture.cameras[index]
+    frame, sight = around.store.read(index), around.sight
     if frame.depth is None:
         return None
-    settings = RenderSettings(background=around.capture.background or (0.0, 0.0, 0.0))
-    made = render(standing, camera, settings=settings).rgb
-    wrong = ((made - frame.rgb).abs().mean(-1) > UNEXPLAINED) & (frame.depth > 0)
+    camera = sight.camera(index, around.known)
+    if sight.traced:
+        made = sight.standing(standing, camera, index).rgb
+    else:
+        settings = RenderSettings(background=sight.background)
+        made = render(standing, sight.capture.cameras[index], settings=settings).rgb
+    points, known = lifted(camera, frame.depth)
+    wrong = ((made - frame.rgb).abs().mean(-1) > UNEXPLAINED) & known
     if frame.counts is not None:
         wrong = wrong & frame.counts
-    points = unproject(camera.to(torch.float32), frame.depth)
     return PointCloud(positions=points[wrong], rgb=frame.rgb[wrong])

@@ -4,11 +4,9 @@ capture ─ points ─ coarse: standing Gaussians ─ errors over time ─ fine:
 still ones out ─ judgement on held-out frames. Call again with the same folder to go on.
 """
 
-import hashlib
-import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
@@ -18,7 +16,7 @@ from diff4splat.data.capture.capture import Capture
 from diff4splat.data.capture.checks import require_usable_capture
 from diff4splat.data.capture.split import SplitReport, report_split
 from diff4splat.errors import DivergenceError
-from diff4splat.report.omissions import Omission, Omissions
+from diff4splat.report.omissions import Omissions
 from diff4splat.report.phases import Phases
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
@@ -26,10 +24,13 @@ from diff4splat.training.per_scene import checkpoint
 from diff4splat.training.per_scene.checkpoint import Standing
 from diff4splat.training.per_scene.departure import Surroundings, depart
 from diff4splat.training.per_scene.guard import restore
+from diff4splat.training.per_scene.identity import fingerprint
 from diff4splat.training.per_scene.judging import FrameQuality, Judge
 from diff4splat.training.per_scene.model import SceneModel
 from diff4splat.training.per_scene.motions.still import Still
 from diff4splat.training.per_scene.objective import Objective
+from diff4splat.training.per_scene.optics.camera_model import CameraModel
+from diff4splat.training.per_scene.optics.learned import LearnedOptics
 from diff4splat.training.per_scene.pictures import FrameStore, Schedule
 from diff4splat.training.per_scene.recording import Recorder
 from diff4splat.training.per_scene.region import Region, find_region
@@ -40,9 +41,10 @@ from diff4splat.training.per_scene.setting_out import (
     standing_model,
 )
 from diff4splat.training.per_scene.settings import FitSettings
+from diff4splat.training.per_scene.sight import Sight
 from diff4splat.training.per_scene.stage_loop import Course, StageLoop
 from diff4splat.training.per_scene.stillness import error_variation
-from diff4splat.training.per_scene.taking_out import take_out_still
+from diff4splat.training.per_scene.taking_out import left_standing, take_out_still
 
 COARSE, FINE = "coarse", "fine"
 
@@ -77,6 +79,12 @@ class FitResult:
     training: list[FrameQuality]
     """A few frames that were learnt from."""
     omissions: Omissions
+    sight: Sight
+    """What made the pictures."""
+    cameras: CameraModel | None
+    """As learned; None where nothing was."""
+    learned: dict[str, dict[str, object]]
+    """What was learned of the cameras: start and recovered value of each part."""
     seconds: float
     finished: bool
     """False when time ran out: the same call goes on."""
@@ -99,13 +107,17 @@ class _Fit:
         self.capture = require_usable_capture(asked.capture)
         self.split = report_split(self.capture)
         asked.note(f"{self.capture.name} ({self.capture.source}): {self.split}")
+        self.sight = Sight(
+            capture=self.capture, backend=asked.backend, settings=self.settings.camera
+        )
+        self.optics = LearnedOptics(self.capture, self.settings.camera.learn)
         self.store = FrameStore(self.capture, self.settings.picture_memory_mb << 20)
         self.region: Region = find_region(self.capture)
         self.schedule = Schedule(self.capture, self.settings.views_per_step, self.settings.seed)
-        self.judge = Judge(capture=self.capture, store=self.store, backend=asked.backend)
+        self.judge = Judge(sight=self.sight, store=self.store)
         self.recorder = Recorder(folder=asked.folder, note=asked.note)
         self.omissions = Omissions()
-        self.fingerprint = fingerprint(asked)
+        self.fingerprint = fingerprint(self.capture, self.settings, asked.init)
         self.began = time.perf_counter()
 
     def run(self) -> FitResult:
@@ -146,9 +158,9 @@ class _Fit:
             if standing is not None:
                 model = self._restored(standing, Still(self.capture.time_range_s))
             elif self.asked.init is not None:
-                model = initial_model(self.asked.init, self.capture, settings)
+                model = initial_model(self.asked.init, self.capture, settings, self.optics)
             else:
-                model = standing_model(self.capture, self.region, settings)
+                model = standing_model(self.capture, self.region, settings, self.optics)
         return self._loop(COARSE, model, steps, 0, standing)
 
     def _fine(self, standing: Standing | None, before: SceneModel | None) -> StageLoop:
@@ -162,10 +174,14 @@ class _Fit:
             self.bounds = field_bounds(before.table["means"].detach()[moves])
             motion = create_motion(self.capture, settings, self.bounds)
             around = Surroundings(
-                capture=self.capture, store=self.store, schedule=self.schedule, settings=settings
+                sight=self.sight,
+                store=self.store,
+                schedule=self.schedule,
+                settings=settings,
+                known=before.cameras(learning=False),
             )
             leaving = depart(before, moves, motion, around)
-            model = SceneModel(leaving.rows, motion, leaving.moves)
+            model = SceneModel(leaving.rows, motion, leaving.moves, self.optics, before.table)
             self.asked.note(f"{int(moves.sum()):,} of {len(moves):,} Gaussians may move")
         first = settings.coarse_steps if self.asked.init is None else 0
         return self._loop(FINE, model, settings.fine_steps, first, standing)
@@ -175,7 +191,8 @@ class _Fit:
         plain = Gaussians(
             **{name: getattr(canonical, name).detach() for name in canonical.__dataclass_fields__}
         )
-        varies = error_variation(plain, self.capture, self.store, self.schedule)
+        known = model.cameras(learning=False)
+        varies = error_variation(plain, self.sight, self.store, self.schedule, known)
         return varies > self.settings.stillness.min_score
 
     def _loop(
@@ -185,12 +202,7 @@ class _Fit:
         deadline_s = None if asked.stop_after_s is None else self.began + asked.stop_after_s
         course = Course(
             name=name,
-            objective=Objective(
-                capture=self.capture,
-                store=self.store,
-                settings=self.settings,
-                backend=asked.backend,
-            ),
+            objective=Objective(sight=self.sight, store=self.store, settings=self.settings),
             schedule=self.schedule,
             judge=self.judge,
             recorder=self.recorder,
@@ -246,60 +258,35 @@ class _Fit:
 
     def _restored(self, standing: Standing, motion) -> SceneModel:
         rows = {name: standing.tensors[name] for name in standing.tensors if "/" not in name}
-        columns = {name: value for name, value in rows.items() if name not in motion.shared()}
-        model = SceneModel(columns, motion, standing.moves)
+        shared = {*motion.shared(), *self.optics.names}
+        columns = {name: value for name, value in rows.items() if name not in shared}
+        self.optics.resumed(rows)
+        model = SceneModel(columns, motion, standing.moves, self.optics)
         model.table.load(standing.tensors)
         return model
 
     def _result(self, loop: StageLoop, finished: bool) -> FitResult:
         model, degree = loop.model, loop.degree if not finished else self.settings.harmonics
         with torch.no_grad():
-            canonical, motion = model.canonical(degree), model.motion(degree)
+            scene, known = model.scene(degree, self.sight.path), model.cameras(learning=False)
             held = self.capture.held_out.nonzero().flatten().tolist()
             learnt = self.capture.learnt
             some = learnt[torch.linspace(0, len(learnt) - 1, min(24, len(learnt))).long()].tolist()
             with self.asked.phases.phase("judge", len(held) + len(some)) as advance:
-                state_at = lambda time_s: motion.state_at(canonical, time_s)  # noqa: E731
-                judged = self.judge.frames(state_at, held, True, advance)
-                trained = self.judge.frames(state_at, some, True, advance)
-        if (standing := _standing(model)) is not None:
+                judged = self.judge.frames(scene, known, held, True, advance)
+                trained = self.judge.frames(scene, known, some, True, advance)
+        if (standing := left_standing(model)) is not None:
             self.omissions.add(standing)
         return FitResult(
-            gaussians=canonical,
-            motion=motion,
+            gaussians=scene.gaussians,
+            motion=scene.motion,
             split=self.split,
             held_out=judged,
             training=trained,
             omissions=self.omissions,
+            sight=self.sight,
+            cameras=known if self.settings.camera.learn else None,
+            learned=self.optics.facts(model.table),
             seconds=loop.seconds,
             finished=finished,
         )
-
-
-def _standing(model: SceneModel) -> Omission | None:
-    """What the motion does not carry; None where it carries all, or there is none."""
-    still = int((~model.moves).sum())
-    if isinstance(model.learned, Still) or still == 0:
-        return None
-    return Omission(
-        what="motion of what stands",
-        why=f"{still:,} of {len(model):,} Gaussians look the same at all times",
-        saved=f"{still / len(model):.0%} of all motion look-ups and stored motion",
-    )
-
-
-def fingerprint(asked: FitRun) -> str:
-    """A hash of everything that decides the result, but not of when it was stopped."""
-    capture = asked.capture
-    numbers: list[Tensor] = [
-        capture.cameras.world_from_camera,
-        capture.cameras.focal_px,
-        capture.times_s,
-        capture.held_out,
-    ]
-    digest = hashlib.sha256(json.dumps(asdict(asked.settings), sort_keys=True).encode())
-    for tensor in numbers:
-        digest.update(tensor.contiguous().numpy().tobytes())
-    if asked.init is not None:
-        digest.update(asked.init.gaussians.means.contiguous().numpy().tobytes())
-    return digest.hexdigest()

@@ -1,14 +1,14 @@
 """How well a scene shows frames that it has not seen.
 
 Axes: ``h w`` pixels. As published comparisons do: pictures of eight bits, one PSNR and SSIM per
-frame, then the mean; PSNR over all pixels that count.
+frame, then the mean; PSNR over all pixels that count and that the lens sees.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture, Frame
@@ -17,7 +17,10 @@ from diff4splat.metrics.structure import WINDOW_PX, ssim
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.scene import Scene
+from diff4splat.training.per_scene.optics.camera_model import CameraModel
 from diff4splat.training.per_scene.pictures import FrameStore
+from diff4splat.training.per_scene.sight import Sight, counted
 
 BEST_PSNR_DB = 99.0
 """Of equal pictures, whose PSNR is infinite."""
@@ -37,37 +40,55 @@ class FrameQuality:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judge:
-    """Renders frames of a capture and compares."""
+    """Makes frames of a capture and compares."""
 
-    capture: Capture
+    sight: Sight
     store: FrameStore
-    backend: str = "auto"
 
     def frames(
         self,
-        state_at: Callable[[float], Gaussians],
+        scene: Scene,
+        known: CameraModel | None,
         indices: Sequence[int],
         with_ssim: bool = False,
         advance: Callable[[], None] = lambda: None,
     ) -> list[FrameQuality]:
-        """Quality of each frame."""
+        """Quality of each frame, through cameras as far as they are ``known``."""
         found = []
         for index in indices:
-            made = self.picture(state_at(float(self.capture.times_s[index])), index)
-            found.append(self._compare(made, index, with_ssim))
+            made, seen = self.picture(scene, known, index)
+            frame = self.store.read(index)
+            frame = replace(frame, counts=counted(frame, seen))
+            found.append(self._compare(made, frame, index, with_ssim))
             advance()
         return found
 
     @torch.no_grad()
-    def picture(self, state: Gaussians, index: int) -> Float[Tensor, "h w 3"]:
-        """What the scene shows in place of a frame, rounded to eight bits."""
-        settings = RenderSettings(background=self.capture.background or (0.0, 0.0, 0.0))
-        camera = self.capture.cameras[index]
-        made = render(state, camera, settings=settings, backend=self.backend).rgb
-        return (made.clamp(0, 1) * 255).round() / 255
+    def picture(
+        self, scene: Scene, known: CameraModel | None, index: int
+    ) -> tuple[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]]:
+        """What the scene shows in place of a frame, rounded to eight bits, and where."""
+        if self.sight.traced:
+            made = self.sight.show(scene, self.sight.camera(index, known), index)
+            rgb, seen = made.rgb, made.valid
+        else:
+            rgb = self._drawn(scene.state_at(float(self.capture.times_s[index])), index)
+            seen = torch.ones(rgb.shape[:2], dtype=torch.bool)
+        return (rgb.clamp(0, 1) * 255).round() / 255, seen
 
-    def _compare(self, made: Float[Tensor, "h w 3"], index: int, with_ssim: bool) -> FrameQuality:
-        frame = self.store.read(index)
+    @property
+    def capture(self) -> Capture:
+        """What is compared with."""
+        return self.sight.capture
+
+    def _drawn(self, state: Gaussians, index: int) -> Float[Tensor, "h w 3"]:
+        settings = RenderSettings(background=self.sight.background)
+        camera = self.capture.cameras[index]
+        return render(state, camera, settings=settings, backend=self.sight.drawing).rgb
+
+    def _compare(
+        self, made: Float[Tensor, "h w 3"], frame: Frame, index: int, with_ssim: bool
+    ) -> FrameQuality:
         structure = None
         if with_ssim and min(made.shape[:2]) >= WINDOW_PX:
             structure = float(ssim(made, frame.rgb))

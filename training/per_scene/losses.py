@@ -11,11 +11,14 @@ from torch import Tensor
 
 from diff4splat.data.capture.capture import Flow, Frame
 from diff4splat.metrics.structure import WINDOW_PX, ssim
+from diff4splat.render.physical.settings import Photograph
 from diff4splat.render.settings import RenderOutput
 from diff4splat.training.per_scene.settings import Weights
 
 
-def picture_loss(made: RenderOutput, frame: Frame, weights: Weights) -> Float[Tensor, ""]:
+def picture_loss(
+    made: RenderOutput | Photograph, frame: Frame, weights: Weights
+) -> Float[Tensor, ""]:
     """All weighted terms that ``made`` has outputs for."""
     counts = frame.counts
     rgb = made.rgb

@@ -9,26 +9,41 @@ import torch
 from jaxtyping import Bool, Int
 from torch import Tensor
 
+from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.protocol import Motion
-from diff4splat.training.per_scene.canonical import COLUMNS, activated
+from diff4splat.scene.scene import Provenance, Scene
+from diff4splat.training.per_scene.canonical import COLUMNS, activated, bound
 from diff4splat.training.per_scene.motions.protocol import LearnedMotion
+from diff4splat.training.per_scene.optics.camera_model import CameraModel
+from diff4splat.training.per_scene.optics.learned import LearnedOptics
 from diff4splat.training.per_scene.settings import Rates
 from diff4splat.training.per_scene.table import ParameterTable
+
+UNFINISHED = Provenance(generator="diff4splat fit")
 
 
 class SceneModel:
     """Gaussians and a motion; ``moves`` says whom the motion carries."""
 
     def __init__(
-        self, rows: Mapping[str, Tensor], motion: LearnedMotion, moves: Bool[Tensor, " n"]
+        self,
+        rows: Mapping[str, Tensor],
+        motion: LearnedMotion,
+        moves: Bool[Tensor, " n"],
+        optics: LearnedOptics | None = None,
+        before: ParameterTable | None = None,
     ) -> None:
-        """``rows`` are canonical numbers; columns of the motion that they lack get its start."""
+        """``rows`` are canonical numbers; columns of the motion that they lack get its start.
+
+        The cameras of ``optics`` set out as an earlier stage left them in the table ``before``.
+        """
         count = len(moves)
         columns = {**motion.columns(count), **rows}
         wanted = (*COLUMNS, *motion.columns(0))
-        self.table = ParameterTable({name: columns[name] for name in wanted}, motion.shared())
-        self.learned, self.moves = motion, moves
+        shared = dict(motion.shared()) | ({} if optics is None else optics.shared(before))
+        self.table = ParameterTable({name: columns[name] for name in wanted}, shared)
+        self.learned, self.moves, self.optics = motion, moves, optics
 
     def __len__(self) -> int:
         return len(self.table)
@@ -50,11 +65,31 @@ class SceneModel:
         """The Gaussians at a time; differentiable."""
         return self.motion(degree).state_at(self.canonical(degree), time_s)
 
+    def scene(self, degree: int, path: CameraPath) -> Scene:
+        """Gaussians and motion in one, along any path; differentiable."""
+        return Scene(
+            gaussians=self.canonical(degree),
+            motion=self.motion(degree),
+            path=path,
+            provenance=UNFINISHED,
+        )
+
+    def cameras(self, learning: bool) -> CameraModel | None:
+        """The cameras as they are now; None is what the capture says."""
+        return None if self.optics is None else self.optics.model(self.table, learning)
+
+    def bound(self) -> None:
+        """Pull numbers back to where values and gradients are finite."""
+        bound(self.table)
+        if self.optics is not None:
+            self.optics.bound(self.table)
+
     def rates(self, rates: Rates, extent: float, progress: float) -> dict[str, float]:
         """The learning rate of every tensor."""
         found = {name: getattr(rates, name).at(progress) for name in COLUMNS}
         found["means"] *= extent
-        return found | dict(self.learned.rates(rates, extent, progress))
+        own = {} if self.optics is None else self.optics.rates(rates, progress)
+        return found | dict(self.learned.rates(rates, extent, progress)) | own
 
     def keep(self, kept: Bool[Tensor, " n"]) -> None:
         """Drop all other Gaussians."""

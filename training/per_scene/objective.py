@@ -1,68 +1,121 @@
-"""One step's loss: pictures of one time, rendered and compared."""
+"""One step's loss: pictures of one time, made and compared."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.data.capture.capture import Capture
-from diff4splat.paths.camera_path import CameraPath
+from diff4splat.data.capture.capture import Capture, Frame
+from diff4splat.errors import ConfigError
+from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
-from diff4splat.scene.scene import Provenance, Scene
+from diff4splat.scene.scene import Scene
+from diff4splat.training.per_scene.density import flat_half_pictures
 from diff4splat.training.per_scene.losses import flow_loss, picture_loss
 from diff4splat.training.per_scene.model import SceneModel
+from diff4splat.training.per_scene.optics.camera_model import shows
 from diff4splat.training.per_scene.pictures import FrameStore
 from diff4splat.training.per_scene.settings import FitSettings
+from diff4splat.training.per_scene.sight import Sight, counted, half_pictures
 
-UNFINISHED = Provenance(generator="diff4splat fit")
+
+class StepLoss(NamedTuple):
+    """What a step learns from."""
+
+    loss: Float[Tensor, ""]
+    """Mean over the frames, with regularisers."""
+    means: Float[Tensor, "n 3"]
+    """Keep the gradients that say where Gaussians are pulled to."""
+    half_pictures: Float[Tensor, " n"]
+    """Scene units per half picture at each of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objective:
-    """Compares a model with the frames of a capture."""
+    """Compares a model with the frames of a capture.
 
-    capture: Capture
+    Raises:
+        ConfigError: flow is asked for, and cameras are more than pinholes.
+    """
+
+    sight: Sight
     store: FrameStore
     settings: FitSettings
-    backend: str = "auto"
+
+    def __post_init__(self) -> None:
+        if self.settings.weights.flow and shows(self.capture.optics):
+            raise ConfigError(
+                "weights.flow: expected 0 for cameras with optics, since flow is that of pinholes, "
+                f"got {self.settings.weights.flow:g}; leave it out"
+            )
+
+    @property
+    def capture(self) -> Capture:
+        """What is to be explained."""
+        return self.sight.capture
 
     def loss(
-        self, model: SceneModel, time_s: float, frames: list[int], degree: int
-    ) -> tuple[Float[Tensor, ""], Gaussians]:
-        """Mean over the frames, with regularisers; and the state, whose means keep gradients."""
-        motion = model.motion(degree)
-        canonical = model.canonical(degree)
-        state = motion.state_at(canonical, time_s)
-        if state.means.requires_grad:
-            state.means.retain_grad()
-        terms = [self._picture(state, index) for index in frames]
+        self, model: SceneModel, time_s: float, frames: list[int], degree: int, number: int = 0
+    ) -> StepLoss:
+        """The loss over ``frames`` in step ``number`` of the fit."""
+        scene = model.scene(degree, self.sight.path)
+        if self.sight.traced:
+            terms, means, lengths = self._photographs(model, scene, time_s, frames, number)
+        else:
+            state = scene.state_at(time_s)
+            if state.means.requires_grad:
+                state.means.retain_grad()
+            terms = [self._picture(state, index) for index in frames]
+            means = state.means
+            cameras = self.capture.cameras[torch.tensor(frames)]
+            lengths = flat_half_pictures(means.detach(), cameras)
         if self.settings.weights.flow:
-            terms += self._flows(
-                Scene(gaussians=canonical, motion=motion, path=self._path(), provenance=UNFINISHED),
-                time_s,
-                frames,
-            )
+            terms += self._flows(scene, time_s, frames)
         total = torch.stack(terms).sum() / len(frames)
         penalty = model.learned.penalty(model.table, self.settings.weights)
-        return (total if penalty is None else total + penalty), state
+        return StepLoss(total if penalty is None else total + penalty, means, lengths)
+
+    def _photographs(
+        self, model: SceneModel, scene: Scene, time_s: float, frames: list[int], number: int
+    ) -> tuple[list[Tensor], Float[Tensor, "n 3"], Float[Tensor, " n"]]:
+        """Terms, the canonical means (nobody else knows all states), and half pictures."""
+        known = model.cameras(learning=number >= self.settings.camera.start)
+        cameras = [self.sight.camera(index, known) for index in frames]
+        terms = [
+            self._photograph(scene, camera, index, number)
+            for camera, index in zip(cameras, frames, strict=True)
+        ]
+        with torch.no_grad():
+            places = scene.state_at(time_s).means
+            lengths = half_pictures(places, cameras, time_s)
+        return terms, scene.gaussians.means, lengths
+
+    def _photograph(
+        self, scene: Scene, camera: PhysicalCamera, index: int, number: int
+    ) -> Float[Tensor, ""]:
+        frame, weights = self.store.read(index), self.settings.weights
+        seed = self.sight.step_seed(number, index)
+        made = self.sight.learn(scene, camera, index, self._outputs(frame), seed)
+        return picture_loss(made, replace(frame, counts=counted(frame, made.valid)), weights)
 
     def _picture(self, state: Gaussians, index: int) -> Float[Tensor, ""]:
         frame = self.store.read(index)
-        weights = self.settings.weights
-        outputs = {"rgb"}
-        if weights.depth and frame.depth is not None and self.settings.use_depth:
-            outputs.add("depth")
         made = render(
             state,
             self.capture.cameras[index],
-            outputs=outputs,
-            settings=RenderSettings(background=self.background),
-            backend=self.backend,
+            outputs=self._outputs(frame),
+            settings=RenderSettings(background=self.sight.background),
+            backend=self.sight.drawing,
         )
-        return picture_loss(made, frame, weights)
+        return picture_loss(made, frame, self.settings.weights)
+
+    def _outputs(self, frame: Frame) -> set[str]:
+        weighted = self.settings.weights.depth and self.settings.use_depth
+        return {"rgb", "depth"} if weighted and frame.depth is not None else {"rgb"}
 
     def _flows(self, scene: Scene, time_s: float, frames: list[int]) -> list[Tensor]:
         """Terms of the frames whose flow is known."""
@@ -77,16 +130,12 @@ class Objective:
             )
             camera = self.capture.cameras[index]
             made = render(
-                scene, camera, time_s, outputs=("flow",), settings=settings, backend=self.backend
+                scene,
+                camera,
+                time_s,
+                outputs=("flow",),
+                settings=settings,
+                backend=self.sight.drawing,
             )
             found.append(self.settings.weights.flow * flow_loss(made.flow, flow))
         return found
-
-    def _path(self) -> CameraPath:
-        """Scenes suggest one; nothing here looks at it."""
-        return CameraPath(cameras=self.capture.cameras[:1], times_s=self.capture.times_s[:1])
-
-    @property
-    def background(self) -> tuple[float, float, float]:
-        """What lies behind the scene."""
-        return self.capture.background or (0.0, 0.0, 0.0)

@@ -11,8 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture, PointCloud
-from diff4splat.geometry.camera import project
-from diff4splat.geometry.depth import unproject
+from diff4splat.training.per_scene.lens_points import fallen, lifted
 from diff4splat.training.per_scene.region import Region
 
 SHELL_SHARE = 0.15
@@ -65,8 +64,8 @@ def _from_depth(capture: Capture, count: int, generator: torch.Generator) -> Poi
         frame = capture.frames.read(index)
         if frame.depth is None:
             return None
-        points = unproject(capture.cameras[index].to(torch.float32), frame.depth)
-        seen = frame.depth > 0 if frame.counts is None else (frame.depth > 0) & frame.counts
+        points, known = lifted(capture.physical_camera(index), frame.depth)
+        seen = known if frame.counts is None else known & frame.counts
         drawn = torch.randperm(int(seen.sum()), generator=generator)
         drawn = drawn[: math.ceil(count / len(nearest))]
         positions.append(points[seen][drawn])
@@ -93,10 +92,8 @@ def _colored(capture: Capture, positions: Float[Tensor, "p 3"], views: int = 16)
     at = torch.linspace(0, len(learnt) - 1, min(views, len(learnt))).round().long()
     total, seen = torch.full_like(positions, 0.5), torch.ones(len(positions), 1)
     for index in learnt[at].tolist():
-        pixels, z = project(capture.cameras[index].to(torch.float32), positions)
-        height, width = capture.cameras.size_px
-        column, row = pixels.nan_to_num(-1.0, -1.0, -1.0).clamp(-1, 1e6).floor().long().unbind(-1)
-        inside = (z > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        pixels, inside = fallen(capture.physical_camera(index), positions)
+        column, row = torch.where(inside[:, None], pixels, 0.0).floor().long().unbind(-1)
         rgb = capture.frames.read(index).rgb
         total[inside] += rgb[row[inside], column[inside]]
         seen[inside] += 1

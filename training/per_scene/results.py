@@ -7,7 +7,7 @@ import json
 import math
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from diff4splat.io.atomic import atomic_folder, write_text
 from diff4splat.io.images import write_png
 from diff4splat.io.scene_file import save_scene
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.render.physical.viewer import radians_per_pixel
 from diff4splat.report.card import LIBRARIES, scene_facts
 from diff4splat.report.phases import peak_memory_bytes
 from diff4splat.report.run_log import RunLog
@@ -79,7 +80,12 @@ def shown_path(capture: Capture) -> CameraPath:
             times_s.append((index, time_s))
             last = time_s
     kept = torch.tensor([index for index, _ in times_s])
-    return CameraPath(cameras=capture.cameras[kept], times_s=capture.times_s[kept])
+    cameras = capture.cameras[kept]
+    if capture.optics is not None:
+        # A path is of pinholes: as fine as the lens in the middle of the picture.
+        step = radians_per_pixel(cameras[0], capture.optics)
+        cameras = replace(cameras, focal_px=torch.full_like(cameras.focal_px, 1 / step))
+    return CameraPath(cameras=cameras, times_s=capture.times_s[kept])
 
 
 def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
@@ -101,9 +107,9 @@ def _comparison(report: FitReport, scene: Scene) -> Float[Tensor, "h w 3"]:
     qualities = report.result.held_out or report.result.training
     at = torch.linspace(0, len(qualities) - 1, min(SHOWN, len(qualities))).round().long()
     chosen = [qualities[i] for i in at.tolist()]
-    judge = Judge(capture=report.capture, store=FrameStore(report.capture))
+    judge = Judge(sight=report.result.sight, store=FrameStore(report.capture))
     truths = [judge.store.read(quality.frame).rgb for quality in chosen]
-    made = [judge.picture(scene.state_at(q.time_s), q.frame) for q in chosen]
+    made = [judge.picture(scene, report.result.cameras, q.frame)[0] for q in chosen]
     labels = [f"camera {q.camera}, {q.time_s:.2f} s: {q.psnr_db:.1f} dB" for q in chosen]
     return comparison(truths, made, labels)
 
@@ -123,6 +129,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
         },
         "held_out": quality_facts(result.held_out),
         "training": quality_facts(result.training),
+        "cameras_learned": result.learned,
         "finished": result.finished,
         "settings": asdict(report.settings),
         "provenance": asdict(scene.provenance),

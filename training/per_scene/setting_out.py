@@ -17,6 +17,7 @@ from diff4splat.training.per_scene.motions.hexplane import HexPlaneField
 from diff4splat.training.per_scene.motions.protocol import LearnedMotion
 from diff4splat.training.per_scene.motions.spacetime import Pulses
 from diff4splat.training.per_scene.motions.still import Still
+from diff4splat.training.per_scene.optics.learned import LearnedOptics
 from diff4splat.training.per_scene.points import starting_points
 from diff4splat.training.per_scene.region import Region
 from diff4splat.training.per_scene.settings import FitSettings
@@ -24,12 +25,14 @@ from diff4splat.training.per_scene.settings import FitSettings
 BOUNDS_QUANTILE, BOUNDS_MARGIN = 0.01, 0.1
 
 
-def standing_model(capture: Capture, region: Region, settings: FitSettings) -> SceneModel:
+def standing_model(
+    capture: Capture, region: Region, settings: FitSettings, optics: LearnedOptics | None = None
+) -> SceneModel:
     """Points of the capture, without motion."""
     points = starting_points(capture, region, settings.points, settings.use_depth, settings.seed)
     nobody = torch.zeros(len(points.positions), dtype=torch.bool)
     rows = raw_points(points, settings.harmonics)
-    return SceneModel(rows, Still(capture.time_range_s), nobody)
+    return SceneModel(rows, Still(capture.time_range_s), nobody, optics)
 
 
 def field_bounds(means: Float[Tensor, "n 3"]) -> Float[Tensor, "2 3"]:
@@ -56,7 +59,9 @@ def create_motion(
     return Pulses(capture.time_range_s, 0.5 * (stop_s - start_s) / max(times - 1, 1))
 
 
-def initial_model(scene: Scene, capture: Capture, settings: FitSettings) -> SceneModel:
+def initial_model(
+    scene: Scene, capture: Capture, settings: FitSettings, optics: LearnedOptics | None = None
+) -> SceneModel:
     """A ready scene, at the middle of its time, seen from the world of the capture.
 
     The first camera of the scene's path is put where the first training frame was taken; lengths
@@ -73,4 +78,4 @@ def initial_model(scene: Scene, capture: Capture, settings: FitSettings) -> Scen
     state = scene.state_at(sum(scene.motion.time_range_s) / 2)
     rows = raw_gaussians(transform_gaussians(state, similarity), settings.harmonics)
     nobody = torch.zeros(len(state), dtype=torch.bool)
-    return SceneModel(rows, Still(capture.time_range_s), nobody)
+    return SceneModel(rows, Still(capture.time_range_s), nobody, optics)

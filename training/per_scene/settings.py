@@ -13,6 +13,7 @@ from diff4splat.scene.motion.hexplane.decoder import DecoderSize
 from diff4splat.scene.motion.hexplane.planes import HexPlaneSize
 
 MotionName = Literal["hexplane", "spacetime", "static"]
+CameraPart = Literal["lens", "focus", "aperture", "readout", "focal"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +42,13 @@ class Rates:
     decoder: Decay = Decay(first=1e-3, last=5e-5)
     velocities: Decay = Decay(first=1e-2, last=1e-4)
     times: Decay = Decay(first=1e-2, last=1e-3)
+    lens: Decay = Decay(first=5e-2, last=2e-3)
+    """In pixels of displacement."""
+    focus: Decay = Decay(first=1e-2, last=5e-4)
+    """Of logarithms, as the next three."""
+    aperture: Decay = Decay(first=1e-2, last=5e-4)
+    readout: Decay = Decay(first=2e-2, last=1e-3)
+    focal: Decay = Decay(first=2e-3, last=1e-4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +95,25 @@ class Stillness:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSettings:
+    """What is learned of the cameras, and how rays make pictures where rays are needed."""
+
+    learn: tuple[CameraPart, ...] = ()
+    """Parts that the capture only guesses: they start from there."""
+    start: int = 100
+    """Steps of the whole fit before they are learned: first the scene has to be there."""
+    samples: int = 8
+    """Rays per pixel in a step, where an aperture or an exposure needs several; other ones each
+    time. Fewer are faster and noisier."""
+    shown_samples: int = 64
+    """The same for pictures that are judged and shown."""
+    tolerance_px: float = 0.3
+    """How far anything may be from its place at the time of a ray, in a step."""
+    most_intervals: int = 4
+    """Into which the time of a picture is split in a step."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FitSettings:
     """One fit."""
 
@@ -108,6 +135,7 @@ class FitSettings:
     density: Density = field(default_factory=Density)
     weights: Weights = field(default_factory=Weights)
     stillness: Stillness = field(default_factory=Stillness)
+    camera: CameraSettings = field(default_factory=CameraSettings)
     planes: HexPlaneSize = field(default_factory=lambda: HexPlaneSize(space=(32, 32, 32), time=25))
     decoder: DecoderSize = field(
         default_factory=lambda: DecoderSize(
@@ -127,10 +155,15 @@ class FitSettings:
             "points": self.points, "density.budget": self.density.budget,
             "time_slices": self.time_slices,
             "picture_memory_mb": self.picture_memory_mb,
+            "camera.samples": self.camera.samples,
+            "camera.shown_samples": self.camera.shown_samples,
+            "camera.most_intervals": self.camera.most_intervals,
         }  # fmt: skip
         for name, value in counts.items():
             if value < 1:
                 raise ConfigError(f"{name}: expected at least 1, got {value}")
+        if len(set(self.camera.learn)) < len(self.camera.learn):
+            raise ConfigError(f"camera.learn: expected each part once, got {self.camera.learn}")
         checks = self.stillness.checks
         if not all(0 < share <= 1 for share in checks):
             raise ConfigError(

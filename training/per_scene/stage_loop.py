@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from diff4splat.training.per_scene.canonical import bound
 from diff4splat.training.per_scene.density import Pull, grow_and_prune
 from diff4splat.training.per_scene.guard import Guard
 from diff4splat.training.per_scene.judging import Judge, mean_psnr_db
@@ -95,9 +94,9 @@ class StageLoop:
         held = self.course.objective.capture.held_out.nonzero().flatten()
         some = torch.linspace(0, len(held) - 1, min(LIVE_FRAMES, len(held))).round().long()
         with torch.no_grad():
-            found = self.course.judge.frames(
-                lambda time_s: self.model.state_at(time_s, self.degree), held[some].tolist()
-            )
+            scene = self.model.scene(self.degree, self.course.objective.sight.path)
+            known = self.model.cameras(learning=False)
+            found = self.course.judge.frames(scene, known, held[some].tolist())
         self.course.recorder.record(
             Reading(
                 stage=self.course.name,
@@ -113,19 +112,19 @@ class StageLoop:
     def _take_step(self) -> None:
         course, number = self.course, self.course.first_step + self.step
         time_s, frames = course.schedule.frames(number)
-        loss, state = course.objective.loss(self.model, time_s, frames, self.degree)
-        self._loss = float(loss.detach())
+        step = course.objective.loss(self.model, time_s, frames, self.degree, number)
+        self._loss = float(step.loss.detach())
         finite = math.isfinite(self._loss)
         if finite:
-            loss.backward()
+            step.loss.backward()
             finite = self._gradients_finite()
         if not self.guard.accepts(self._loss if finite else math.nan):
             self.model.table.optimizer.zero_grad(set_to_none=True)
             return
-        self.pull.add(state, course.objective.capture.cameras[torch.tensor(frames)])
+        self.pull.add(step.means, step.half_pictures)
         rates = self.model.rates(course.objective.settings.rates, course.extent, self.progress)
         self.model.table.step(rates)
-        bound(self.model.table)
+        self.model.bound()
         self.guard.passed(self.model, self.step)
 
     def _gradients_finite(self) -> bool:

@@ -76,6 +76,12 @@ class ParameterTable:
                     if moment in state:
                         state[moment][index] = 0
 
+    def rewrite_shared(self, name: str, value: Tensor) -> None:
+        """Give a shared tensor other numbers; it starts anew."""
+        with torch.no_grad():
+            self._leaves[name].copy_(value)
+        self.optimizer.state.pop(self._leaves[name], None)
+
     def tensors(self) -> dict[str, Tensor]:
         """Everything that makes the next step, detached: values and moments."""
         found = {}

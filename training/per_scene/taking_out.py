@@ -8,9 +8,11 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture
+from diff4splat.render.physical.viewer import radians_per_pixel
 from diff4splat.report.omissions import Omission
 from diff4splat.training.per_scene.canonical import raw_gaussians
 from diff4splat.training.per_scene.model import SceneModel
+from diff4splat.training.per_scene.motions.still import Still
 from diff4splat.training.per_scene.settings import FitSettings
 from diff4splat.training.per_scene.stillness import proved_still
 
@@ -55,7 +57,22 @@ def take_out_still(
 
 def length_per_px(capture: Capture, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
     """Scene units that one pixel covers at each point, in the nearest training camera."""
-    cameras = capture.cameras[capture.learnt].to(points.dtype)
+    learnt = capture.learnt
+    cameras = capture.cameras[learnt].to(points.dtype)
     places = cameras.position.unique(dim=0)
     distance = torch.cat([torch.cdist(part, places).amin(1) for part in points.split(4096)])
-    return distance / float(cameras.focal_px.mean())
+    if capture.optics is None:
+        return distance / float(cameras.focal_px.mean())
+    return distance * radians_per_pixel(capture.cameras[int(learnt[0])], capture.optics)
+
+
+def left_standing(model: SceneModel) -> Omission | None:
+    """What the motion does not carry; None where it carries all, or there is none."""
+    still = int((~model.moves).sum())
+    if isinstance(model.learned, Still) or still == 0:
+        return None
+    return Omission(
+        what="motion of what stands",
+        why=f"{still:,} of {len(model):,} Gaussians look the same at all times",
+        saved=f"{still / len(model):.0%} of all motion look-ups and stored motion",
+    )

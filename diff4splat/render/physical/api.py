@@ -14,7 +14,8 @@ from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.physical.effects import find_effects
 from diff4splat.render.physical.exposure import Exposure
 from diff4splat.render.physical.pinhole import drawn
-from diff4splat.render.physical.settings import Photograph, PhotoSettings, require_outputs
+from diff4splat.render.physical.settings import OUTPUTS, Photograph, PhotoSettings
+from diff4splat.render.settings import require_outputs
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
@@ -40,7 +41,7 @@ def photograph(
         InputError: a camera or time that is not finite, or more rays with gradients than memory
             holds.
     """
-    wanted = require_outputs(outputs)
+    wanted = require_outputs(outputs, OUTPUTS)
     own = scene_or_gaussians
     means = (own if isinstance(own, Gaussians) else own.gaussians).means
     camera = _usable(camera, time_s).to(means.dtype).to(means.device)

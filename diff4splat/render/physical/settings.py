@@ -4,14 +4,12 @@ Axes: ``h w`` pixels.
 """
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.errors import ConfigError
-from diff4splat.render.settings import RenderSettings
+from diff4splat.render.settings import RenderSettings, require_accepted
 from diff4splat.render.trace.settings import TraceSettings
 
 OUTPUTS = ("rgb", "alpha", "depth", "median_depth", "distance", "time_s")
@@ -60,11 +58,7 @@ class PhotoSettings:
             "most_intervals": self.most_intervals >= 1,
             "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
         }
-        for name, fine in accepted.items():
-            if not fine:
-                raise ConfigError(
-                    f"PhotoSettings.{name}: expected {_EXPECTED[name]}, got {getattr(self, name)}"
-                )
+        require_accepted(self, accepted, _EXPECTED)
 
 
 _EXPECTED = {
@@ -107,18 +101,3 @@ class Photograph:
     """What this picture did not need, in words."""
     dropped_nonfinite: int = 0
     """Gaussians left out because a parameter is NaN, infinite or too large."""
-
-
-def require_outputs(outputs: Collection[str]) -> frozenset[str]:
-    """The set of ``outputs`` when all of them are known.
-
-    Raises:
-        ConfigError: none is named, or a name is unknown.
-    """
-    known = ", ".join(OUTPUTS)
-    if isinstance(outputs, str) or not outputs:
-        raise ConfigError(f"outputs: expected a collection of names among {known}, got {outputs!r}")
-    unknown = sorted(set(outputs) - set(OUTPUTS))
-    if unknown:
-        raise ConfigError(f"outputs: expected names among {known}, got {', '.join(unknown)}")
-    return frozenset(outputs)

@@ -8,7 +8,7 @@ from small_fits import ball_capture
 
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.per_scene.canonical import activated, raw_points
-from diff4splat.training.per_scene.density import Pull, grow_and_prune, split
+from diff4splat.training.per_scene.density import Pull, flat_half_pictures, grow_and_prune, split
 from diff4splat.training.per_scene.model import SceneModel
 from diff4splat.training.per_scene.motions.spacetime import Pulses
 from diff4splat.training.per_scene.motions.still import Still
@@ -110,7 +110,8 @@ def test_pull_counts_only_what_was_seen():
     state.means.retain_grad()
     (state.means * torch.tensor([[1.0], [0.0], [2.0]])).sum().backward()
     pull = Pull(3)
-    pull.add(state, ball_capture(views=2, times=2, held=()).cameras[torch.tensor([0])])
+    cameras = ball_capture(views=2, times=2, held=()).cameras[torch.tensor([0])]
+    pull.add(state.means, flat_half_pictures(state.means.detach(), cameras))
     mean = pull.mean()
     assert mean[1] == 0 and mean[0] > 0 and mean[2] > 0
     pull.forget()

@@ -14,6 +14,7 @@ from diff4splat.training.per_scene.motions.spacetime import Pulses
 from diff4splat.training.per_scene.motions.still import Still
 from diff4splat.training.per_scene.pictures import FrameStore, Schedule
 from diff4splat.training.per_scene.settings import Density, FitSettings
+from diff4splat.training.per_scene.sight import Sight
 
 
 def departed(capture: Capture, moving: int, budget: int, use_depth: bool = True) -> Departure:
@@ -23,7 +24,7 @@ def departed(capture: Capture, moving: int, budget: int, use_depth: bool = True)
         density=Density(budget=budget),
     )  # fmt: skip
     around = Surroundings(
-        capture=capture, store=FrameStore(capture), schedule=Schedule(capture, 2, 0),
+        sight=Sight(capture=capture), store=FrameStore(capture), schedule=Schedule(capture, 2, 0),
         settings=settings,
     )  # fmt: skip
     moves = torch.arange(60) < moving

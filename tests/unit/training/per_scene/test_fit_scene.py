@@ -105,17 +105,18 @@ def test_divergence_keeps_the_last_good_state(tmp_path: Path, monkeypatch):
 
     def breaking(self, *arguments):
         calls[0] += 1
-        loss, state = original(self, *arguments)
-        return (loss * float("nan") if calls[0] > 130 else loss), state
+        step = original(self, *arguments)
+        return step._replace(loss=step.loss * float("nan")) if calls[0] > 130 else step
 
     monkeypatch.setattr(Objective, "loss", breaking)
     with pytest.raises(DivergenceError, match=r"state of step \d+ is kept"):
         fit_scene(run(tmp_path, coarse_steps=400))
     monkeypatch.undo()
     from diff4splat.training.per_scene import checkpoint
-    from diff4splat.training.per_scene.fit import fingerprint
+    from diff4splat.training.per_scene.identity import fingerprint
 
-    kept = checkpoint.load(tmp_path, fingerprint(run(tmp_path, coarse_steps=400)))
+    asked = run(tmp_path, coarse_steps=400)
+    kept = checkpoint.load(tmp_path, fingerprint(asked.capture, asked.settings, None))
     assert kept.step == 100
     assert all(bool(torch.isfinite(value).all()) for value in kept.tensors.values())
 

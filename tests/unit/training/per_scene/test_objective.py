@@ -13,6 +13,7 @@ from diff4splat.training.per_scene.motions.spacetime import Pulses
 from diff4splat.training.per_scene.objective import Objective
 from diff4splat.training.per_scene.pictures import FrameStore
 from diff4splat.training.per_scene.settings import FitSettings, Weights
+from diff4splat.training.per_scene.sight import Sight
 
 
 def flowing(offset_px: float) -> Capture:
@@ -26,10 +27,10 @@ def loss_and_velocity_gradient(capture: Capture, weights: Weights) -> tuple[floa
     rows = raw_gaussians(balls(0.0).to(torch.float32), 0)
     model = SceneModel(rows, Pulses((0.0, 1.0), 0.1), torch.ones(5, dtype=torch.bool))
     settings = FitSettings(motion="spacetime", weights=weights)
-    goal = Objective(capture=capture, store=FrameStore(capture), settings=settings)
-    loss, state = goal.loss(model, 0.0, [0], 0)
+    goal = Objective(sight=Sight(capture=capture), store=FrameStore(capture), settings=settings)
+    loss, means, _ = goal.loss(model, 0.0, [0], 0)
     loss.backward()
-    assert state.means.grad is not None
+    assert means.grad is not None
     return float(loss.detach()), model.table["velocities"].grad
 
 

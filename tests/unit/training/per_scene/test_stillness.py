@@ -12,6 +12,7 @@ from diff4splat.training.per_scene.model import SceneModel
 from diff4splat.training.per_scene.motions.spacetime import Pulses
 from diff4splat.training.per_scene.pictures import FrameStore, Schedule
 from diff4splat.training.per_scene.settings import FitSettings
+from diff4splat.training.per_scene.sight import Sight
 from diff4splat.training.per_scene.stillness import error_variation, proved_still
 from diff4splat.training.per_scene.taking_out import length_per_px, take_out_still
 
@@ -20,7 +21,9 @@ CAPTURE = ball_capture(views=4, times=3, held=())
 
 def test_the_ball_that_moves_varies_most_and_what_it_never_covers_hardly():
     still = balls(0.0).to(torch.float32)
-    varies = error_variation(still, CAPTURE, FrameStore(CAPTURE), Schedule(CAPTURE, 2, 0))
+    varies = error_variation(
+        still, Sight(capture=CAPTURE), FrameStore(CAPTURE), Schedule(CAPTURE, 2, 0)
+    )
     assert int(varies.argmax()) == 0
     assert float(varies[0]) > 0.1
     assert float(varies[1:].amin()) < 0.02
@@ -28,7 +31,9 @@ def test_the_ball_that_moves_varies_most_and_what_it_never_covers_hardly():
 
 def test_what_no_picture_shows_does_not_vary():
     away = replace(balls(0.0), means=balls(0.0).means + 100).to(torch.float32)
-    varies = error_variation(away, CAPTURE, FrameStore(CAPTURE), Schedule(CAPTURE, 2, 0))
+    varies = error_variation(
+        away, Sight(capture=CAPTURE), FrameStore(CAPTURE), Schedule(CAPTURE, 2, 0)
+    )
     assert not varies.any()
 
 

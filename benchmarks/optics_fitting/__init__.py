@@ -1,0 +1,1 @@
+"""Scenes fitted through optics, and optics recovered from wrong guesses."""
