@@ -43,7 +43,7 @@ READOUT_S = 0.16
 LENS = (0.05, -0.01, 0.002, 0.0)
 FOV_DEG = {"fisheye": 160.0, "lens": 120.0}
 FOCUS_DISTANCE, RADIUS = 1.3, 0.06
-STEPS = {"fisheye": 600, "rolling": 900, "lens": 600, "focus": 400, "readout": 900}
+STEPS = {"fisheye": 2000, "rolling": 2000, "lens": 2000, "focus": 600, "readout": 2000}
 
 
 def fisheye() -> list[Row]:

@@ -25,7 +25,7 @@ class CaptureOptions:
     """How the data are read."""
 
     format: str = "auto"
-    """dnerf, neu3d, hypernerf, colmap, transforms or clips; auto looks at the files."""
+    """dnerf, neu3d, hypernerf, colmap, transforms, clips or cameras; auto looks at the files."""
     hold_out: tuple[int, ...] | None = None
     """Cameras to hold out, from 0; if left out, the rule of the format."""
     downscale: int = 1
@@ -35,7 +35,7 @@ class CaptureOptions:
     fps: float | None = None
     """Frames per second, for formats that only count frames."""
     clip: str | None = None
-    """Which clip of a folder of shards."""
+    """Which clip of a folder of shards, or which effect of data sets of cameras."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,13 +5,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from diff4splat.cli.optics_options import WITH_FOCAL_LENGTH, OpticsOptions
+from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.geometry.camera import Camera
+    from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
     from diff4splat.geometry.lenses.protocol import Lens
     from diff4splat.paths.camera_path import CameraPath
 
 SENSOR_MM, FOV_DEG = 36.0, 180.0
+_ROUNDING = 1e-9
 BARREL = (-0.1, 0.02, 0.0, 0.0)
 """k1 k2 p1 p2 of an opencv lens where nobody says."""
 
@@ -68,6 +71,21 @@ def _opencv(given: tuple[float, ...]) -> "Lens":
     )
 
 
+def _fisheye_fov_deg(options: OpticsOptions, lens: "OpenCVFisheye") -> float:
+    """What was asked for, else 180 degrees or as far as the lens goes.
+
+    Raises:
+        ConfigError: the coefficients bend the picture back before that.
+    """
+    widest = math.degrees(2 * lens.largest_angle_rad)
+    if options.fov is not None and options.fov > widest * (1 + _ROUNDING):
+        raise ConfigError(
+            f"--fov: expected at most {widest:.4g} degrees, where these --lens-coefficients bend "
+            f"the picture back on itself, got {options.fov:g}; ask for less"
+        )
+    return min(FOV_DEG, widest * (1 - _ROUNDING)) if options.fov is None else options.fov
+
+
 def _lens_camera(options: OpticsOptions, lens: "Lens", size_px: tuple[int, int]) -> "Camera":
     """At the origin, float64."""
     import torch
@@ -80,8 +98,7 @@ def _lens_camera(options: OpticsOptions, lens: "Lens", size_px: tuple[int, int])
     from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 
     if isinstance(lens, OpenCVFisheye):
-        fov_deg = FOV_DEG if options.fov is None else options.fov
-        return fisheye_camera(fov_deg, size_px, lens, torch.float64)
+        return fisheye_camera(_fisheye_fov_deg(options, lens), size_px, lens, torch.float64)
     if options.lens == "blender":
         sensor_mm = SENSOR_MM if options.sensor_size is None else options.sensor_size
         return blender_camera(size_px, sensor_mm, torch.float64)

@@ -52,17 +52,19 @@ class PoseTrack:
         near = poses[max(first, 0) : last + 1]
         return len(near) < 2 or bool((near == near[0]).all())
 
-    def at(self, times_s: Float[Tensor, " r"]) -> Float[Tensor, "r 4 4"]:
-        """``world_from_camera`` at each time."""
-        poses = self.world_from_camera.to(times_s)
+    def at(
+        self, times_s: Float[Tensor, " r"], dtype: torch.dtype | None = None
+    ) -> Float[Tensor, "r 4 4"]:
+        """``world_from_camera`` at each time, in ``dtype`` or else that of the times."""
+        poses = self.world_from_camera.to(times_s.device, dtype or times_s.dtype)
         if len(poses) == 1:
             return poses.expand(len(times_s), 4, 4)
         keys = self.times_s.to(times_s.device)
         lower = torch.searchsorted(keys.detach().double(), times_s.detach().double(), right=True)
         lower = (lower - 1).clamp(0, len(keys) - 2)
-        gap = (keys[lower + 1] - keys[lower]).to(times_s)
         # Differences of times are small; the times may not be.
-        weight = ((times_s - keys[lower]).to(times_s) / gap).clamp(0, 1)
+        weight = (times_s - keys[lower]) / (keys[lower + 1] - keys[lower])
+        weight = weight.clamp(0, 1).to(poses)
         turns = quaternion.from_matrix(poses[:, :3, :3])
         turn = quaternion.slerp(turns[lower], turns[lower + 1], weight)
         places = poses[:, :3, 3]

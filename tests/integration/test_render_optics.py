@@ -177,7 +177,10 @@ def test_a_data_set_is_written_whole_and_once(
         (("--samples", "0", "--pixel-area"), "--samples: expected a finite number of at least 1"),
         (("--samples", "1000000", "--pixel-area"), "samples: expected 1 to 65536"),
         (("--lens", "fisheye", "--fov", "400"), "--fov: expected at most 360 degrees, got 400"),
-        (("--lens", "fisheye", "--lens-coefficients", "-9", "0", "0", "0"), "fov_deg: expected"),
+        (
+            ("--lens", "fisheye", "--lens-coefficients", "-9", "0", "0", "0", "--fov", "90"),
+            "--fov: expected at most 22.05 degrees",
+        ),
         (("--lens", "fisheye", "--out", "x.gif"), "--out: expected a name ending in .mp4"),
         (("--lens", "fisheye", "--frame", "9"), "--frame: expected -3 to 2, got 9"),
         (("--dataset", "--lens", "opencv"), "--dataset: expected --lens fisheye or blender"),

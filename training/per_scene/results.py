@@ -19,6 +19,7 @@ from diff4splat import __version__
 from diff4splat.data.capture.capture import Capture
 from diff4splat.io.atomic import atomic_folder, write_text
 from diff4splat.io.images import write_png
+from diff4splat.io.optics_json import optics_json
 from diff4splat.io.scene_file import save_scene
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.physical.viewer import radians_per_pixel
@@ -130,6 +131,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
         "held_out": quality_facts(result.held_out),
         "training": quality_facts(result.training),
         "cameras_learned": result.learned,
+        "optics": None if result.cameras is None else optics_json(result.cameras.optics),
         "finished": result.finished,
         "settings": asdict(report.settings),
         "provenance": asdict(scene.provenance),

@@ -150,9 +150,10 @@ def _to_world(
     if camera.track is not None:
         times_s = offset_s.double().flatten() + time_s
         if bool((times_s == times_s[:1]).all()) and not times_s.requires_grad:
-            poses = camera.track.at(times_s[:1])[0].to(directions)
+            poses = camera.track.at(times_s[:1], directions.dtype)[0]
         else:
-            poses = camera.track.at(times_s).to(directions).unflatten(0, tuple(offset_s.shape))
+            each = camera.track.at(times_s, directions.dtype)
+            poses = each.unflatten(0, tuple(offset_s.shape))
     turn, place = poses[..., :3, :3], poses[..., :3, 3]
     turned = (turn @ directions[..., None]).squeeze(-1)
     return (turn @ origins[..., None]).squeeze(-1) + place, turned

@@ -16,6 +16,7 @@ from diff4splat.render.trace.primitives import prepare
 from diff4splat.render.trace.settings import TraceSettings
 from diff4splat.render.trace.shade import SEEN, shade
 from diff4splat.render.trace.tables import (
+    MEAN,
     MOVING_COLUMNS,
     STILL_COLUMNS,
     Cloud,
@@ -31,6 +32,9 @@ from diff4splat.render.trace.tables import (
 from diff4splat.render.trace.tree import NOTHING_KNOWN, build
 
 PACKETS_PER_PART = 16
+_ASKED = 1024
+"""Gaussians that tell how far away the scene is."""
+_LEAST_SIZE = 1e-30
 _BYTES_PER_HIT, _SHARES = 12, 16
 """A packet may use a sixteenth of the memory, whatever the threads: that says where it is cut."""
 _LEAST_EXPONENT = -125.0
@@ -112,7 +116,9 @@ def make_sight(
     """Rays (origins, directions, times) cut into packets."""
     return Sight(
         world,
-        bundle_rays(*arrays, _viewed_size(world.tree, arrays[0])),
+        bundle_rays(
+            *arrays, _viewed_size(world.tree, arrays[0]), _viewed_distance(world, arrays[0])
+        ),
         rules,
         bands,
         settings.memory_bytes // (_BYTES_PER_HIT * _SHARES),
@@ -123,4 +129,14 @@ def _viewed_size(tree: Tree, origins: Floats) -> float:
     """Half size of the scene, and how far away the first ray begins."""
     corners = tree.nodes[-1:][np.isfinite(tree.nodes[-1:])]
     away = origins[:1].astype(np.float64) - tree.anchor
-    return max(float(np.abs(corners).max(initial=0.0) + np.abs(away).max(initial=0.0)), 1e-30)
+    return max(float(np.abs(corners).max(initial=0.0) + np.abs(away).max(initial=0.0)), _LEAST_SIZE)
+
+
+def _viewed_distance(world: World, origins: Floats) -> float:
+    """From the first ray's origin to half of the scene's Gaussians, by some of them."""
+    order = world.tree.order
+    if not len(order) or not len(origins):
+        return _LEAST_SIZE
+    some = order[:: max(len(order) // _ASKED, 1)]
+    away = world.primitives[some, MEAN : MEAN + 3] - origins[:1]
+    return max(float(np.median(np.linalg.norm(away, axis=1))), _LEAST_SIZE)

@@ -114,7 +114,7 @@ def test_packets_look_the_same_way() -> None:
         directions=torch.randn(500, 3, generator=generator),
     )
     made = bundle_rays(
-        rays.origins.numpy(), rays.directions.numpy(), rays.origins.numpy()[:0, 0], 5.0
+        rays.origins.numpy(), rays.directions.numpy(), rays.origins.numpy()[:0, 0], 5.0, 2.0
     )
     assert sorted(made.order.tolist()) == list(range(500))
     assert made.starts[0] == 0
