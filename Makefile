@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Test files side by side, one core each: threads of several processes would wait for each other.
+PARALLEL := OMP_NUM_THREADS=1
 PROMPT ?= in a meadow, a turquoise rounded block slides to the left
 
 .PHONY: demo test test-all lint clean
@@ -22,10 +24,10 @@ ifdef PHOTO
 endif
 
 test: $(VENV)/ready  ## everything that needs neither a GPU nor patience
-	$(BIN)/pytest -q -m "not slow"
+	$(PARALLEL) $(BIN)/pytest -q -m "not slow" -n auto --dist loadfile
 
 test-all: $(VENV)/ready  ## the same and the slow tests
-	$(BIN)/pytest -q
+	$(PARALLEL) $(BIN)/pytest -q -n auto --dist loadfile
 
 lint: $(VENV)/ready
 	$(BIN)/ruff check .

@@ -6,6 +6,7 @@ from dataclasses import replace
 import torch
 
 from diff4splat.data.capture.capture import Capture
+from diff4splat.data_prep.readers.angular import NOTES, shared_optics
 from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.data_prep.readers.shot_frames import ShotFrames, require_size
 from diff4splat.data_prep.readers.shots import Draft, Shot
@@ -19,7 +20,7 @@ def finish(draft: Draft, options: ReadOptions) -> Capture:
     Raises:
         InputError: there are no pictures.
         ConfigError: the pictures are smaller than one block of the downscaling.
-        FileFormatError: a picture is missing, or of another size or shape.
+        FileFormatError: a picture is missing, or of another size, shape or lens.
     """
     if not draft.shots:
         raise InputError(f"{draft.name}: expected pictures, got none; check the folder")
@@ -33,6 +34,7 @@ def finish(draft: Draft, options: ReadOptions) -> Capture:
         camera_index=torch.tensor([shot.camera for shot in shots]),
         held_out=torch.tensor([shot.held_out for shot in shots]),
         frames=ShotFrames(shots, draft.background, draft.shrink),
+        optics=shared_optics(shots),
         points=draft.points,
         background=draft.background,
         split_reason=draft.split_reason,
@@ -81,8 +83,9 @@ def _notes(shots: list[Shot], draft: Draft, step: int) -> tuple[str, ...]:
     left_over = max(side % draft.shrink for side in first.lens.size_px)
     done = {
         "lens distortion was removed from the pictures; pixels without a source do not count": any(
-            not shot.lens.is_pinhole for shot in shots
+            shot.lens.is_bent for shot in shots
         ),
+        NOTES.get(first.lens.model, ""): first.lens.is_angular,
         f"one time in {step} of each camera was taken": step > 1,
         f"up to {left_over} rows or columns were cut, so that blocks of {draft.shrink} pixels "
         "fill the picture": left_over > 0,

@@ -113,7 +113,7 @@ def require_known_model(name: str, where: str) -> None:
     """Refuse a camera model by its name.
 
     Raises:
-        FileFormatError: its pictures cannot be straightened here.
+        FileFormatError: its pictures can neither be straightened nor seen through it here.
     """
     if name not in PARAMETERS:
         raise FileFormatError(

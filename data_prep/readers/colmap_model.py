@@ -25,7 +25,16 @@ MODEL_NAMES = (
     "THIN_PRISM_FISHEYE",
 )
 """By the number that binary files have for them."""
-PARAMETERS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8}
+PARAMETERS = {
+    "SIMPLE_PINHOLE": 3,
+    "PINHOLE": 4,
+    "SIMPLE_RADIAL": 4,
+    "RADIAL": 5,
+    "OPENCV": 8,
+    "OPENCV_FISHEYE": 8,
+    "SIMPLE_RADIAL_FISHEYE": 4,
+    "RADIAL_FISHEYE": 5,
+}
 """How many numbers each of the models has that can be read."""
 
 SPARSE_FOLDERS = ("sparse/0", "sparse", "sparse_", "colmap/sparse/0", "colmap/sparse")

@@ -1,11 +1,13 @@
 """A COLMAP model from either kind of files, and what it means: lenses and poses.
 
 Axes: ``i`` images. With SIMPLE_PINHOLE f, c_x, c_y; PINHOLE f_x, f_y, c_x, c_y; SIMPLE_RADIAL
-f, c_x, c_y, k; RADIAL f, c_x, c_y, k₁, k₂; OPENCV f_x, f_y, c_x, c_y, k₁, k₂, p₁, p₂
-(https://colmap.github.io/cameras.html).
+f, c_x, c_y, k; RADIAL f, c_x, c_y, k₁, k₂; OPENCV f_x, f_y, c_x, c_y, k₁, k₂, p₁, p₂. The fisheyes
+SIMPLE_RADIAL_FISHEYE f, c_x, c_y, k; RADIAL_FISHEYE f, c_x, c_y, k₁, k₂; OPENCV_FISHEYE f_x, f_y,
+c_x, c_y, k₁, k₂, k₃, k₄ (https://colmap.github.io/cameras.html).
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data_prep.readers import colmap_binary, colmap_text
+from diff4splat.data_prep.readers.angular import require_fisheye
 from diff4splat.data_prep.readers.colmap_model import Model, ModelCamera, ModelImage, suffix_of
 from diff4splat.data_prep.readers.lens import Lens
 from diff4splat.errors import FileFormatError
@@ -74,11 +77,12 @@ def lens_of(camera: ModelCamera, where: str) -> Lens:
     """The lens of a camera.
 
     Raises:
-        FileFormatError: a number is not finite, or a size or focal length not above 0.
+        FileFormatError: a number is not finite, a size or focal length not above 0, or a fisheye
+            turns back.
     """
     numbers = camera.parameters
     # f, c_x, c_y or f_x, f_y, c_x, c_y, then what bends.
-    two = camera.model in ("PINHOLE", "OPENCV")
+    two = camera.model in ("PINHOLE", "OPENCV", "OPENCV_FISHEYE")
     focal_px = (numbers[0], numbers[1] if two else numbers[0])
     column, row, *bent = numbers[2:] if two else numbers[1:]
     if not (np.isfinite(numbers).all() and min(*focal_px, *camera.size_px) > 0):
@@ -86,11 +90,9 @@ def lens_of(camera: ModelCamera, where: str) -> Lens:
             f"{where}: expected sizes and focal lengths above 0 and finite numbers, got "
             f"{camera.size_px} and {numbers}; write the model again"
         )
-    k1, k2, p1, p2 = (*bent, *[0.0] * (4 - len(bent)))
-    return Lens(
-        focal_px=focal_px,
-        center_px=(column, row),
-        size_px=camera.size_px,
-        radial=(k1, k2, 0.0),
-        tangential=(p1, p2),
-    )
+    straight = Lens(focal_px=focal_px, center_px=(column, row), size_px=camera.size_px)
+    four = (*bent, *[0.0] * (4 - len(bent)))
+    if camera.model.endswith("FISHEYE"):
+        return require_fisheye(replace(straight, model="fisheye", fisheye=four), where)
+    k1, k2, p1, p2 = four
+    return replace(straight, radial=(k1, k2, 0.0), tangential=(p1, p2))

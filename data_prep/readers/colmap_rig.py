@@ -38,7 +38,10 @@ def read_rig(
     extent = float((standing[:, :3, 3] - standing[:, :3, 3].mean(0)).norm(dim=-1).max())
     for name, pose in zip(rig.names, poses, strict=True):
         _require_standing(pose, extent, name, model.folder)
-    lenses = [lens_of(model.cameras[images[name][0].camera], name) for name in rig.names]
+    lenses = [
+        lens_of(model.cameras[images[name][0].camera], f"{model.folder}: {name}")
+        for name in rig.names
+    ]
     without = [name for name in folders if name not in images]
     notes = (f"{', '.join(without)} left out: the model has no pose for it",) if without else ()
     return rig_shots(rig, standing, lenses, fps), (*notes, *rig.notes())

@@ -14,8 +14,8 @@ from diff4splat.data_prep.readers.holding_out import chosen_reason, hold_out_tim
 from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.data_prep.readers.places import Place
 from diff4splat.data_prep.readers.shots import Draft, Shot
+from diff4splat.data_prep.readers.transform_lenses import lens_of
 from diff4splat.data_prep.readers.transform_records import (
-    lens_of,
     load_frames,
     picture_of,
     poses_of,

@@ -1,14 +1,16 @@
-"""A camera's intrinsics as files give them: pinhole, skew, and radial and tangential distortion.
+"""A camera's intrinsics as files give them: pinhole, skew, and what bends.
 
 With (x, y) = (X/Z, Y/Z) in OpenCV camera axes and r² = x² + y², a point is seen at
 
     x' = x (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + 2 p₁ x y + p₂ (r² + 2 x²)     u = f_x x' + s y' + c_x
     y' = y (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + p₁ (r² + 2 y²) + 2 p₂ x y     v = f_y y' + c_y
 
-(OpenCV, calib3d; COLMAP's and Nerfies' cameras are the same). Pixel centres are at +0.5.
+(OpenCV, calib3d; COLMAP's and Nerfies' cameras are the same). Pixel centres are at +0.5. Fisheyes
+and spheres have formulas of their own, see ``angular``.
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -33,11 +35,20 @@ class Lens:
     """k₁, k₂, k₃"""
     tangential: tuple[float, float] = (0.0, 0.0)
     """p₁, p₂"""
+    model: Literal["pinhole", "fisheye", "equirectangular"] = "pinhole"
+    """Focal lengths of the last two are pixels per radian."""
+    fisheye: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    """k₁, k₂, k₃, k₄ of the polynomial of the angle."""
 
     @property
-    def is_pinhole(self) -> bool:
-        """Nothing to straighten."""
-        return not any((self.skew_px, *self.radial, *self.tangential))
+    def is_angular(self) -> bool:
+        """Whether its pictures stay as they are."""
+        return self.model != "pinhole"
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether its pictures are straightened."""
+        return not self.is_angular and any((self.skew_px, *self.radial, *self.tangential))
 
     def fitted(self, size_px: tuple[int, int], where: str) -> "Lens":
         """The same lens for a picture of another size and the same shape.

@@ -39,7 +39,7 @@ class ShotFrames:
             raise InputError(f"frame: expected 0 to {len(self) - 1}, got {index}")
         shot = self._shots[index]
         known = self._known(shot)
-        if not shot.lens.is_pinhole:
+        if shot.lens.is_bent:
             known = layers.straightened(known, *self._map(shot.lens))
         return layers.to_frame(layers.coarser(known, self._shrink))
 

@@ -1,11 +1,10 @@
-"""Frames of ``transforms*.json``: poses, lenses, times and files, for D-NeRF and nerfstudio alike.
+"""Frames of ``transforms*.json``: poses, times and files, for D-NeRF and nerfstudio alike.
 
 Axes: ``f`` frames. ``transform_matrix`` is world_from_camera with OpenGL camera axes (x right,
 y up, z back); a frame's own value goes before the one given for all.
 """
 
 from collections import ChainMap
-from collections.abc import Mapping
 from pathlib import Path
 
 import torch
@@ -13,11 +12,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data_prep.readers.json_file import read_object
-from diff4splat.data_prep.readers.lens import Lens
 from diff4splat.data_prep.readers.picture_file import PictureFile
 from diff4splat.data_prep.readers.places import picture_at
 from diff4splat.errors import FileFormatError
-from diff4splat.geometry.camera import pinhole
 from diff4splat.paths.formats.axes import swap_opengl_opencv
 from diff4splat.paths.formats.checks import exact_poses
 from diff4splat.paths.formats.json_fields import (
@@ -25,16 +22,8 @@ from diff4splat.paths.formats.json_fields import (
     frame_records,
     kind_of,
     optional_number,
-    picture_size,
 )
-from diff4splat.paths.formats.pinhole_fields import pinhole_px
 from diff4splat.paths.formats.transforms_json import pose_matrix
-
-_FOCAL_KEYS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
-_BENT = ("k1", "k2", "k3", "p1", "p2")
-"""Distortion that can be removed; other coefficients are refused by name."""
-
-Record = Mapping[str, object]
 
 
 def load_frames(file: Path) -> tuple[dict[str, object], list[FrameRecord]]:
@@ -98,27 +87,3 @@ def time_of(frame: FrameRecord, advice: str) -> float:
     if time_s is None:
         raise FileFormatError(f"{frame.where}: expected 'time', got none; {advice}")
     return time_s
-
-
-def lens_of(frame: FrameRecord, picture_px: tuple[int, int]) -> Lens:
-    """The lens of a frame; ``picture_px`` stands in where the file says no size.
-
-    Raises:
-        FileFormatError: no focal length, or a camera model that cannot be straightened.
-    """
-    record, where = frame.fields, frame.where
-    if all(record.get(key) is None for key in _FOCAL_KEYS):
-        raise FileFormatError(
-            f"{where}: expected a focal length ({', '.join(_FOCAL_KEYS)}), got none; add one"
-        )
-    size_px = picture_size(record, ("h", "w"), where) or picture_px
-    straight = {key: value for key, value in record.items() if key not in _BENT}
-    fl_x, fl_y, cx, cy = pinhole_px(straight, where, pinhole(1.0, size_px))
-    k1, k2, k3, p1, p2 = (optional_number(record, key, where) or 0.0 for key in _BENT)
-    return Lens(
-        focal_px=(fl_x, fl_y),
-        center_px=(cx, cy),
-        size_px=size_px,
-        radial=(k1, k2, k3),
-        tangential=(p1, p2),
-    )

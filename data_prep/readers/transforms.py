@@ -2,7 +2,7 @@
 
 Poses have OpenGL camera axes. Beside each picture there may be a mask (black covers), depth, and
 the file may name points to start from and which frames are for what
-(https://docs.nerf.studio/quickstart/data_conventions.html).
+(https://docs.nerf.studio/quickstart/data_conventions.html). Fisheye frames stay fisheye frames.
 """
 
 import posixpath
@@ -18,9 +18,9 @@ from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.data_prep.readers.places import Place, inside
 from diff4splat.data_prep.readers.points import read_cloud
 from diff4splat.data_prep.readers.shots import Draft, Shot
+from diff4splat.data_prep.readers.transform_lenses import lens_of
 from diff4splat.data_prep.readers.transform_records import (
     file_name,
-    lens_of,
     load_frames,
     picture_of,
     poses_of,
@@ -68,7 +68,12 @@ def read(place: Place, options: ReadOptions) -> Draft:
         shrink=options.downscale,
         points=points,
         background=options.background,
-        notes=(*notes, *cloud_notes, *_time_note(frames, options.fps)),
+        notes=(
+            *notes,
+            *cloud_notes,
+            *_time_note(frames, options.fps),
+            *_depth_note(frames, shots[0]),
+        ),
     )
 
 
@@ -94,7 +99,9 @@ def _shots(
     ]
     depths = [_beside(frame, "depth_file_path", folder) for frame in frames]
     return [
-        shot if depth is None else replace(shot, depth=DepthFile(file=depth, unit=unit))
+        shot
+        if depth is None or shot.lens.is_angular
+        else replace(shot, depth=DepthFile(file=depth, unit=unit))
         for shot, depth in zip(shots, depths, strict=True)
     ]
 
@@ -109,6 +116,14 @@ def _time_note(frames: list[FrameRecord], fps: float | None) -> tuple[str, ...]:
     if frames[0].fields.get("time") is not None:
         return ()
     return (f"the file has no times: its order was taken as {fps:g} frames per second",)
+
+
+def _depth_note(frames: list[FrameRecord], shot: Shot) -> tuple[str, ...]:
+    """Rays have length one in nerfstudio where pixels are angles, so depth there is distance."""
+    given = any(frame.fields.get("depth_file_path") is not None for frame in frames)
+    if not (given and shot.lens.is_angular):
+        return ()
+    return ("distances were left out: depth is z",)
 
 
 def _beside(frame: FrameRecord, key: str, folder: Path) -> Path | None:

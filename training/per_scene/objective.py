@@ -11,6 +11,7 @@ from diff4splat.data.capture.capture import Capture, Frame
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.api import render
+from diff4splat.render.physical.settings import Photograph
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
@@ -98,9 +99,23 @@ class Objective:
         self, scene: Scene, camera: PhysicalCamera, index: int, number: int
     ) -> Float[Tensor, ""]:
         frame, weights = self.store.read(index), self.settings.weights
-        seed = self.sight.step_seed(number, index)
+        seed, other = (self.sight.step_seed(2 * number + part, index) for part in (0, 1))
         made = self.sight.learn(scene, camera, index, self._outputs(frame), seed)
+        if made.samples > 1:
+            made = self._independent(made, scene, camera, index, other)
         return picture_loss(made, replace(frame, counts=counted(frame, made.valid)), weights)
+
+    def _independent(
+        self, made: Photograph, scene: Scene, camera: PhysicalCamera, index: int, seed: int
+    ) -> Photograph:
+        """The values of other samples with the gradients of ``made``.
+
+        Noise that is in a residual and in its derivative at once has a mean, which would pull at
+        whatever makes less noise, such as a focus elsewhere.
+        """
+        with torch.no_grad():
+            values = self.sight.learn(scene, camera, index, {"rgb"}, seed).rgb
+        return replace(made, rgb=values + (made.rgb - made.rgb.detach()))
 
     def _picture(self, state: Gaussians, index: int) -> Float[Tensor, ""]:
         frame = self.store.read(index)

@@ -29,7 +29,8 @@ def standing_model(
     capture: Capture, region: Region, settings: FitSettings, optics: LearnedOptics | None = None
 ) -> SceneModel:
     """Points of the capture, without motion."""
-    points = starting_points(capture, region, settings.points, settings.use_depth, settings.seed)
+    count = min(settings.points, settings.density.budget)
+    points = starting_points(capture, region, count, settings.use_depth, settings.seed)
     nobody = torch.zeros(len(points.positions), dtype=torch.bool)
     rows = raw_points(points, settings.harmonics)
     return SceneModel(rows, Still(capture.time_range_s), nobody, optics)

@@ -31,6 +31,8 @@ from diff4splat.scene.scene import Scene
 
 _PROBES = (0.3, 0.6)
 """Near the largest error of a bow, ½, and of an S, 0.21, which has none in its middle."""
+_KEPT = 4
+"""States at ends of intervals that are kept for their neighbours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +114,8 @@ def _halved(
     scene: Scene, edges: list[float], time_s: float, viewer: Viewer, settings: PhotoSettings
 ) -> Intervals:
     """Halve the interval with the largest error until all are within the tolerance."""
-    errors = {span: _error_px(scene, *span, time_s, viewer) for span in pairwise(edges)}
+    measure = _Measure(scene, time_s, viewer)
+    errors = {span: measure.error_px(*span) for span in pairwise(edges)}
     while len(errors) < settings.most_intervals:
         worst = max(errors, key=lambda span: errors[span])
         if errors[worst] <= settings.tolerance_px:
@@ -120,43 +123,66 @@ def _halved(
         del errors[worst]
         middle = 0.5 * (worst[0] + worst[1])
         for span in ((worst[0], middle), (middle, worst[1])):
-            errors[span] = _error_px(scene, *span, time_s, viewer)
+            errors[span] = measure.error_px(*span)
     ends = sorted({edge for span in errors for edge in span})
     return Intervals(tuple(ends), max(errors.values()))
 
 
 def _largest(scene: Scene, edges: Sequence[float], time_s: float, viewer: Viewer) -> float:
-    return max(_error_px(scene, *span, time_s, viewer) for span in pairwise(edges))
+    measure = _Measure(scene, time_s, viewer)
+    return max(measure.error_px(*span) for span in pairwise(edges))
 
 
-def _error_px(
-    scene: Scene, earliest_s: float, latest_s: float, time_s: float, viewer: Viewer
-) -> float:
-    """Largest error of one interval at its ends and in between; states live no longer."""
-    if earliest_s == latest_s:
-        return 0.0
-    early, late = (scene.state_at(time_s + at) for at in (earliest_s, latest_s))
-    found = max(error_px(early, early, late, 0.0, viewer), error_px(early, late, late, 1.0, viewer))
-    for part in _PROBES:
-        state = scene.state_at(time_s + earliest_s + part * (latest_s - earliest_s))
-        found = max(found, error_px(early, state, late, part, viewer))
-    return found
+class _Measure:
+    """Errors of intervals; keeps the last states, since neighbours share their ends."""
+
+    def __init__(self, scene: Scene, time_s: float, viewer: Viewer) -> None:
+        self._scene, self._time_s, self._viewer = scene, time_s, viewer
+        self._ends: dict[float, Gaussians] = {}
+
+    def error_px(self, earliest_s: float, latest_s: float) -> float:
+        """Largest error of one interval at its ends and in between."""
+        if earliest_s == latest_s:
+            return 0.0
+        early, late = self._end(earliest_s), self._end(latest_s)
+        straight = Straight(early, late)
+        found = max(
+            straight.error_px(early, 0.0, self._viewer), straight.error_px(late, 1.0, self._viewer)
+        )
+        for part in _PROBES:
+            at_s = earliest_s + part * (latest_s - earliest_s)
+            state = self._scene.state_at(self._time_s + at_s)
+            found = max(found, straight.error_px(state, part, self._viewer))
+        return found
+
+    def _end(self, at_s: float) -> Gaussians:
+        if at_s not in self._ends:
+            if len(self._ends) >= _KEPT:
+                del self._ends[next(iter(self._ends))]
+            self._ends[at_s] = self._scene.state_at(self._time_s + at_s)
+        return self._ends[at_s]
 
 
-def error_px(
-    early: Gaussians, true: Gaussians, late: Gaussians, part: float, viewer: Viewer
-) -> float:
-    """How far anything that is seen is from where, or how, it should be; 0 where nothing is.
+class Straight:
+    """What stands for Gaussians between two states, to be held against them."""
 
-    ``true`` is what stands at ``part`` of the way from ``early`` to ``late``.
-    """
-    made = halfway(early, late)
-    seen = viewer.sees(true) | viewer.sees(made)
-    if not bool(seen.any()):
-        return 0.0
-    place = (true.means - torch.lerp(early.means, late.means, part)).norm(dim=-1)
-    shape = (_root(true) - _root(made)).norm(dim=-1).amax(-1)
-    return float((viewer.pixels(place + shape, true) + _brightness(true, made))[seen].max())
+    def __init__(self, early: Gaussians, late: Gaussians) -> None:
+        self._early, self._late = early.means, late.means
+        self._made = halfway(early, late)
+        self._shape = _root(self._made)
+
+    def error_px(self, true: Gaussians, part: float, viewer: Viewer) -> float:
+        """How far anything that is seen is from where, or how, it should be; 0 where nothing is.
+
+        ``true`` is what stands at ``part`` of the way.
+        """
+        made = self._made
+        seen = viewer.sees(true) | viewer.sees(made)
+        if not bool(seen.any()):
+            return 0.0
+        place = (true.means - torch.lerp(self._early, self._late, part)).norm(dim=-1)
+        shape = (_root(true) - self._shape).norm(dim=-1).amax(-1)
+        return float((viewer.pixels(place + shape, true) + _brightness(true, made))[seen].max())
 
 
 def _brightness(true: Gaussians, made: Gaussians) -> Float[Tensor, " n"]:

@@ -1,6 +1,7 @@
 """Small pieces of the readers: lenses, layers, names, numbers of cameras, stores."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -86,7 +87,8 @@ def test_a_lens_follows_its_picture() -> None:
     assert half.skew_px == 1
     assert lens.fitted((20, 30), "x") == half
     assert lens.fitted((40, 60), "x") == lens
-    assert not lens.is_pinhole
+    assert lens.is_bent
+    assert not replace(lens, model="fisheye").is_bent
     with pytest.raises(
         FileFormatError, match="x: expected a picture shaped as its camera, 60 x 40"
     ):

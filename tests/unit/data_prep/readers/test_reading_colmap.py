@@ -165,7 +165,7 @@ def test_binary_files_that_end_too_early_are_refused_wherever_they_end(
 @pytest.mark.parametrize(
     ("number", "message"),
     [
-        (5, "got OPENCV_FISHEYE; let COLMAP undistort"),
+        (10, "got THIN_PRISM_FISHEYE; let COLMAP undistort"),
         (6, "got FULL_OPENCV"),
         (99, "got number 99"),
         (-1, "got number -1"),

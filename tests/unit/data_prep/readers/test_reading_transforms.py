@@ -151,8 +151,8 @@ def test_points_of_the_file_are_read(tmp_path: Path) -> None:
     ("change", "message"),
     [
         (
-            {"camera_model": "OPENCV_FISHEYE"},
-            "expected a pinhole camera_model, got 'OPENCV_FISHEYE'",
+            {"camera_model": "FISHEYE624"},
+            "expected a pinhole camera_model, got 'FISHEYE624'",
         ),
         ({"k4": 0.1}, "expected no lens distortion, got k4 = 0.1"),
         ({"ply_file_path": "../points.ply"}, r"expected a path inside .*'\.\./points\.ply'"),

@@ -16,7 +16,9 @@ from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 from diff4splat.training.per_scene.fit import FitResult, FitRun, fit_scene
 from diff4splat.training.per_scene.judging import mean_psnr_db
-from diff4splat.training.per_scene.settings import Decay, FitSettings, Rates, Stillness
+from diff4splat.training.per_scene.region import find_region
+from diff4splat.training.per_scene.setting_out import standing_model
+from diff4splat.training.per_scene.settings import Decay, Density, FitSettings, Rates, Stillness
 
 SETTINGS = FitSettings(
     coarse_steps=60,
@@ -168,3 +170,9 @@ def test_one_standing_camera_without_depth_is_refused(tmp_path: Path):
 def test_nothing_held_out_is_said_and_fitted(tmp_path: Path):
     result = fit_scene(run(tmp_path, capture=ball_capture(held=()), coarse_steps=5, fine_steps=5))
     assert result.held_out == [] and str(result.split).endswith("nothing held out")
+
+
+def test_a_fit_starts_within_its_budget() -> None:
+    capture = ball_capture(views=3, times=1)
+    few = replace(SETTINGS, density=Density(budget=17))
+    assert len(standing_model(capture, find_region(capture), few)) <= 17
