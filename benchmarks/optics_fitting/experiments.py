@@ -42,7 +42,7 @@ READOUT_S = 0.16
 """Of 0.2 s from frame to frame."""
 LENS = (0.05, -0.01, 0.002, 0.0)
 FOV_DEG = {"fisheye": 160.0, "lens": 120.0}
-FOCUS_DISTANCE, RADIUS = 1.3, 0.06
+FOCUS_DISTANCE, RADII = 1.3, (0.06, 0.15)
 STEPS = {"fisheye": 2000, "rolling": 2000, "lens": 2000, "focus": 600, "readout": 2000}
 
 
@@ -92,9 +92,13 @@ def lens() -> list[Row]:
 
 
 def focus() -> list[Row]:
-    """Relative error of the focus distance."""
+    """Relative error of the focus distance, through a small and a large aperture."""
+    return [row for radius in RADII for row in _focus(radius)]
+
+
+def _focus(radius: float) -> list[Row]:
     room, cameras = world(3, moving=False), _pinhole()
-    aperture = Aperture(radius=RADIUS, focus_distance=FOCUS_DISTANCE)
+    aperture = Aperture(radius=radius, focus_distance=FOCUS_DISTANCE)
     capture = taken(room, views(16, cameras, 3), (0.0,), Optics(aperture=aperture), 8)
     guess = replace(aperture, focus_distance=1.5 * FOCUS_DISTANCE)
     rows = []
@@ -103,7 +107,8 @@ def focus() -> list[Row]:
             told(capture, Optics(aperture=guess)), "static", STEPS["focus"], learn=learn
         )
         found = result.learned["focus"]["recovered"] if learn else guess.focus_distance
-        rows.append(_quality("focus", name, result, seconds) | _error(found, FOCUS_DISTANCE, 1.5))
+        own = f"focus, radius {radius:g}"
+        rows.append(_quality(own, name, result, seconds) | _error(found, FOCUS_DISTANCE, 1.5))
     return rows
 
 
