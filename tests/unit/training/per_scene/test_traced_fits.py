@@ -231,3 +231,26 @@ def test_flow_is_refused_through_optics():
     settings = replace(SETTINGS, weights=Weights(flow=1.0))
     with pytest.raises(ConfigError, match="flow is that of pinholes"):
         Objective(sight=Sight(capture=capture), store=FrameStore(capture), settings=settings)
+
+
+def test_residuals_come_from_other_samples_than_gradients(monkeypatch: pytest.MonkeyPatch):
+    aperture = Aperture(radius=0.2, focus_distance=1.5)
+    capture, seeds, learn = photographed(scene(), Optics(aperture=aperture)), [], Sight.learn
+
+    def noted(self, scene, camera, index, outputs, seed):
+        seeds.append((seed, torch.is_grad_enabled()))
+        return learn(self, scene, camera, index, outputs, seed)
+
+    monkeypatch.setattr(Sight, "learn", noted)
+    loss = objective(capture, samples=2).loss
+    for number in (0, 1):
+        loss(model_of(motions()["still"]), 0.0, [0, 1], 0, number)
+    assert len({seed for seed, _ in seeds}) == len(seeds) == 8
+    assert [learning for _, learning in seeds] == [True, False] * 4
+
+
+def test_one_ray_per_pixel_is_its_own_residual(monkeypatch: pytest.MonkeyPatch):
+    calls, learn = [], Sight.learn
+    monkeypatch.setattr(Sight, "learn", lambda *given: calls.append(1) or learn(*given))
+    objective(fisheye()).loss(model_of(motions()["still"]), 0.0, [0], 0)
+    assert calls == [1]
