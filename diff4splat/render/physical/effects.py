@@ -38,7 +38,6 @@ class Effects:
     """Rays of a pixel have times that differ, and that shows."""
     scene_moves: bool
     """While the picture is taken."""
-    camera_moves: bool
     covers: bool
     """Rays of a pixel go through all of its square."""
     samples: int
@@ -61,8 +60,8 @@ def find_effects(
     """The effects that show in a picture of ``subject`` at ``time_s``."""
     optics, left_out = camera.optics, []
     aperture, shutter = optics.aperture, optics.shutter
-    bends = not _is_pinhole(optics.lens)
-    spreads = aperture is not None and _shows(aperture.radius)
+    bends = not is_pinhole(optics.lens)
+    spreads = aperture is not None and counts(aperture.radius)
     if not bends and not isinstance(optics.lens, Pinhole):
         left_out.append("distortion: all coefficients are 0")
     if aperture is not None and not spreads:
@@ -70,10 +69,10 @@ def find_effects(
     # What is learned may grow to any size.
     learned = is_learned(optics.exposure_s) or (shutter and is_learned(shutter.readout_s))
     window = (-math.inf, math.inf) if learned else optics.window_s(time_s)
-    scene_moves, camera_moves = _moves(subject, window), camera.moves_between(*window)
-    moves = scene_moves or camera_moves
-    rolls = shutter is not None and _shows(shutter.readout_s)
-    exposes = _shows(optics.exposure_s)
+    scene_moves = _moves(subject, window)
+    moves = scene_moves or camera.moves_between(*window)
+    rolls = shutter is not None and counts(shutter.readout_s)
+    exposes = counts(optics.exposure_s)
     if not moves and (rolls or exposes):
         names = " and ".join(
             name for name, there in (("read-out", rolls), ("exposure", exposes)) if there
@@ -90,19 +89,18 @@ def find_effects(
         rolls=rolls,
         exposes=exposes,
         scene_moves=scene_moves and (rolls or exposes),
-        camera_moves=camera_moves and (rolls or exposes),
         covers=settings.pixel_area,
         samples=samples,
         left_out=tuple(left_out),
     )
 
 
-def _shows(number: Number) -> bool:
+def counts(number: Number) -> bool:
     """Whether it is not 0, or will not be."""
     return as_float(number) > 0 or is_learned(number)
 
 
-def _is_pinhole(lens: Lens) -> bool:
+def is_pinhole(lens: Lens) -> bool:
     """Whether a lens bends nothing, and is not about to learn to."""
     if isinstance(lens, OpenCVPinhole):
         terms = torch.cat([lens.radial, lens.tangential, lens.thin_prism])

@@ -27,18 +27,23 @@ KERNELS: list[Any] = []
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile ``function`` when it is first called, and keep it on disk where that is allowed."""
+    compiled = kept(function, _OPTIONS)
+    KERNELS.append(compiled)
+    return compiled
+
+
+def kept(function: Callable[..., Any], options: dict[str, Any], *others: Path) -> Any:
+    """Compile ``function`` when it is first called, and keep it in `cache_folder` of ``others``."""
     # Test hooks wrap functions to check their annotations; kernels need the bare one.
     bare, before = inspect.unwrap(function), config.CACHE_DIR
     try:
-        config.CACHE_DIR = str(cache_folder())
-        compiled = njit(cache=True, **_OPTIONS)(bare)
+        config.CACHE_DIR = str(cache_folder(*others))
+        return njit(cache=True, **options)(bare)
     except (OSError, RuntimeError):
         # No folder to write to: every process compiles for itself.
-        compiled = njit(**_OPTIONS)(bare)
+        return njit(**options)(bare)
     finally:
         config.CACHE_DIR = before
-    KERNELS.append(compiled)
-    return compiled
 
 
 def device(function: Callable[..., Any]) -> Any:

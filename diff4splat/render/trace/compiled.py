@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+from numba import njit
 
-from diff4splat.render.raster.jit import cache_folder
+from diff4splat.render.raster.jit import kept
 
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
 
@@ -21,16 +21,7 @@ KERNELS: list[Any] = []
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile ``function`` when it is first called, and keep it on disk where that is allowed."""
-    # Test hooks wrap functions to check their annotations; kernels need the bare one.
-    bare, before = inspect.unwrap(function), config.CACHE_DIR
-    try:
-        config.CACHE_DIR = str(cache_folder(Path(__file__).parent))
-        compiled = njit(cache=True, **_OPTIONS)(bare)
-    except (OSError, RuntimeError):
-        # No folder to write to: every process compiles for itself.
-        compiled = njit(**_OPTIONS)(bare)
-    finally:
-        config.CACHE_DIR = before
+    compiled = kept(function, _OPTIONS, Path(__file__).parent)
     KERNELS.append(compiled)
     return compiled
 

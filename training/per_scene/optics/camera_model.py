@@ -7,9 +7,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture
-from diff4splat.geometry.lenses.pinhole import Pinhole
-from diff4splat.geometry.optics import Number, Optics, is_learned
+from diff4splat.geometry.optics import Optics
 from diff4splat.geometry.physical_camera import PhysicalCamera
+from diff4splat.render.physical.effects import counts, is_pinhole
 
 
 def _one() -> Float[Tensor, ""]:
@@ -40,11 +40,6 @@ def shows(optics: Optics | None) -> bool:
     """Whether pictures through ``optics`` differ from a pinhole's, at least of what moves."""
     if optics is None:
         return False
-    bends = not isinstance(optics.lens, Pinhole)
-    spreads = optics.aperture is not None and _counts(optics.aperture.radius)
-    rolls = optics.shutter is not None and _counts(optics.shutter.readout_s)
-    return bends or spreads or rolls or _counts(optics.exposure_s)
-
-
-def _counts(number: Number) -> bool:
-    return float(number) > 0 or is_learned(number)
+    spreads = optics.aperture is not None and counts(optics.aperture.radius)
+    rolls = optics.shutter is not None and counts(optics.shutter.readout_s)
+    return not is_pinhole(optics.lens) or spreads or rolls or counts(optics.exposure_s)

@@ -41,7 +41,7 @@ def test_without_a_folder_to_write_to_kernels_compile_all_the_same(
     def nowhere(*others: object) -> None:
         raise PermissionError("read only")
 
-    monkeypatch.setattr(compiled, "cache_folder", nowhere)
+    monkeypatch.setattr(jit, "cache_folder", nowhere)
     monkeypatch.setattr(compiled, "KERNELS", [])
 
     def twice(x):

@@ -15,6 +15,7 @@ from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.lenses.opencv_pinhole import OpenCVPinhole
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
 from diff4splat.training.per_scene.optics import coefficients
+from diff4splat.training.per_scene.optics.camera_model import shows
 from diff4splat.training.per_scene.optics.learned import LearnedOptics
 from diff4splat.training.per_scene.settings import Rates
 from diff4splat.training.per_scene.table import ParameterTable
@@ -136,3 +137,9 @@ def test_numbers_that_are_not_finite_go_back_too():
 def test_what_the_capture_does_not_say_cannot_be_learned(name: str, optics: Optics, message: str):
     with pytest.raises(ConfigError, match=message):
         learned(optics, (name,))
+
+
+def test_distortion_of_nothing_is_drawn_as_a_pinhole():
+    assert not shows(Optics(lens=OpenCVPinhole()))
+    bent = OpenCVPinhole(radial=torch.tensor([0.1, 0, 0, 0, 0, 0]))
+    assert shows(Optics(lens=bent)) and not shows(Optics()) and not shows(None)
