@@ -16,7 +16,7 @@ def kernels() -> list[Any]:
 
 def is_ready() -> bool:
     """Whether every kernel was compiled before, in this process or on this machine."""
-    from diff4splat.render.raster.jit import is_ready as is_compiled
+    from diff4splat.jit import is_ready as is_compiled
 
     return all(map(is_compiled, kernels()))
 

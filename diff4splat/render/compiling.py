@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from diff4splat.render.raster import jit
+from diff4splat import jit
 
 
 def warmed(kernels: list[Any], advance: Callable[[str], None], use: Callable[[], None]) -> float:

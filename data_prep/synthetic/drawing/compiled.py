@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import njit
 
-from diff4splat.render.raster.jit import kept
+from diff4splat.jit import kept
 
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
 

@@ -11,13 +11,13 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
+from diff4splat import jit
 from diff4splat.data.clip import ClipNote
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
 from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.world import Light, Mesh, Sky, Texture, World, WorldObject
 from diff4splat.geometry.camera import Camera, pinhole
-from diff4splat.render.raster import jit
 from diff4splat.report.phases import Phases
 
 

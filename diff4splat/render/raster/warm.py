@@ -13,11 +13,12 @@ import torch
 from jaxtyping import Int
 from torch import Tensor
 
+from diff4splat import jit
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.compiling import compile_aloud, warmed
-from diff4splat.render.raster import jit
 from diff4splat.render.raster.function import rasterize
+from diff4splat.render.raster.jit import KERNELS
 from diff4splat.render.raster.plan import make_plan, make_view
 from diff4splat.render.raster.sequence import Sequence
 from diff4splat.render.settings import RenderSettings
@@ -30,12 +31,12 @@ _ONE_AT_A_TIME = Lock()
 
 def is_ready() -> bool:
     """Whether every kernel was compiled before, in this process or on this machine."""
-    return all(map(jit.is_ready, jit.KERNELS))
+    return all(map(jit.is_ready, KERNELS))
 
 
 def kernel_count() -> int:
     """How many kernels `warm` goes through."""
-    return len(jit.KERNELS)
+    return len(KERNELS)
 
 
 def warm(advance: Callable[[str], None] = lambda name: None) -> float:
@@ -43,7 +44,7 @@ def warm(advance: Callable[[str], None] = lambda name: None) -> float:
 
     Returns the seconds.
     """
-    return warmed(jit.KERNELS, advance, _draw_tiny_scene)
+    return warmed(KERNELS, advance, _draw_tiny_scene)
 
 
 def ensure_compiled() -> None:

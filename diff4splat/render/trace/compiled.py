@@ -11,7 +11,8 @@ from typing import Any
 
 from numba import njit
 
-from diff4splat.render.raster.jit import kept
+from diff4splat.jit import kept
+from diff4splat.render.raster.jit import SOURCES
 
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
 
@@ -21,7 +22,7 @@ KERNELS: list[Any] = []
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile ``function`` when it is first called, and keep it on disk where that is allowed."""
-    compiled = kept(function, _OPTIONS, Path(__file__).parent)
+    compiled = kept(function, _OPTIONS, Path(__file__).parent, SOURCES)
     KERNELS.append(compiled)
     return compiled
 

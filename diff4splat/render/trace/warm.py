@@ -10,8 +10,8 @@ from threading import Lock
 
 import torch
 
+from diff4splat import jit
 from diff4splat.render.compiling import compile_aloud, warmed
-from diff4splat.render.raster import jit
 from diff4splat.render.trace.compiled import KERNELS
 from diff4splat.render.trace.function import look
 from diff4splat.render.trace.moving import MovingCloud

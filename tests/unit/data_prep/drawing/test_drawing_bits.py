@@ -10,10 +10,8 @@ import oracles_drawing as oracle
 import pytest
 
 from diff4splat.data.clip import Clip
-from diff4splat.data_prep.synthetic.drawing import compiled
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
-from diff4splat.render.raster.jit import cache_folder
 
 SETTINGS = {"samples_per_side": 4, "tracks": 30, "shadow_px": 64}
 GOLDEN = "e9d6e5c8ea46a2b8"
@@ -66,23 +64,3 @@ def test_a_plain_processor_gives_the_same_bits(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=900, check=True, env={**os.environ, **plain},
     )  # fmt: skip
     assert done.stdout.strip() == digest(small())
-
-
-def test_kernels_lie_under_a_digest_of_the_sources_here(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    folders = []
-    for content in ("a = 1", "a = 2", "a = 1"):
-        (tmp_path / "noise.py").write_text(content)
-        folders.append(cache_folder.__wrapped__(tmp_path))
-    assert folders[0] == folders[2] != folders[1]
-
-
-def test_kernels_compile_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nowhere(*others: Path) -> Path:
-        raise PermissionError("read only")
-
-    monkeypatch.setattr(compiled, "cache_folder", nowhere)
-    monkeypatch.setattr(compiled, "KERNELS", [])
-    assert compiled.kernel(lambda x: 2 * x)(21.0) == 42.0

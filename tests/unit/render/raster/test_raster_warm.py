@@ -1,10 +1,8 @@
 """Compilation is announced, happens once, and leaves files behind."""
 
-import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -79,55 +77,3 @@ def test_the_first_picture_on_a_machine_says_what_takes_so_long(tmp_path: Path) 
     assert set(first.partition("machine: ")[2].split()) == set(compiled())
     assert last.startswith("diff4splat: ready after ")
     assert draw(tmp_path) == (["True", "True"], "")
-
-
-def test_a_kernel_is_ready_once_it_was_compiled_anywhere(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(jit, "KERNELS", [])
-    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "kernels")
-    source = tmp_path / "twice.py"
-    source.write_text("def twice(x):\n    return 2 * x\n")
-    first = jit.kernel(loaded(source))
-    assert not jit.is_ready(first)
-    assert first(21.0) == 42.0
-    assert jit.is_ready(first)
-    assert jit.is_ready(jit.kernel(loaded(source)))
-    assert len(jit.KERNELS) == 2
-
-
-def test_without_a_folder_to_write_to_kernels_compile_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def nowhere() -> Path:
-        raise PermissionError("read only")
-
-    monkeypatch.setattr(jit, "KERNELS", [])
-    monkeypatch.setattr(jit, "cache_folder", nowhere)
-    source = tmp_path / "twice.py"
-    source.write_text("def twice(x):\n    return 2 * x\n")
-    kernel = jit.kernel(loaded(source))
-    assert not jit.is_ready(kernel)
-    assert kernel(21.0) == 42.0
-    assert jit.is_ready(kernel)
-
-
-def test_kernels_lie_under_a_digest_of_their_sources(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    monkeypatch.setattr(jit, "__file__", str(tmp_path / "jit.py"))
-    folders = []
-    for content in ("a = 1", "a = 2", "a = 1"):
-        (tmp_path / "footprint.py").write_text(content)
-        folders.append(jit.cache_folder.__wrapped__())
-    assert folders[0] == folders[2] != folders[1]
-    assert {folder.parent for folder in folders} == {tmp_path / "kernels"}
-
-
-def loaded(source: Path) -> Callable[[float], float]:
-    """The function ``twice`` of a module that was read anew."""
-    spec = importlib.util.spec_from_file_location("twice", source)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.twice

@@ -33,20 +33,3 @@ def test_the_first_rays_say_that_they_wait(
     monkeypatch.setattr(warm, "is_ready", lambda: True)
     warm._compile_once.__wrapped__()
     assert capsys.readouterr().err == ""
-
-
-def test_without_a_folder_to_write_to_kernels_compile_all_the_same(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def nowhere(*others: object) -> None:
-        raise PermissionError("read only")
-
-    monkeypatch.setattr(jit, "cache_folder", nowhere)
-    monkeypatch.setattr(compiled, "KERNELS", [])
-
-    def twice(x):
-        return 2 * x
-
-    made = compiled.kernel(twice)
-    assert made(21.0) == 42.0
-    assert len(compiled.KERNELS) == 1
