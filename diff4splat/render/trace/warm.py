@@ -1,7 +1,7 @@
 """Compilation ahead of use: visible, once per machine.
 
-Kernels compile when they are first called and are then loaded from disk. One ray that looks at one
-Gaussian, forwards and backwards, calls each of them once.
+Kernels compile when they are first called and are then loaded from disk. Two rays from different
+places that look at one Gaussian, forwards and backwards, call each of them once.
 """
 
 from collections.abc import Callable
@@ -37,7 +37,7 @@ def warm(advance: Callable[[str], None] = lambda name: None) -> float:
 
     Returns the seconds.
     """
-    return warmed(KERNELS, advance, _trace_one_ray)
+    return warmed(KERNELS, advance, _trace_two_rays)
 
 
 def ensure_compiled() -> None:
@@ -52,7 +52,7 @@ def _compile_once() -> None:
         compile_aloud("the ray tracer", warm)
 
 
-def _trace_one_ray() -> None:
+def _trace_two_rays() -> None:
     zero, ahead = torch.zeros(1, 3, device="cpu"), torch.tensor([[0.0, 0.0, 1.0]], device="cpu")
     gaussian = Gaussians(
         means=ahead.float(),
@@ -62,6 +62,7 @@ def _trace_one_ray() -> None:
         sh=torch.zeros(1, 4, 3, device="cpu"),
     )
     now = torch.zeros(1, device="cpu")
-    rays = Rays(origins=zero, directions=ahead, time_s=now)
+    apart = torch.tensor([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]], device="cpu")
+    rays = Rays(origins=apart, directions=ahead.expand(2, 3), time_s=now.expand(2))
     moving = MovingCloud(velocities=zero, time_centers_s=now, time_deviations_s=now + 1)
     look(gaussian, rays, TraceSettings(), moving).light.sum().backward()
