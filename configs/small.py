@@ -11,7 +11,6 @@ from diff4splat.configs.stages import (
     dynamic_data,
     dynamic_stage,
     generator_stage,
-    joint_stage,
     motion_stage,
     reconstruction_gates,
     static_stage,
@@ -66,7 +65,9 @@ def small_recipe() -> Recipe:
 
 def _generating(dynamic: StageRecipe) -> tuple[StageRecipe, ...]:
     """What comes after the reconstruction of true videos."""
-    return _single(dynamic), _generator(dynamic), _joint(dynamic)
+    single, generator = _single(dynamic), _generator(dynamic)
+    told = _told(single)
+    return single, told, generator, _branch(generator), _joint(told)
 
 
 def _autoencoder(data: DataSettings) -> StageRecipe:
@@ -143,6 +144,18 @@ def _single(dynamic: StageRecipe) -> StageRecipe:
     )
 
 
+def _told(single: StageRecipe) -> StageRecipe:
+    """LDRM from one picture, judged along the path while things move: depth, and what they hide."""
+    return replace(
+        single,
+        name="told",
+        kind="told",
+        steps=2_500,
+        losses=replace(single.losses, photometric=12.0),
+        data=replace(single.data, target_frames=4, moving_targets=True),
+    )
+
+
 def _generator(dynamic: StageRecipe) -> StageRecipe:
     """Captions speak of left and right, so clips are not mirrored here, but where they are encoded.
 
@@ -162,13 +175,29 @@ def _generator(dynamic: StageRecipe) -> StageRecipe:
     )
 
 
-def _joint(dynamic: StageRecipe) -> StageRecipe:
-    """The reconstruction alone: the video model learns more from the clips that it has encoded."""
+def _branch(generator: StageRecipe) -> StageRecipe:
+    """The motion branch; small beside the video model, so that it sees far more clips.
+
+    Where things are has to be learnt from the picture; at low levels the motion itself shows it.
+    """
     return replace(
-        joint_stage(dynamic),
+        generator,
+        name="branch",
+        kind="branch",
+        steps=4_000,
+        trained=("dit",),
+        losses=replace(generator.losses, flow_motion=1.0, moves=10.0),
+        level_shift=16.0,
+    )
+
+
+def _joint(told: StageRecipe) -> StageRecipe:
+    """The reconstruction, on motion as the branch makes it; right or wrong, it is what is shown."""
+    return replace(
+        told,
+        name="joint",
+        kind="generated",
         steps=400,
-        trained=("ldrm", "deformation"),
-        data=replace(dynamic.data, augment=False),
-        optimizer=replace(dynamic.optimizer, learning_rate=3e-4, warmup_steps=20),
-        level_shift=3.0,
+        data=replace(told.data, augment=False),
+        optimizer=replace(told.optimizer, learning_rate=1e-4, warmup_steps=20),
     )

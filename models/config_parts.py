@@ -148,12 +148,21 @@ class DitConfig:
     motion: bool = False
     """Also makes, beside the latent, where what the first frame shows goes to (ours;
     docs/adr/0018)."""
+    motion_width: int = 0
+    """Width of a branch that tells that motion instead, from the pixels of the first picture (ours;
+    docs/adr/0022); 0 is none."""
 
     def __post_init__(self) -> None:
         require_counts(
             self, "width", "blocks", "heads", "feedforward_width", "frequency_width", "camera_width"
         )
         require_heads(self, smallest=6)
+        whole = isinstance(self.motion_width, int) and not isinstance(self.motion_width, bool)
+        fits = whole and self.motion_width >= 0 and self.motion_width % (2 * self.heads) == 0
+        multiple = f"0 or a multiple of {2 * self.heads}, twice the heads"
+        require(fits, "DitConfig.motion_width", multiple, self.motion_width)
+        told = self.motion or not self.motion_width
+        require(told, "DitConfig.motion", "true where a branch tells it", self.motion)
         known = self.predicts in ("velocity", "clean")
         require(known, "DitConfig.predicts", "velocity or clean", self.predicts)
         for name in ("draft", "motion", "pooled_text"):

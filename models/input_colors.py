@@ -10,6 +10,7 @@ itself undoes the blur:
 Colours stay in [0, 1]: what sharpens the input view must not ring in other views.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
@@ -21,6 +22,7 @@ from diff4splat.geometry.rays import pixel_centers
 from diff4splat.models.picture import Picture
 from diff4splat.render.api import render
 from diff4splat.report.run_log import RunLog
+from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import color_from_dc, dc_from_color
 from diff4splat.scene.scene import Scene
 
@@ -47,17 +49,26 @@ class InputGrid:
 
 def match_input_view(scene: Scene, grid: InputGrid, steps: int, log: RunLog) -> Scene:
     """Correct the colours of the Gaussians that lie on their own cell of the input view."""
-    start_s = scene.motion.time_range_s[0]
-    own = _on_their_cell(scene.state_at(start_s).means, grid).nonzero()[:, 0]
-    if steps == 0 or len(own) == 0:
+    first = scene.state_at(scene.motion.time_range_s[0])
+    if steps == 0 or not _on_their_cell(first.means, grid).any():
         return scene
     with log.phases.phase("match colours", steps) as advance:
-        for _ in range(steps):
-            seen = render(scene, grid.picture.camera, start_s).rgb
-            residual = _per_cell(grid.picture.rgb.to(seen) - seen, grid.stride)
-            scene = _add_color(scene, own, residual[grid.cells[own]])
-            advance()
-    return scene
+        sh = matched_colors(first, grid, steps, advance)
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+
+
+@torch.no_grad()
+def matched_colors(
+    gaussians: Gaussians, grid: InputGrid, steps: int, advance: Callable[[], None] = lambda: None
+) -> Float[Tensor, "n c 3"]:
+    """Harmonics with which ``gaussians``, as they are at the first moment, show the picture."""
+    own = _on_their_cell(gaussians.means, grid).nonzero()[:, 0]
+    for _ in range(steps):
+        seen = render(gaussians, grid.picture.camera).rgb
+        residual = _per_cell(grid.picture.rgb.to(seen) - seen, grid.stride)
+        gaussians = _add_color(gaussians, own, residual[grid.cells[own]])
+        advance()
+    return gaussians.sh
 
 
 def _on_their_cell(means: Float[Tensor, "n 3"], grid: InputGrid) -> Bool[Tensor, " n"]:
@@ -75,7 +86,9 @@ def _per_cell(picture: Float[Tensor, "h w 3"], stride: int) -> Float[Tensor, "c 
     return means.flatten(1).mT
 
 
-def _add_color(scene: Scene, own: Int[Tensor, " m"], change: Float[Tensor, "m 3"]) -> Scene:
-    sh = scene.gaussians.sh.clone()
+def _add_color(
+    gaussians: Gaussians, own: Int[Tensor, " m"], change: Float[Tensor, "m 3"]
+) -> Gaussians:
+    sh = gaussians.sh.clone()
     sh[own, 0] = dc_from_color((color_from_dc(sh[own, 0]) + change).clamp(0, 1))
-    return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+    return replace(gaussians, sh=sh)

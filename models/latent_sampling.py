@@ -12,13 +12,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.flow.guidance import CallCount, Guidance, guided
+from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.video_dit import DitConditions, VideoDiT
 from diff4splat.models.video_motion import with_still_motion
-
-UNGUIDED = Guidance(weight=1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

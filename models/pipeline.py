@@ -5,11 +5,13 @@ Axes: ``b c t h w`` inside networks, pictures ``h w 3`` outside; this file is wh
     picture ─ smaller ─┬─ vae ────┐
                        ├─ draft ──┤   prompt ── text encoder ─┐
                        │          └─── path ─── Plücker maps ─┴─ sample ─ latents, motion ─┐
+                       ├─ motion branch ◄── prompt ── motion, and the picture's own latent ┤
                        └─ (or a plane) ────────────────────────────────────────────────────┤
     picture ── finer, match ── Scene ◄── move ◄── prune ◄── reconstruct ◄──────────────────┘
 
 Where the video model sees a draft and tells motion, the picture alone is reconstructed and moved as
-told, unless the settings ask for the sampled video as well.
+told, unless the settings ask for the sampled video as well; if a branch of its own tells motion, no
+video is sampled then.
 A model of which some parts are trained, but not the video model, shows the picture on its plane,
 standing still: see ``Model.runs_video_model``.
 """
@@ -27,12 +29,13 @@ from diff4splat.models.base_only import base_canonical, base_motion, leave_out_v
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
-from diff4splat.models.detail.stabilise import key_depth
 from diff4splat.models.draft import draft_latent
 from diff4splat.models.finer import FinerScene, finer
 from diff4splat.models.input_colors import InputGrid, match_input_view
 from diff4splat.models.latent_sampling import Conditions, SampledVideo, sample_video
 from diff4splat.models.latents_to_scene import VideoLatent, canonical_scene
+from diff4splat.models.motion_sampling import MotionWish
+from diff4splat.models.moved_picture import first_depth, moved_picture, note_guidance
 from diff4splat.models.picture import Picture, load_picture, smaller
 from diff4splat.models.pretrained import Model, load_model, save_model, with_text_encoder
 from diff4splat.models.prompt import require_prompt
@@ -157,6 +160,10 @@ class Diff4SplatPipeline:
         self, request: Request, context: CameraPath, log: RunLog
     ) -> tuple[Canonical, Motion]:
         """What the networks make of the picture."""
+        if self.model.branches_motion and request.settings.pictures == "first":
+            text = self._text_states(request.prompt, log)
+            wish = MotionWish(text=text, seed=request.seed, settings=request.settings)
+            return moved_picture(self.model, request.picture, context, wish, log)
         made = self._sample(request, self._conditions(request, context, log), log)
         video = VideoLatent(latent=made.latent, picture=request.picture, cameras=context.cameras)
         alone = self.model.tells_motion and request.settings.pictures == "first"
@@ -176,8 +183,7 @@ class Diff4SplatPipeline:
         """What the video model says of motion, if it says something and there is room for it."""
         if not self.model.config.dit.motion or made.motion.shape[2] < 2:
             return None
-        raw_distance = canonical.maps.gaussians[:, -1, :1]
-        depth = key_depth(raw_distance, self.model.config.activation)[0, 0]
+        depth = first_depth(canonical, self.model.config)
         return told_offsets(made.motion, picture.rgb, depth)
 
     def _from_picture(
@@ -227,9 +233,7 @@ class Diff4SplatPipeline:
         settings, dit = request.settings, self.model.networks.dit
         with log.phases.phase("sample video", settings.steps) as advance:
             video = sample_video(dit, conditions, settings, request.seed, advance)
-        if video.calls.saved:
-            why = "no prompt" if conditions.text is None else settings.why_unguided
-            log.left_out("guidance pass", why, f"{video.calls.saved} network calls")
+        note_guidance(video.calls, conditions.text is None, settings.guidance, log)
         return video
 
     def _motion(

@@ -92,6 +92,11 @@ class Model:
         return self.config.dit.motion and self.config.dit.draft
 
     @property
+    def branches_motion(self) -> bool:
+        """Whether motion is told by a branch of its own, so that no video need be sampled."""
+        return self.tells_motion and self.config.dit.motion_width > 0
+
+    @property
     def side_px(self) -> int:
         """Longer side of pictures read from files."""
         return _side_px(self.config, self.trained)

@@ -5,6 +5,7 @@ key times. The deformation network answers one time per call, so that memory doe
 number of key times times the grid.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -114,15 +115,23 @@ def told_motion(
     canonical: Canonical, key_times_s: Float[Tensor, " k"], told: Float[Tensor, "t h w 3"]
 ) -> Motion:
     """Key-framed motion of the kept Gaussians by nothing but ``told`` offsets."""
+    fractions = torch.linspace(0, 1, len(key_times_s)).tolist()
+    states = told_states(canonical, told, fractions)
+    every = torch.arange(len(canonical.cells), device=told.device)
+    return keyframe_motion(states, key_times_s, every)
+
+
+def told_states(
+    canonical: Canonical, told: Float[Tensor, "t h w 3"], fractions: Sequence[float]
+) -> list[DeformationState]:
+    """How the kept Gaussians differ at fractions of the clip, by nothing but ``told`` offsets."""
     count = len(canonical.cells)
     still = DeformationState(
         offsets=told.new_zeros(count, 3),
         rotations=told.new_tensor([1.0, 0.0, 0.0, 0.0]).repeat(count, 1),
         log_scale_offsets=told.new_zeros(count, 3),
     )
-    fractions = torch.linspace(0, 1, len(key_times_s)).tolist()
-    states = [_moved_on(still, told, canonical, fraction) for fraction in fractions]
-    return keyframe_motion(states, key_times_s, torch.arange(count, device=told.device))
+    return [_moved_on(still, told, canonical, fraction) for fraction in fractions]
 
 
 def deform(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from diff4splat.errors import ConfigError
-from diff4splat.flow.guidance import DEFAULT_GUIDANCE, Guidance
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE, UNGUIDED, Guidance
 from diff4splat.flow.levels import Schedule, make_levels, require_levels
 from diff4splat.flow.samplers import find_sampler
 from diff4splat.scene.edit import MIN_OPACITY
@@ -12,6 +12,32 @@ from diff4splat.scene.edit import MIN_OPACITY
 MAX_STEPS = 1000
 ENOUGH_STEPS = 6
 """With fewer, evenly spaced in log signal-to-noise ratio throws guided samples off their course."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionSettings:
+    """Sampling of a motion branch; defaults as measured in docs/results/generation.md."""
+
+    steps: int = 1
+    """One gives the mean of what the words allow; more draw one of the futures."""
+    shift: float = 16.0
+    """As in its training: where things are is learnt at noisy levels."""
+    guidance: Guidance = UNGUIDED
+    moves_above: float = 0.3
+    """A pixel moves if it is more likely than this to move at all, or among the likeliest where
+    none is (docs/adr/0022)."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.steps <= MAX_STEPS:
+            raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
+        require_levels(self.levels)
+        if not 0 <= self.moves_above <= 1:
+            raise ConfigError(f"moves_above: expected 0 to 1, got {self.moves_above:g}")
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Noise levels that the sampler visits."""
+        return make_levels("uniform", self.steps, self.shift)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +55,8 @@ class GenerationSettings:
     pictures: Literal["first", "sampled"] = "first"
     """What is reconstructed where the video model corrects a draft and tells motion: the picture,
     moved as told, or the sampled video as well (docs/adr/0018)."""
+    motion: MotionSettings = MotionSettings()
+    """The same for a motion branch, where the model has one."""
     min_opacity: float = MIN_OPACITY
     still_px: float = 0.05
     """Gaussians that never move by more than this many pixels of the input view stand still."""
@@ -55,12 +83,12 @@ class GenerationSettings:
         measured: Schedule = "log_snr" if self.steps >= ENOUGH_STEPS else "uniform"
         return make_levels(self.schedule or measured, self.steps, self.shift)
 
-    @property
-    def why_unguided(self) -> str:
-        """Why a prompted generation leaves some unconditional passes out."""
-        if self.guidance.weight == 1:
-            return "a guidance weight of 1 needs no other pass"
-        return "outside the guidance interval"
+
+def why_unguided(guidance: Guidance) -> str:
+    """Why a prompted generation leaves some unconditional passes out."""
+    if guidance.weight == 1:
+        return "a guidance weight of 1 needs no other pass"
+    return "outside the guidance interval"
 
 
 def require_seed(seed: int) -> int:

@@ -54,6 +54,7 @@ def small_size() -> ModelConfig:
             predicts="clean",
             draft=True,
             motion=True,
+            motion_width=64,
             pooled_text=True,
         ),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),

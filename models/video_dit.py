@@ -11,7 +11,8 @@ gives it level 0.
     level ── sinusoid, MLP ─ modulation ───┘ │
     text ─── MLP ─ cross-attention ──────────┘
 
-``c`` includes the channels of a motion, where the model makes one (``video_motion``).
+``c`` includes the channels of a motion, where the model makes one (``video_motion``). Where a
+``motion_branch`` tells motion, it is asked on its own (``motion_sampling``), and not here.
 
 Where it predicts clean latents, the last linear layer answers what to add to the draft (to 0, where
 there is none), and the velocity follows from that: a fresh model leads any noise to the draft.
@@ -35,6 +36,7 @@ from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embeddin
 from diff4splat.models.camera_adapter import CameraAdapter
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.config_parts import TOKEN_PATCH
+from diff4splat.models.motion_branch.branch import MotionBranch
 
 PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
 
@@ -88,6 +90,9 @@ class VideoDiT(nn.Module):
         self.norm_out = nn.LayerNorm(dit.width, eps=EPSILON, elementwise_affine=False)
         self.modulation_out = nn.Parameter(torch.zeros(2, dit.width))
         self.head = zero_(nn.Linear(dit.width, channels * TOKEN_PATCH**2))
+        self.motion_branch = None
+        if dit.motion_width:
+            self.motion_branch = MotionBranch(dit.motion_width, dit.heads, config.text)
 
     def forward(
         self,

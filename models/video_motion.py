@@ -10,7 +10,7 @@ the grid of the latents. In the first latent frame it is 0.
 """
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.models.bilateral import enlarged, log_weights
@@ -59,3 +59,15 @@ def told_offsets(
     weight = log_weights(colors.movedim(0, -1), rgb)
     fields = [enlarged(cells[:, time], weight) for time in range(cells.shape[1])]
     return torch.stack(fields).movedim(1, -1) * UNIT * depth[..., None]
+
+
+def moved_offsets(
+    field: Float[Tensor, "c t hc wc"],
+    moves: Bool[Tensor, "hh ww"] | Float[Tensor, "hh ww"],
+    depth: Float[Tensor, "hh ww"],
+) -> Float[Tensor, "t hh ww 3"]:
+    """The same where it is told apart what moves, and how: a smooth ``field`` of all cells."""
+    pixels = torch.nn.functional.interpolate(
+        field.transpose(0, 1), scale_factor=MOTION_CELL_PX, mode="bilinear", align_corners=False
+    )
+    return (pixels * moves).movedim(1, -1) * UNIT * depth[..., None]

@@ -12,11 +12,24 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.config_parts import TIME_STRIDE
 
-StageKind = Literal["vae", "sight", "static", "motion", "dynamic", "generator", "joint"]
+StageKind = Literal[
+    "vae",
+    "sight",
+    "static",
+    "motion",
+    "dynamic",
+    "told",
+    "generator",
+    "branch",
+    "joint",
+    "generated",
+]
 Precision = Literal["float32", "bfloat16"]
 Parallel = Literal["none", "ddp", "fsdp2"]
 Direction = Literal["at_least", "at_most"]
-RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "joint")
+RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "told", "joint", "generated")
+READING = ("generator", "branch", "joint", "generated")
+"""Kinds that read captions, which speak of left and right."""
 
 
 def _require(holds: bool, what: str, expected: str, got: object) -> None:
@@ -35,6 +48,9 @@ class LossWeights:
     clean latents are predicted, small levels would otherwise outweigh all others."""
     flow_motion: float = 1.0
     """How much a channel of motion counts, beside 1 for one of the latent (ours)."""
+    moves: float = 0.0
+    """Cross-entropy of which cells move, for a motion branch (ours; docs/adr/0022): most stand, so
+    that a squared error alone takes long to find those that do not."""
     flow_energy: float = 0.0
     """Latent channels count as their share in pictures to this power (ours); 0 is the paper."""
     photometric: float = 1.0
@@ -268,10 +284,12 @@ class Recipe:
         encoded = any(source.kind == "latents" for source in stage.data.sources)
         fits = not encoded or stage.kind == "generator"
         _require(fits, f"{what}: data.sources", "latents for a generator stage alone", stage.kind)
-        told = stage.data.augment and stage.kind in ("generator", "joint")
+        told = stage.data.augment and stage.kind in READING
         _require(not told, f"{what}: data.augment", "false where captions are read", "true")
         stride, framed = stage.data.track_stride, detail and stage.kind in RECONSTRUCTING
         fits = not framed or stride == TIME_STRIDE
+        branches = stage.kind not in ("branch", "generated") or self.model.dit.motion_width > 0
+        _require(branches, f"{what}: model.dit.motion_width", "a motion branch for its kind", 0)
         key_frames = f"{TIME_STRIDE} with a detail decoder"
         _require(fits, f"{what}: data.track_stride", key_frames, stride)
 

@@ -41,14 +41,15 @@ class Generate:
     """Side of a square with as many pixels as the picture will have; if left out, the model's."""
     fov: float | None = None
     """Horizontal field of view in degrees; if left out, from EXIF, else a 30 mm lens."""
-    steps: int = 8
-    """Steps of the sampler."""
+    steps: int | None = None
+    """Steps of the sampler; if left out, 1 where a branch tells motion, and 8 for a video."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
     """How the flow is integrated; `diff4splat report error-time` compares them."""
-    shift: float = 1.0
-    """Above 1 spends more steps on noisy levels."""
-    guidance: float = 5.0
-    """How strongly to follow the prompt; 1 switches guidance off."""
+    shift: float | None = None
+    """Above 1 spends more steps on noisy levels; if left out, 16 for motion, and 1 for a video."""
+    guidance: float | None = None
+    """How strongly to follow the prompt, 1 is not at all more than it says; if left out, 1 where a
+    branch tells motion, and 5 for a video."""
     min_opacity: float = 0.005
     """Fainter Gaussians are dropped."""
     skip_depth: bool = False
@@ -99,17 +100,24 @@ class Generate:
         from diff4splat.flow.guidance import DEFAULT_GUIDANCE
         from diff4splat.models.pretrained import find_config
         from diff4splat.models.prompt import require_prompt
-        from diff4splat.models.settings import GenerationSettings, require_seed
+        from diff4splat.models.settings import (
+            GenerationSettings,
+            MotionSettings,
+            require_seed,
+        )
 
         require_seed(self.seed)
         if self.prompt is not None:
             require_prompt(self.prompt, find_config(self.model).text.max_bytes)
+        given = {"steps": self.steps, "shift": self.shift}
+        if self.guidance is not None:
+            given["guidance"] = replace(DEFAULT_GUIDANCE, weight=self.guidance)
+        given = {name: value for name, value in given.items() if value is not None}
         return GenerationSettings(
-            steps=self.steps,
             sampler=self.sampler,
-            shift=self.shift,
-            guidance=replace(DEFAULT_GUIDANCE, weight=self.guidance),
             min_opacity=self.min_opacity,
+            motion=MotionSettings(**given),
+            **given,
         )
 
     def picture(self) -> "Picture":

@@ -44,6 +44,8 @@ class Guidance:
         return self.weight != 1 and self.low <= level <= self.high
 
 
+UNGUIDED = Guidance(weight=1.0)
+"""The condition as it stands."""
 DEFAULT_GUIDANCE = Guidance(weight=5.0, low=0.2, high=1.0)
 """What a prompted generation uses unless told otherwise."""
 

@@ -40,6 +40,10 @@ class ClipBatch:
     track_valid: Bool[Tensor, "b n"]
     motion: Float[Tensor, "b 3 t hc wc"]
     """Where what the first frame shows goes to, per cell (``motion_truth``)."""
+    field: Float[Tensor, "b 3 t hc wc"]
+    """The same, as what moves goes, continued to all other cells (``motion_truth.continued``)."""
+    moving: Bool[Tensor, "b h w"]
+    """Pixels of the first frame that move."""
     is_static: Bool[Tensor, " b"]
     captions: tuple[str, ...]
 

@@ -14,7 +14,12 @@ from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.training.batches.augment import augmented
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.batches.motion_truth import motion_truth
+from diff4splat.training.batches.motion_truth import (
+    cell_means,
+    continued,
+    moving_pixels,
+    pixel_motion,
+)
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
@@ -46,6 +51,8 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
     if not (settings.moving_targets or clip.note.is_static):
         targets = replace(targets, frames=torch.zeros_like(targets.frames))
     tracks = draw_tracks(clip, targets.frames, settings, generator)
+    motion = pixel_motion(clip, settings.input_stride)
+    moving = moving_pixels(motion)
     view, shown = clip.views[INPUT_VIEW], slice(None, None, settings.input_stride)
     return ClipBatch(
         sample_index=torch.tensor([origin.key.sample]),
@@ -60,7 +67,9 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         track_cell=tracks.cell[None],
         track_offset=tracks.offset[None],
         track_valid=tracks.valid[None],
-        motion=motion_truth(clip, settings.input_stride)[None],
+        motion=cell_means(motion)[None],
+        field=continued(motion, moving)[None],
+        moving=moving[None],
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
     )

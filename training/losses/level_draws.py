@@ -50,3 +50,12 @@ def draw_levels(uniform: Float[Tensor, " b"], draw: LevelDraw) -> Float[Tensor, 
         return levels
     # The denominator keeps levels 0 and 1 exactly where they are.
     return draw.shift * levels / (draw.shift * levels + (1 - levels))
+
+
+def level_weights(level: Float[Tensor, " b"], least: float) -> Float[Tensor, " b"] | None:
+    """Errors of velocity at small levels as if the error of the clean latent were made higher up.
+
+    The velocity of a clean prediction is wrong by its error over the level; errors at levels below
+    ``least`` count as if they were made there. None, where that is 0, counts all alike.
+    """
+    return None if least == 0 else (level / least).clamp_max(1).square()

@@ -6,6 +6,8 @@ from types import MappingProxyType
 from diff4splat.models.factory import Networks
 from diff4splat.training.recipe import StageKind
 from diff4splat.training.stages.autoencoder import AutoencoderStage
+from diff4splat.training.stages.branch import BranchStage
+from diff4splat.training.stages.generated import GeneratedStage
 from diff4splat.training.stages.generator import GeneratorStage
 from diff4splat.training.stages.joint import JointStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
@@ -15,6 +17,7 @@ from diff4splat.training.stages.reconstruction import (
     SightStage,
     StaticStage,
 )
+from diff4splat.training.stages.told import ToldStage
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
     {
@@ -22,9 +25,12 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "sight": SightStage,
         "static": StaticStage,
         "motion": MotionStage,
+        "told": ToldStage,
+        "branch": BranchStage,
         "dynamic": DynamicStage,
         "generator": GeneratorStage,
         "joint": JointStage,
+        "generated": GeneratedStage,
     }
 )
 

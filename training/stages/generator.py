@@ -15,27 +15,24 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.data_prep.synthetic.captions.variety import said_otherwise
 from diff4splat.flow.path import add_noise, clean_from_velocity
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.config import ModelConfig
 from diff4splat.models.draft import draft_latent
 from diff4splat.models.picture import Picture
-from diff4splat.models.text_encoder import tokenize
 from diff4splat.models.video_motion import packed_motion, with_still_motion
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.losses.flow_matching import flow_matching
-from diff4splat.training.losses.level_draws import LevelDraw, draw_levels
+from diff4splat.training.losses.level_draws import LevelDraw, draw_levels, level_weights
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.model_stage import ModelStage, camera_rays, shown_video
+from diff4splat.training.stages.captioned import CaptionedStage
+from diff4splat.training.stages.model_stage import camera_rays, shown_video
 from diff4splat.training.stages.panels import Row, panel
 
-UNSAID = "a scene"
-"""What clips without a caption say, so that every process runs the text encoder alike."""
 Terms = Mapping[str, Float[Tensor, " b"]]
 
 JUDGED_LEVELS = (0.25, 0.5, 0.75)
@@ -63,7 +60,7 @@ class NoisyVideo:
         return self.level[:, None] * (torch.arange(frames, device=self.level.device) > 0)
 
 
-class GeneratorStage(ModelStage):
+class GeneratorStage(CaptionedStage):
     """Video DiT and text encoder."""
 
     parts = ("vae", "text_encoder", "dit")
@@ -108,8 +105,8 @@ class GeneratorStage(ModelStage):
     def flow_terms(self, batch: LatentBatch) -> Terms:
         """Flow matching at one level per sample, for the latents of the batch."""
         video, weights = self.noisy(batch), self.plan.recipe.losses
-        velocity = self.velocity(batch, video, self._drops_text(batch))
-        flow = self._flow(velocity, video, _level_weights(video.level, weights.flow_level))
+        velocity = self.velocity(batch, video, self.drops_text(batch))
+        flow = self._flow(velocity, video, level_weights(video.level, weights.flow_level))
         return {"flow": flow, TOTAL: weights.flow * flow}
 
     def _flow(
@@ -161,30 +158,10 @@ class GeneratorStage(ModelStage):
         without_text: bool = False,
     ) -> Float[Tensor, "b c t h w"]:
         """The model's answer for any latent."""
-        text, mask = (None, None) if without_text else self._text(batch)
+        text, mask = (None, None) if without_text else self.text(batch)
         channels, draft = self.plan.model.motion_channels, batch.draft
         draft = None if draft is None else with_still_motion(draft, channels)
         return self.dit(latent, levels, camera_rays(batch.cameras), text, mask, draft)
-
-    def _text(self, batch: LatentBatch) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
-        captions = [caption or UNSAID for caption in self._captions(batch)]
-        tokens, mask = tokenize(captions, self.plan.model.text.max_bytes)
-        tokens, mask = tokens.to(batch.latent.device), mask.to(batch.latent.device)
-        return self.text_encoder(tokens, mask), mask
-
-    def _captions(self, batch: LatentBatch) -> list[str]:
-        """As they stand, or as somebody else would put them."""
-        if not (self.training and self.plan.recipe.vary_captions):
-            return list(batch.captions)
-        said = []
-        for caption, own in zip(batch.captions, self.draw(batch, "words"), strict=True):
-            draw, variant = torch.rand((), generator=own), torch.randint(12, (), generator=own)
-            said.append(said_otherwise(caption, float(draw), int(variant)))
-        return said
-
-    def _drops_text(self, batch: LatentBatch) -> bool:
-        draw = torch.rand((), generator=self.draw_for_step(batch, "text"))
-        return self.training and bool(draw < self.plan.recipe.text_dropout)
 
     @torch.no_grad()
     def measure(self, batch: ClipBatch | LatentBatch) -> Terms:
@@ -222,11 +199,3 @@ class GeneratorStage(ModelStage):
         clean = self.clean(batch)
         levels = clean.new_full((len(clean),), level)
         return NoisyVideo(clean=clean, noise=self.noise(batch, clean, "judged"), level=levels)
-
-
-def _level_weights(level: Float[Tensor, " b"], least: float) -> Float[Tensor, " b"] | None:
-    """Errors of velocity at small levels as if the error of the clean latent were made higher up.
-
-    The velocity of a clean prediction is wrong by its error over the level.
-    """
-    return None if least == 0 else (level / least).clamp_max(1).square()

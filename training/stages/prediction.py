@@ -69,12 +69,8 @@ def canonical_scenes(
 
 def still_pictures(scenes: list[Canonical], batch: ClipBatch) -> Rendered:
     """Every target shows the canonical state: the deformation network is not executed."""
-    shown = []
-    for index, scene in enumerate(scenes):
-        targets = batch.target_cameras[index]
-        flat = [_pictures(scene.gaussians, targets[time]) for time in range(len(targets))]
-        shown.append(_stack(flat))
-    rgb, depth = _stack(shown)
+    times = batch.target_time.shape[1]
+    rgb, depth = target_pictures([[scene.gaussians] * times for scene in scenes], batch)
     return Rendered(rgb=rgb, depth=depth, offsets=None)
 
 
@@ -82,15 +78,24 @@ def moving_pictures(
     scenes: list[Canonical], deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
 ) -> Rendered:
     """``deformations`` hold the raw maps of all samples, one tensor (b, 10, …) per target time."""
-    shown = []
+    moved = []
     for index, scene in enumerate(scenes):
         states = [deformed_state(scene, maps[index], model) for maps in deformations]
-        moved = [deformed(scene.gaussians, state) for state in states]
-        targets = batch.target_cameras[index]
-        flat = [_pictures(state, targets[time]) for time, state in enumerate(moved)]
-        shown.append(_stack(flat))
-    rgb, depth = _stack(shown)
+        moved.append([deformed(scene.gaussians, state) for state in states])
+    rgb, depth = target_pictures(moved, batch)
     return Rendered(rgb=rgb, depth=depth, offsets=track_offsets(deformations, batch, model))
+
+
+def target_pictures(
+    moments: list[list[Gaussians]], batch: ClipBatch
+) -> tuple[Float[Tensor, "b m p h w 3"], Float[Tensor, "b m p h w"]]:
+    """Colour and depth of every sample's Gaussians, one set per target time."""
+    shown = []
+    for index, moved in enumerate(moments):
+        targets = batch.target_cameras[index]
+        flat = [_pictures(gaussians, targets[time]) for time, gaussians in enumerate(moved)]
+        shown.append(_stack(flat))
+    return _stack(shown)
 
 
 def track_offsets(

@@ -58,11 +58,13 @@ class StaticStage(ModelStage):
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """PSNR and depth correlation at the targets, and displacement error where there is one."""
+        batch = self.given(batch)
         return reconstruction_measures(self.render(batch, self.encode(batch)), batch)
 
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """Input, truth, prediction, both depths, motion."""
+        batch = self.given(batch)
         return reconstruction_panel(self.render(batch, self.encode(batch)), batch)
 
 

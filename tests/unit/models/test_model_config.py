@@ -40,6 +40,8 @@ OTHER_VALUES = {
     "pooled_text": True,
 }
 """Valid values where doubling the old one is not."""
+BOUND = [("ldrm", "reads"), ("dit", "motion_width")]
+"""Fields that may not change alone."""
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -54,7 +56,7 @@ def test_json_lists_every_field() -> None:
     assert all(leaf in data[part] for part, leaf in LEAVES)
 
 
-@pytest.mark.parametrize(("part", "leaf"), [pair for pair in LEAVES if pair != ("ldrm", "reads")])
+@pytest.mark.parametrize(("part", "leaf"), [pair for pair in LEAVES if pair not in BOUND])
 def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
     data = json.loads(test_size().to_json())
     old = data[part][leaf]
@@ -64,10 +66,23 @@ def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
     assert len(changed.fingerprint()) == 12 and int(changed.fingerprint(), 16) >= 0
 
 
+def test_a_branch_for_motion_needs_a_motion_and_room_for_its_heads() -> None:
+    dit = dataclasses.replace(test_size().dit, motion=True, motion_width=8)
+    assert dataclasses.replace(test_size(), dit=dit).fingerprint() != test_size().fingerprint()
+    for change, words in (
+        ({"motion": False}, "DitConfig.motion: expected true where a branch tells it"),
+        ({"motion_width": 6}, "motion_width: expected 0 or a multiple of 4, twice the heads"),
+        ({"motion_width": -8}, "motion_width: expected 0 or a multiple"),
+        ({"motion_width": True}, "motion_width: expected 0 or a multiple"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            dataclasses.replace(dit, **change)
+
+
 def test_models_stored_before_there_were_details_have_none() -> None:
     data = json.loads(test_size().to_json())
     del data["detail"], data["vae"]["linear_code"], data["ldrm"]["reads"]
-    for later in ("predicts", "draft", "motion", "pooled_text"):
+    for later in ("predicts", "draft", "motion", "motion_width", "pooled_text"):
         del data["dit"][later]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 

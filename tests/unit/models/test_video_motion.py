@@ -5,6 +5,7 @@ import torch
 from diff4splat.models.video_motion import (
     UNIT,
     motion_cells,
+    moved_offsets,
     packed_motion,
     told_offsets,
     with_still_motion,
@@ -51,3 +52,15 @@ def test_there_is_a_gradient_to_the_motion() -> None:
     motion = torch.zeros(1, 12, 2, 2, 2, requires_grad=True)
     told_offsets(motion, torch.rand(16, 16, 3), torch.ones(16, 16)).sum().backward()
     torch.testing.assert_close(motion.grad.sum(), torch.tensor(2 * 256 * 3 * UNIT))
+
+
+def test_only_what_moves_goes_as_the_field_says() -> None:
+    field = torch.zeros(3, 2, 4, 4)
+    field[1, 1] = 2.0
+    moves = torch.zeros(16, 16, dtype=torch.bool)
+    moves[3:6, 2:9] = True
+    depth = torch.rand(16, 16) + 1
+    found = moved_offsets(field, moves, depth)
+    assert found.shape == (2, 16, 16, 3)
+    torch.testing.assert_close(found[1, ..., 1], 2 * UNIT * depth * moves)
+    assert not found[0].any() and not found[1, ..., 0].any()

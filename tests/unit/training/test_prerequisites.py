@@ -46,15 +46,19 @@ WITH_SIGHT = {
     "motion": {"vae": "vae", "ldrm": "static-low"},
     "dynamic": {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
     "single": {"vae": "vae", "ldrm": "dynamic"},
-    "generator": {"vae": "vae", "ldrm": "single"},
-    "joint": BUILDS_ON["joint"] | {"ldrm": "single"},
+    "told": {"vae": "vae", "ldrm": "single", "deformation": "dynamic"},
+    "generator": {"vae": "vae", "ldrm": "told"},
+    "branch": {"text_encoder": "generator", "dit": "generator"},
+    "joint": BUILDS_ON["joint"] | {"ldrm": "told", "dit": "branch"},
 }
 """What differs in ``small``, at its only size: seeing is learnt first, and motion by itself."""
 SIGHT_CONTINUES = {
     "static-low": "sight",
     "dynamic": "motion",
     "single": "dynamic",
-    "joint": "single",
+    "told": "single",
+    "branch": "generator",
+    "joint": "told",
 }
 
 

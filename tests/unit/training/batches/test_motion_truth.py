@@ -8,7 +8,13 @@ from diff4splat.data.clip import Clip, ClipNote, Tracks, View
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.video_motion import UNIT
 from diff4splat.training.batches.augment import mirrored
-from diff4splat.training.batches.motion_truth import motion_truth
+from diff4splat.training.batches.motion_truth import (
+    cell_means,
+    continued,
+    motion_truth,
+    moving_pixels,
+    pixel_motion,
+)
 
 SIDE, FRAMES, DEPTH = 16, 9, 4.0
 
@@ -79,3 +85,38 @@ def test_without_depth_masks_or_tracks_nothing_moves() -> None:
 
 def test_what_hardly_moves_stands() -> None:
     assert not bool(motion_truth(square((0.01, 0.0, 0.0)), 1).any())
+
+
+def test_cells_are_means_of_pixels() -> None:
+    clip = square((0.8, 0.3, -0.4))
+    torch.testing.assert_close(cell_means(pixel_motion(clip, 1)), motion_truth(clip, 1))
+
+
+def test_what_moves_is_told_pixel_by_pixel() -> None:
+    moving = moving_pixels(pixel_motion(square((0.8, 0.0, 0.0)), 1))
+    assert bool(moving[:8, :8].all()) and int(moving.sum()) == 64
+    assert not moving_pixels(pixel_motion(square((0.0, 0.0, 0.0)), 1)).any()
+
+
+def test_all_cells_go_as_the_nearest_that_moves() -> None:
+    motion = pixel_motion(square((0.8, 0.2, -0.4)), 1)
+    field = continued(motion, moving_pixels(motion))
+    assert field.shape == (3, 3, 4, 4)
+    for time in range(3):
+        wanted = motion[:, time, 0, 0][:, None, None]
+        torch.testing.assert_close(field[:, time], wanted.expand(3, 4, 4))
+
+
+def test_a_cell_goes_as_its_moving_pixels_do_and_not_as_their_mean_with_the_others() -> None:
+    motion = torch.zeros(3, 2, 8, 8)
+    motion[0, 1, 3, 3] = 2.0
+    motion[1, 1, 7, 7] = -1.0
+    field = continued(motion, moving_pixels(motion))
+    assert field[:, 1, 0, 0].tolist() == [2.0, 0.0, 0.0]
+    assert field[:, 1, 1, 1].tolist() == [0.0, -1.0, 0.0]
+    assert not field[:, 0].any()
+
+
+def test_where_nothing_moves_nothing_is_continued() -> None:
+    motion = torch.zeros(3, 3, 16, 16)
+    assert not continued(motion, moving_pixels(motion)).any()

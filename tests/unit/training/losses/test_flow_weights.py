@@ -10,8 +10,8 @@ from stage_fixtures import make_batch, make_stage, stage_recipe
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.flow.path import add_noise, velocity, velocity_from_clean
 from diff4splat.training.losses.flow_matching import flow_matching
+from diff4splat.training.losses.level_draws import level_weights
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.generator import _level_weights
 from diff4splat.training.stages.model_stage import ModelStage
 
 F64 = torch.float64
@@ -55,13 +55,13 @@ def test_channels_and_samples_are_weighted_together() -> None:
 
 
 def test_levels_are_all_alike_where_none_is_named() -> None:
-    assert _level_weights(torch.tensor([0.0, 0.3]), 0.0) is None
+    assert level_weights(torch.tensor([0.0, 0.3]), 0.0) is None
 
 
 def test_smaller_levels_count_less() -> None:
     level = torch.tensor([0.0, 0.1, 0.2, 0.4, 0.7, 1.0])
     wanted = torch.tensor([0.0, 1 / 16, 0.25, 1.0, 1.0, 1.0])
-    torch.testing.assert_close(_level_weights(level, 0.4), wanted)
+    torch.testing.assert_close(level_weights(level, 0.4), wanted)
 
 
 @settings(max_examples=25, deadline=None)
@@ -75,7 +75,7 @@ def test_the_same_error_of_the_clean_latent_costs_the_same_at_all_levels_below(
         noisy, levels = add_noise(clean, noise, at), torch.full((2,), at, dtype=F64)
         wrong = velocity_from_clean(noisy, clean + error, levels[:, None, None, None, None])
         torch.testing.assert_close(wrong, velocity(clean, noise) - error / at)
-        return flow_matching(wrong, clean, noise, weights=_level_weights(levels, least))
+        return flow_matching(wrong, clean, noise, weights=level_weights(levels, least))
 
     torch.testing.assert_close(cost(min(level, least)), cost(least))
 

@@ -1,0 +1,84 @@
+"""One picture to a scene that moves as told: what generation shows along its path.
+
+    picture ─ vae (frozen) ─ latent ─ ldrm ─ Gaussians ─ match colours ─ move ─ render ─ losses
+    truth ──────────────────────────── motion per cell ───────────────────┘
+
+Depth, what lies behind things that move away and what the camera uncovers are learnt from the
+pictures in which they are seen. Some steps are given whole videos instead, moved by the deformation
+network: without them LDRM forgets how to read one within a few hundred steps. Colours are matched
+to the picture as generation does, so that sizes and opacities suit the colours that are shown in
+the end; no gradient passes the matching.
+"""
+
+from dataclasses import replace
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.detail.stabilise import key_depth
+from diff4splat.models.input_colors import InputGrid, matched_colors
+from diff4splat.models.maps import ReconstructionMaps
+from diff4splat.models.picture import Picture
+from diff4splat.models.reconstruction import Canonical, told_states
+from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.video_motion import moved_offsets
+from diff4splat.scene.gaussians import Gaussians
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.stages.model_stage import network_rays
+from diff4splat.training.stages.prediction import (
+    Rendered,
+    canonical_scenes,
+    deformed,
+    target_pictures,
+    with_depth,
+)
+from diff4splat.training.stages.reconstruction import DynamicStage
+
+
+class ToldStage(DynamicStage):
+    """LDRM from first pictures, judged at any time; where things go is known."""
+
+    def given(self, batch: ClipBatch) -> ClipBatch:
+        """The first picture alone, and in some steps of training the whole video."""
+        return super().given(batch) if self.training else batch.first_picture()
+
+    def render(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Rendered:
+        """Pictures of the moved scenes at the targets; a video is moved by what is seen in it."""
+        if batch.video.shape[1] > 1:
+            return super().render(batch, latent)
+        sight = self.sight(batch, latent)
+        maps = self.ldrm(latent, network_rays(batch), sight, moving=False)
+        with torch.autocast(latent.device.type, enabled=False):
+            scenes = canonical_scenes(maps, batch, self.plan.model, sight)
+            return with_depth(self.told_pictures(scenes, maps, batch), maps, self.plan.model)
+
+    def told_pictures(
+        self, scenes: list[Canonical], maps: ReconstructionMaps, batch: ClipBatch
+    ) -> Rendered:
+        """Every target shows its own moment of the scene, moved by the motion of the batch."""
+        depth = key_depth(maps.gaussians[:, -1], self.plan.model.activation)[:, 0]
+        moved = []
+        for index, scene in enumerate(scenes):
+            picture = first_picture(batch, index)
+            told = moved_offsets(batch.field[index], batch.moving[index], depth[index])
+            states = told_states(scene, told, batch.target_time[index].tolist())
+            shown = _matched(scene, picture)
+            moved.append([deformed(shown, state) for state in states])
+        rgb, depths = target_pictures(moved, batch)
+        return Rendered(rgb=rgb, depth=depths, offsets=None)
+
+
+def first_picture(batch: ClipBatch, index: int) -> Picture:
+    """What one sample starts from."""
+    rgb = unit_rgb(batch.video[index, 0])
+    return Picture(rgb=rgb, camera=batch.cameras[index][0], focal_source="clip")
+
+
+def _matched(scene: Canonical, picture: Picture) -> Gaussians:
+    """The Gaussians at rest with the colours that generation would give them."""
+    grid = InputGrid(picture=picture, stride=1, cells=scene.every_cell)
+    own = scene.gaussians
+    sh = matched_colors(own, grid, GenerationSettings().color_steps)
+    return replace(own, sh=own.sh + (sh - own.sh).detach())
