@@ -28,6 +28,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.geometry.rays import pixel_centers
+from diff4splat.io.images import write_png
 from diff4splat.io.ply import read_ply, write_ply
 from diff4splat.io.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr

@@ -6,6 +6,7 @@ around it that is near and of its colour (``bilateral``): Gaussian, track and, b
 the same surface, depth.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import torch
@@ -15,6 +16,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.rays import world_rays
+from diff4splat.models.behind import behind_picture
 from diff4splat.models.bilateral import around, log_weights
 from diff4splat.models.picture import Picture
 from diff4splat.models.reconstruction import Canonical
@@ -26,6 +28,11 @@ from diff4splat.scene.motion.static import StaticMotion
 
 ONE_SURFACE = 0.1
 """Difference of log depth up to which neighbours are one surface."""
+
+
+OPAQUE, WIDEST_PX = 0.95, 0.6
+"""What the photograph shows is not seen through, and a pixel of it hides no other: cells may be
+fainter and wider, where networks are unsure of an edge."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +64,7 @@ def finer(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) 
     """
     first = int((canonical.cells < small.rgb[..., 0].numel()).sum())
     pixels = _take_over(canonical, first, small, photo)
-    rest = canonical.gaussians.select(slice(first, None))
+    rest = _rest(canonical, first, small)
     fine = _fine_gaussians(canonical.gaussians, pixels, small, photo)
     behind = torch.arange(first, len(canonical.gaussians), device=pixels.parent.device)
     outside = behind.new_full((len(behind),), photo.rgb[..., 0].numel())
@@ -67,6 +74,17 @@ def finer(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) 
         motion=_inherited(motion, torch.cat([pixels.parent, behind]), grown),
         cells=torch.cat([pixels.kept, outside]),
     )
+
+
+def _rest(canonical: Canonical, first: int, small: Picture) -> Gaussians:
+    """Later frames as they are, and the surroundings behind the picture."""
+    own = len(canonical.cells)
+    cells, size_px = canonical.cells[:first], small.camera.size_px
+    depth = project(small.camera, canonical.gaussians.means[:first])[1]
+    surface = depth.new_zeros(math.prod(size_px)).index_copy(0, cells, depth).view(size_px)
+    around = canonical.gaussians.select(slice(own, None))
+    later = canonical.gaussians.select(slice(first, own))
+    return concatenate([later, behind_picture(around, surface, small.camera)])
 
 
 def _take_over(canonical: Canonical, first: int, small: Picture, photo: Picture) -> _Pixels:
@@ -98,11 +116,14 @@ def _fine_gaussians(
     depth = project(small.camera, parent.means)[1] * pixels.log_depth.exp()
     whole = depth.new_ones(photo.rgb[..., 0].numel()).index_copy(0, pixels.kept, depth)
     distance = distance_from_depth(photo.camera, whole.view(photo.camera.size_px)).flatten()
+    widest = WIDEST_PX * depth / photo.camera.focal_px.prod().sqrt()
+    scales = parent.scales * (pixels.log_depth.exp() / side)[:, None]
     origins, directions = (rays.flatten(0, 1)[pixels.kept] for rays in world_rays(photo.camera))
     return replace(
         parent,
         means=origins + distance[pixels.kept, None] * directions,
-        scales=parent.scales * (pixels.log_depth.exp() / side)[:, None],
+        scales=torch.minimum(scales, widest[:, None]),
+        opacities=parent.opacities.clamp_min(OPAQUE),
         sh=dc_from_color(photo.rgb.flatten(0, 1)[pixels.kept])[:, None].to(parent.sh),
     )
 

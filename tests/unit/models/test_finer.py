@@ -10,7 +10,8 @@ from torch import Tensor
 from diff4splat.geometry.camera import pinhole, project
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.rays import pixel_centers, world_rays
-from diff4splat.models.finer import ONE_SURFACE, FinerScene, finer
+from diff4splat.models.behind import behind_picture
+from diff4splat.models.finer import ONE_SURFACE, OPAQUE, WIDEST_PX, FinerScene, finer
 from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture, smaller
 from diff4splat.models.reconstruction import Canonical
@@ -105,9 +106,11 @@ def test_where_cells_look_like_their_pixels_each_takes_after_its_own_cell() -> N
     photo = photograph(as_cells(torch.rand(*GRID, 3)))
     canonical = scene(photo)
     found, parents = refined(canonical, photo), canonical.gaussians.select(own_cells())
-    torch.testing.assert_close(found.gaussians.scales[:PIXELS], parents.scales / SIDE)
+    wanted = (parents.scales / SIDE).clamp_max(WIDEST_PX * 4.0 / 20.0)
+    assert bool((wanted < parents.scales / SIDE).any())
+    torch.testing.assert_close(found.gaussians.scales[:PIXELS], wanted)
     assert torch.equal(found.gaussians.quats[:PIXELS], parents.quats)
-    assert torch.equal(found.gaussians.opacities[:PIXELS], parents.opacities)
+    assert torch.equal(found.gaussians.opacities[:PIXELS], parents.opacities.clamp_min(OPAQUE))
 
 
 def test_pixels_are_numbered_and_all_others_get_the_number_after_the_last() -> None:
@@ -191,15 +194,18 @@ def test_what_is_farther_than_its_parent_is_larger_and_moves_as_much_more() -> N
     torch.testing.assert_close(found.motion.offsets, motion.offsets[:, parents] * farther[:, None])
     torch.testing.assert_close(found.motion.rotations, motion.rotations[:, parents])
     wanted = canonical.gaussians.scales[parents] * farther[:, None] / SIDE
+    wanted = torch.minimum(wanted, (WIDEST_PX * z / 20.0)[:, None])
     torch.testing.assert_close(found.gaussians.scales[:PIXELS], wanted)
 
 
-def test_what_lies_behind_the_cells_stays_and_never_moves() -> None:
+def test_what_lies_behind_the_cells_goes_behind_the_picture_and_never_moves() -> None:
     photo = photograph()
     canonical = scene(photo)
     found = refined(canonical, photo, moving(list(range(CELLS))))
+    around = canonical.gaussians.select(slice(CELLS, None))
+    around = behind_picture(around, torch.full(GRID, 4.0), photo.camera.resized(GRID))
     for field in fields(Gaussians):
-        before = getattr(canonical.gaussians, field.name)[CELLS:]
+        before = getattr(around, field.name)
         assert torch.equal(getattr(found.gaussians, field.name)[PIXELS:], before), field.name
     assert torch.equal(found.motion.moving_index, torch.arange(PIXELS))
 
