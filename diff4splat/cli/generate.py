@@ -48,8 +48,8 @@ class Generate:
     shift: float | None = None
     """Above 1 spends more steps on noisy levels; if left out, 16 for motion, and 1 for a video."""
     guidance: float | None = None
-    """How strongly to follow the prompt, 1 is not at all more than it says; if left out, 1 where a
-    branch tells motion, and 5 for a video."""
+    """How strongly to follow the prompt, 1 switches guidance off; if left out, 1 where a branch
+    tells motion, and 5 for a video."""
     min_opacity: float = 0.005
     """Fainter Gaussians are dropped."""
     skip_depth: bool = False

@@ -40,13 +40,17 @@ class GeneratedStage(BranchStage, ToldStage):
         return {**flow, **scene, TOTAL: flow[TOTAL] + scene[TOTAL]}
 
     def generated(self, batch: ClipBatch) -> Rendered:
-        """Pictures at the targets of the first picture, moved after a detour through noise."""
-        moved = self.regenerated(batch)
+        """Pictures at the targets; a first picture alone is moved after a detour through noise."""
+        alone = batch.video.shape[1] == 1
+        moved = self.regenerated(batch) if alone else batch
         return self.render(moved, self.encode(moved))
 
     @torch.no_grad()
     def regenerated(self, batch: ClipBatch) -> ClipBatch:
-        """The clips, with motion after a detour through noise, from any level."""
+        """The clips, with motion after a detour through noise, from any level.
+
+        What moves is what is likelier than generation asks for; colours do not share it here.
+        """
         start = torch.cat([torch.rand(1, generator=own) for own in self.draw(batch, "detour")])
         noisy = self._noisy(batch, start.to(batch.field), "detour noise")
         motion = noisy.motion

@@ -1,13 +1,10 @@
 """The video model: flow matching on the latents of true videos (Diff4Splat, flow matching).
 
-    video ─ vae (frozen) ─ clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
-                                    first latent frame: clean, level 0, no loss
-    captions ─ text encoder ─┐
-    cameras ─ Plücker maps ──┤
-    first picture ─ draft ───┴─ conditions
-
-Whole steps go without text, so that guidance has its unconditional branch and every process runs
-the same networks: single samples without text would leave some processes waiting for others.
+video ─ vae (frozen) ─ clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
+first latent frame: clean, level 0, no loss
+captions ─ text encoder ─┐
+cameras ─ Plücker maps ──┤
+first picture ─ draft ───┴─ conditions
 """
 
 from collections.abc import Mapping

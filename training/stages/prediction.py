@@ -62,7 +62,7 @@ def canonical_scenes(
                 reconstruct_detailed(own, sight.sample(index), model.activation, RunLog())
             )
             continue
-        base = plane_base(_picture(batch, index), batch.cameras[index], model.ldrm.grid_stride)
+        base = plane_base(first_picture(batch, index), batch.cameras[index], model.ldrm.grid_stride)
         scenes.append(reconstruct(own, base, model.activation))
     return scenes
 
@@ -151,7 +151,8 @@ def _stack(pairs: list[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
     return torch.stack(rgb), torch.stack(depth)
 
 
-def _picture(batch: ClipBatch, index: int) -> Picture:
+def first_picture(batch: ClipBatch, index: int) -> Picture:
+    """What one sample starts from."""
     return Picture(
         rgb=unit_rgb(batch.video[index, 0]), camera=batch.cameras[index][0], focal_source="clip"
     )

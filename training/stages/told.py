@@ -16,7 +16,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.detail.stabilise import key_depth
 from diff4splat.models.input_colors import InputGrid, matched_colors
 from diff4splat.models.maps import ReconstructionMaps
@@ -31,6 +30,7 @@ from diff4splat.training.stages.prediction import (
     Rendered,
     canonical_scenes,
     deformed,
+    first_picture,
     target_pictures,
     with_depth,
 )
@@ -68,12 +68,6 @@ class ToldStage(DynamicStage):
             moved.append([deformed(shown, state) for state in states])
         rgb, depths = target_pictures(moved, batch)
         return Rendered(rgb=rgb, depth=depths, offsets=None)
-
-
-def first_picture(batch: ClipBatch, index: int) -> Picture:
-    """What one sample starts from."""
-    rgb = unit_rgb(batch.video[index, 0])
-    return Picture(rgb=rgb, camera=batch.cameras[index][0], focal_source="clip")
 
 
 def _matched(scene: Canonical, picture: Picture) -> Gaussians:
