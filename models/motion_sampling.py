@@ -80,10 +80,10 @@ def sample_motion(
     # Which things move is not drawn: picture and words decide.
     moves = branch.answers(rgb, noise, noise.new_ones(1), wish.text)[1].sigmoid()
     field = torch.cat([torch.zeros_like(made[0, :, :1]), made[0]], 1)
-    return SampledMotion(field=field, moves=_along_colors(moves, rgb)[0], calls=calls)
+    return SampledMotion(field=field, moves=along_colors(moves, rgb)[0], calls=calls)
 
 
-def _along_colors(
+def along_colors(
     moves: Float[Tensor, "1 hh ww"], rgb: Float[Tensor, "1 3 hh ww"]
 ) -> Float[Tensor, "1 hh ww"]:
     """Likelihoods shared among near pixels of one colour: things move as wholes, up to their edges.

@@ -64,13 +64,13 @@ class ToldStage(DynamicStage):
             picture = first_picture(batch, index)
             told = moved_offsets(batch.field[index], batch.moving[index], depth[index])
             states = told_states(scene, told, batch.target_time[index].tolist())
-            shown = _matched(scene, picture)
+            shown = matched(scene, picture)
             moved.append([deformed(shown, state) for state in states])
         rgb, depths = target_pictures(moved, batch)
         return Rendered(rgb=rgb, depth=depths, offsets=None)
 
 
-def _matched(scene: Canonical, picture: Picture) -> Gaussians:
+def matched(scene: Canonical, picture: Picture) -> Gaussians:
     """The Gaussians at rest with the colours that generation would give them."""
     grid = InputGrid(picture=picture, stride=1, cells=scene.every_cell)
     own = scene.gaussians

@@ -12,7 +12,12 @@ from diff4splat.geometry.camera import pinhole
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.factory import create_networks
 from diff4splat.models.motion_branch.branch import MotionBranch
-from diff4splat.models.motion_sampling import MotionWish, SampledMotion, sample_motion
+from diff4splat.models.motion_sampling import (
+    MotionWish,
+    SampledMotion,
+    along_colors,
+    sample_motion,
+)
 from diff4splat.models.picture import Picture
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.pretrained import Model
@@ -157,3 +162,15 @@ def test_guidance_asks_the_branches_that_it_needs(
 def test_settings_that_cannot_be(changes: dict, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         MotionSettings(**changes)
+
+
+def test_likelihoods_are_shared_within_a_colour_and_not_across() -> None:
+    rgb = torch.zeros(1, 3, SIDE_PX, SIDE_PX)
+    rgb[..., 16:] = 1.0
+    moves = torch.zeros(1, SIDE_PX, SIDE_PX)
+    moves[:, :, 12:16] = 1.0
+    shared = along_colors(moves, rgb)
+    assert float(shared[0, 16, 10]) > 0.1
+    assert float(shared[0, :, 16:].max()) < 1e-3
+    flat = torch.full((1, SIDE_PX, SIDE_PX), 0.4)
+    torch.testing.assert_close(along_colors(flat, torch.rand(1, 3, SIDE_PX, SIDE_PX)), flat)

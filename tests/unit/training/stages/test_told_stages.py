@@ -9,9 +9,13 @@ from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 from diff4splat.errors import ConfigError
 from diff4splat.models.config import DetailConfig, ModelConfig
 from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.render.api import render
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import Recipe, StageRecipe
 from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.model_stage import network_rays
+from diff4splat.training.stages.prediction import canonical_scenes, first_picture
+from diff4splat.training.stages.told import matched
 
 DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4)
 BASE = tiny_size()
@@ -89,6 +93,22 @@ def test_told_scenes_move_with_the_motion_of_the_batch() -> None:
     with torch.no_grad():
         first = stage.render(stage.given(at_first), stage.encode(stage.given(at_first))).rgb
     torch.testing.assert_close(first, seen[1])
+
+
+def test_what_is_judged_has_the_colours_that_generation_would_match() -> None:
+    recipe = told(TOLD)
+    stage = make_stage(recipe, model=MODEL).eval()
+    batch = stage.given(moving_batch(recipe, (0,)))
+    latent = stage.encode(batch)
+    sight = stage.sight(batch, latent)
+    maps = stage.ldrm(latent, network_rays(batch), sight, moving=False)
+    picture = first_picture(batch, 0)
+    plain = canonical_scenes(maps, batch, MODEL, sight)[0]
+    errors = [
+        float((render(seen, picture.camera).rgb - picture.rgb).square().mean().detach())
+        for seen in (plain.gaussians, matched(plain, picture))
+    ]
+    assert errors[1] < 0.7 * errors[0]
 
 
 def test_some_steps_see_the_whole_video() -> None:
