@@ -67,7 +67,7 @@ def _generating(dynamic: StageRecipe) -> tuple[StageRecipe, ...]:
     """What comes after the reconstruction of true videos."""
     single, generator = _single(dynamic), _generator(dynamic)
     told = _told(single)
-    return single, told, generator, _branch(generator), _joint(told)
+    return single, _depth(single), told, generator, _branch(generator), _joint(told)
 
 
 def _autoencoder(data: DataSettings) -> StageRecipe:
@@ -144,14 +144,30 @@ def _single(dynamic: StageRecipe) -> StageRecipe:
     )
 
 
+def _depth(single: StageRecipe) -> StageRecipe:
+    """Depth of pictures without a video: seven of each clip, none of them rendered."""
+    return replace(
+        single,
+        name="depth",
+        kind="depth",
+        steps=6_000,
+        global_batch=8,
+        micro_batch=8,
+        optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
+        losses=LossWeights(depth_log=1.0, depth_edges=0.5, sky=0.2),
+        data=replace(single.data, target_frames=4, moving_targets=True),
+    )
+
+
 def _told(single: StageRecipe) -> StageRecipe:
-    """LDRM from one picture, judged along the path while things move: depth, and what they hide."""
+    """LDRM from one picture, judged along the path while things move: what they and edges hide."""
     return replace(
         single,
         name="told",
         kind="told",
         steps=2_500,
         losses=replace(single.losses, photometric=12.0),
+        optimizer=replace(single.optimizer, learning_rate=2e-4),
         data=replace(single.data, target_frames=4, moving_targets=True),
     )
 

@@ -220,10 +220,13 @@ class DetailConfig:
     surroundings: int = 16
     """Cells of a quarter resolution that continue the first picture beyond its borders, a multiple
     of 4: part of the layer is seen four times coarser; 0 leaves the layer out."""
+    picture_width: int = 0
+    """Channels at half the resolution of the decoder's network for the depth of a picture without a
+    video (ours, docs/adr/0023); 0 leaves it out."""
 
     def __post_init__(self) -> None:
         require_counts(self, "match_channels")
-        for name in ("width", "depths", "surroundings"):
+        for name in ("width", "depths", "surroundings", "picture_width"):
             value = getattr(self, name)
             whole = isinstance(value, int) and not isinstance(value, bool) and value >= 0
             require(whole, f"DetailConfig.{name}", "a whole number of at least 0", value)

@@ -42,15 +42,21 @@ class Canonical:
 
     gaussians: Gaussians
     cells: Int[Tensor, " m"]
-    """Where each lies in the grid; Gaussians behind the first m belong to no cell and stand."""
+    """Where each lies in the grid; Gaussians behind the first m lie in none."""
     maps: ReconstructionMaps
+    backing: Int[Tensor, " b"] | None = None
+    """The cell with which each of the next b goes, if that is told to go; all others stand."""
+
+    @property
+    def told_cells(self) -> Int[Tensor, " mb"]:
+        """Whose motion the first m + b Gaussians are told."""
+        return self.cells if self.backing is None else torch.cat([self.cells, self.backing])
 
     @property
     def every_cell(self) -> Int[Tensor, " n"]:
         """The cell of every Gaussian; those without one get the number after the last."""
-        grid = self.maps.gaussians[0, 0].numel()
-        without = self.cells.new_full((len(self.gaussians) - len(self.cells),), grid)
-        return torch.cat([self.cells, without])
+        grid, told = self.maps.gaussians[0, 0].numel(), self.told_cells
+        return torch.cat([told, told.new_full((len(self.gaussians) - len(told),), grid)])
 
 
 def reconstruct(maps: ReconstructionMaps, base: PixelBase, config: ActivationConfig) -> Canonical:
@@ -68,13 +74,13 @@ def reconstruct_detailed(
     if found.doubled:
         why, saved = "an earlier key frame shows the same points", f"{found.doubled:,} Gaussians"
         log.left_out("doubled pixels", why, saved)
-    return Canonical(gaussians=found.gaussians, cells=found.cells, maps=maps)
+    return Canonical(gaussians=found.gaussians, cells=found.cells, maps=maps, backing=found.backing)
 
 
 def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canonical:
     """Keep Gaussians of at least ``min_opacity`` (Diff4Splat: 0.005), and say what that dropped."""
     opacities = canonical.gaussians.opacities
-    kept = opacities >= min_opacity
+    kept, own = opacities >= min_opacity, len(canonical.cells)
     dropped = len(kept) - int(kept.sum())
     if dropped == len(kept):
         raise ConfigError(
@@ -89,10 +95,12 @@ def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canoni
             f"{dropped:,} of {len(kept):,} Gaussians",
             faintest if faintest >= RENDER_CUTOFF else 0.0,
         )
+    behind = canonical.backing
     return Canonical(
         gaussians=canonical.gaussians.select(kept),
-        cells=canonical.cells[kept[: len(canonical.cells)]],
+        cells=canonical.cells[kept[:own]],
         maps=canonical.maps,
+        backing=behind if behind is None else behind[kept[own : own + len(behind)]],
     )
 
 
@@ -106,8 +114,9 @@ def _moved_on(
     place = fraction * (len(told) - 1)
     before = min(int(place), len(told) - 2)
     now = torch.lerp(told[before], told[before + 1], place - before).flatten(0, 1)
-    own = canonical.cells < len(now)
-    more = now[canonical.cells[own]]
+    cells = canonical.told_cells[: len(state.offsets)]
+    own = cells < len(now)
+    more = now[cells[own]]
     return replace(state, offsets=state.offsets.index_add(0, own.nonzero()[:, 0], more))
 
 
@@ -117,7 +126,7 @@ def told_motion(
     """Key-framed motion of the kept Gaussians by nothing but ``told`` offsets."""
     fractions = torch.linspace(0, 1, len(key_times_s)).tolist()
     states = told_states(canonical, told, fractions)
-    every = torch.arange(len(canonical.cells), device=told.device)
+    every = torch.arange(len(canonical.told_cells), device=told.device)
     return keyframe_motion(states, key_times_s, every)
 
 
@@ -125,7 +134,7 @@ def told_states(
     canonical: Canonical, told: Float[Tensor, "t h w 3"], fractions: Sequence[float]
 ) -> list[DeformationState]:
     """How the kept Gaussians differ at fractions of the clip, by nothing but ``told`` offsets."""
-    count = len(canonical.cells)
+    count = len(canonical.told_cells)
     still = DeformationState(
         offsets=told.new_zeros(count, 3),
         rotations=told.new_tensor([1.0, 0.0, 0.0, 0.0]).repeat(count, 1),

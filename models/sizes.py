@@ -60,7 +60,7 @@ def small_size() -> ModelConfig:
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
         deformation=DeformationConfig(width=64, blocks=3, octaves=3, noise_px=4.0),
         activation=ActivationConfig(),
-        detail=DetailConfig(width=48),
+        detail=DetailConfig(width=48, picture_width=32),
     )
 
 

@@ -18,6 +18,7 @@ StageKind = Literal[
     "static",
     "motion",
     "dynamic",
+    "depth",
     "told",
     "generator",
     "branch",
@@ -27,7 +28,7 @@ StageKind = Literal[
 Precision = Literal["float32", "bfloat16"]
 Parallel = Literal["none", "ddp", "fsdp2"]
 Direction = Literal["at_least", "at_most"]
-RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "told", "joint", "generated")
+RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "depth", "told", "joint", "generated")
 READING = ("generator", "branch", "joint", "generated")
 """Kinds that read captions, which speak of left and right."""
 
@@ -61,6 +62,11 @@ class LossWeights:
     """λ_geo, 1 − Pearson on rendered depth (paper)."""
     depth_log: float = 0.0
     """|log depth − log truth| of the Gaussians themselves at their own pixels (after MoVieS)."""
+    depth_edges: float = 0.0
+    """|∇ (log depth − log truth)| of a picture's depth at several scales (after MiDaS)."""
+    sky: float = 0.0
+    """How much nearer than the sky a picture's depth is where it has no truth (ours): for data in
+    which nothing else has none."""
     smoothness: float = 0.1
     """Total variation of rendered depth; part of L_geo, its weight is not in the paper (ours)."""
     motion: float = 2.0
@@ -290,6 +296,8 @@ class Recipe:
         fits = not framed or stride == TIME_STRIDE
         branches = stage.kind not in ("branch", "generated") or self.model.dit.motion_width > 0
         _require(branches, f"{what}: model.dit.motion_width", "a motion branch for its kind", 0)
+        tells = stage.kind != "depth" or (detail and self.model.detail.picture_width > 0)
+        _require(tells, f"{what}: model.detail.picture_width", "a network for its kind", 0)
         key_frames = f"{TIME_STRIDE} with a detail decoder"
         _require(fits, f"{what}: data.track_stride", key_frames, stride)
 

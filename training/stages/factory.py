@@ -7,6 +7,7 @@ from diff4splat.models.factory import Networks
 from diff4splat.training.recipe import StageKind
 from diff4splat.training.stages.autoencoder import AutoencoderStage
 from diff4splat.training.stages.branch import BranchStage
+from diff4splat.training.stages.depth import DepthStage
 from diff4splat.training.stages.generated import GeneratedStage
 from diff4splat.training.stages.generator import GeneratorStage
 from diff4splat.training.stages.joint import JointStage
@@ -25,6 +26,7 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "sight": SightStage,
         "static": StaticStage,
         "motion": MotionStage,
+        "depth": DepthStage,
         "told": ToldStage,
         "branch": BranchStage,
         "dynamic": DynamicStage,

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.detail.stabilise import key_depth
+from diff4splat.models.factory import Networks
 from diff4splat.models.input_colors import InputGrid, matched_colors
 from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
@@ -25,7 +26,7 @@ from diff4splat.models.settings import GenerationSettings
 from diff4splat.models.video_motion import moved_offsets
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.stages.model_stage import network_rays
+from diff4splat.training.stages.model_stage import StagePlan, network_rays
 from diff4splat.training.stages.prediction import (
     Rendered,
     canonical_scenes,
@@ -38,7 +39,15 @@ from diff4splat.training.stages.reconstruction import DynamicStage
 
 
 class ToldStage(DynamicStage):
-    """LDRM from first pictures, judged at any time; where things go is known."""
+    """LDRM from first pictures, judged at any time; where things go is known.
+
+    Their depth stays as stage ``depth`` has taught it, from far more pictures.
+    """
+
+    def __init__(self, networks: Networks, plan: StagePlan) -> None:
+        super().__init__(networks, plan)
+        if self.ldrm.detail is not None and self.ldrm.detail.picture_depth is not None:
+            self.ldrm.detail.picture_depth.requires_grad_(False)
 
     def given(self, batch: ClipBatch) -> ClipBatch:
         """The first picture alone, and in some steps of training the whole video."""

@@ -33,6 +33,7 @@ OTHER_VALUES = {
     "surroundings": 8,
     "linear_code": True,
     "noise_px": 1.5,
+    "picture_width": 8,
     "range": [2.0, 9.0],
     "predicts": "clean",
     "draft": True,
@@ -77,6 +78,18 @@ def test_a_branch_for_motion_needs_a_motion_and_room_for_its_heads() -> None:
     ):
         with pytest.raises(ConfigError, match=words):
             dataclasses.replace(dit, **change)
+
+
+@pytest.mark.parametrize("width", [-1, True])
+def test_a_network_for_the_depth_of_pictures_has_a_whole_width(width: int) -> None:
+    with pytest.raises(ConfigError, match="picture_width: expected a whole number of at least 0"):
+        DetailConfig(width=6, picture_width=width)
+
+
+def test_models_stored_before_a_picture_told_its_depth_have_none() -> None:
+    data = json.loads(test_size().to_json())
+    del data["detail"]["picture_width"]
+    assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
 
 def test_models_stored_before_there_were_details_have_none() -> None:

@@ -25,9 +25,9 @@ def test_every_recipe_survives_its_json(name: str) -> None:
 def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     names = [stage.name for stage in recipe_by_name(name).stages]
     # Small has one size, so one static stage; its detail decoder learns to see before it, its
-    # deformation network what moves behind it, and then what a single picture shows. The branch
-    # that tells motion reads what the generator's text encoder has learnt.
-    small = ["sight", "static-low", "motion", "dynamic", "single", "told"]
+    # deformation network what moves behind it, and then what a single picture shows and hides.
+    # The branch that tells motion reads what the generator's text encoder has learnt.
+    small = ["sight", "static-low", "motion", "dynamic", "single", "depth", "told"]
     middle = small if name == "small" else ["static-low", "static-high", "dynamic"]
     last = ["branch", "joint"] if name == "small" else ["joint"]
     assert names == ["vae", *middle, "generator", *last]

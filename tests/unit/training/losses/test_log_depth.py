@@ -1,0 +1,76 @@
+"""Losses of the depth of single pictures."""
+
+import math
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from torch import Tensor
+
+from diff4splat.training.losses.log_depth import LEAST_PIXELS, SCALES, edge_error, own_scale
+
+
+def edge_oracle(difference: Tensor, known: Tensor) -> float:
+    """The formula, pixel by pixel."""
+    height, width = difference.shape
+    total = 0.0
+    for stride in (1 << scale for scale in range(SCALES)):
+        for down, right in ((0, stride), (stride, 0)):
+            steps = [
+                abs(float(difference[y + down, x + right] - difference[y, x]))
+                for y in range(height - down)
+                for x in range(width - right)
+                if known[y, x] and known[y + down, x + right]
+            ]
+            total += math.fsum(steps) / len(steps) if steps else 0.0
+    return total
+
+
+@given(st.integers(0, 20), st.integers(1, 12), st.integers(1, 12))
+def test_edges_agree_with_the_formula(seed: int, height: int, width: int) -> None:
+    generator = torch.Generator().manual_seed(seed)
+    difference = torch.randn(2, height, width, generator=generator, dtype=torch.float64)
+    known = torch.rand(2, height, width, generator=generator) < 0.7
+    wanted = [edge_oracle(*pair) for pair in zip(difference, known, strict=True)]
+    found = edge_error(difference, known)
+    torch.testing.assert_close(found, found.new_tensor(wanted), atol=1e-10, rtol=1e-10)
+
+
+def test_edges_do_not_ask_for_a_scale() -> None:
+    difference = torch.randn(1, 8, 8, dtype=torch.float64)
+    known = torch.ones(1, 8, 8, dtype=torch.bool)
+    torch.testing.assert_close(edge_error(difference + 3, known), edge_error(difference, known))
+    assert float(edge_error(torch.full_like(difference, 5.0), known)) == 0
+
+
+def test_gradients_are_right_and_nothing_comes_from_hidden_pixels() -> None:
+    generator = torch.Generator().manual_seed(1)
+    difference = torch.randn(1, 6, 5, generator=generator, dtype=torch.float64)
+    known = torch.rand(1, 6, 5, generator=generator) < 0.6
+    difference[~known] = torch.nan
+    difference.requires_grad_()
+    edge_error(difference, known).sum().backward()
+    assert bool((difference.grad[~known] == 0).all()) and bool(difference.grad.isfinite().all())
+    whole = torch.ones_like(known)
+    smooth = torch.randn(1, 6, 5, generator=generator, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda d: edge_error(d, whole), smooth)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_every_picture_has_its_median_where_asked(unit: float) -> None:
+    depth = unit * (1 + torch.rand(3, 8, 8, dtype=torch.float64))
+    depth[1, :3] = 0
+    scaled, known = own_scale(depth, 4.0)
+    for picture, mask in zip(scaled, known, strict=True):
+        assert float(picture[mask].median()) == pytest.approx(4.0)
+    assert not known[1, :3].any() and bool((scaled[1, :3] == 1).all())
+
+
+def test_a_picture_with_next_to_no_depth_says_nothing() -> None:
+    depth = torch.zeros(2, 8, 8)
+    depth[0].view(-1)[: LEAST_PIXELS - 1] = 2.0
+    depth[1, 0, 0] = torch.inf
+    scaled, known = own_scale(depth, 4.0)
+    assert not known.any() and bool((scaled == 1).all())
+    assert bool((edge_error(scaled.log(), known) == 0).all())

@@ -1,0 +1,124 @@
+"""The stage in which single pictures tell their depth."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
+
+from diff4splat.errors import ConfigError
+from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.config import DetailConfig, ModelConfig
+from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.recipe import Recipe, StageRecipe
+from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.depth import SKY_DEPTH, depth_pictures
+
+DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4, picture_width=4)
+MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
+
+
+def depth_recipe(**losses: float) -> StageRecipe:
+    weights = {"depth_log": 1.0, "depth_edges": 0.5, "sky": 0.2} | losses
+    like = stage_recipe("dynamic", **weights)
+    data = replace(like.data, track_stride=4)
+    return replace(like, name="depth", kind="depth", data=data, trained=("ldrm",))
+
+
+def with_sky(batch: ClipBatch) -> ClipBatch:
+    depth, target = batch.depth.clone(), batch.target_depth.clone()
+    depth[..., :8, :], target[..., :8, :] = 0, 0
+    return replace(batch, depth=depth, target_depth=target)
+
+
+def test_every_key_frame_and_target_is_a_picture() -> None:
+    recipe = depth_recipe()
+    batch = with_sky(make_batch(recipe, (0, 1)))
+    shown = depth_pictures(batch)
+    each = batch.depth.shape[1] + batch.target_rgb[0, :, :, 0, 0, 0].numel()
+    assert len(shown.rgb) == len(shown.depth) == 2 * each
+    assert not shown.known[:, :8].any() and bool((shown.depth[:, :8] == 1).all())
+    for depth, known in zip(shown.depth, shown.known, strict=True):
+        assert float(depth[known].median()) == pytest.approx(PLANE_DEPTH, rel=1e-5)
+    first = batch.video[1, 0].movedim(-1, 0) / 255
+    torch.testing.assert_close(shown.rgb[each], first.float())
+
+
+def test_terms_are_finite_and_only_the_pictures_depth_learns() -> None:
+    recipe = depth_recipe()
+    stage = make_stage(recipe, model=MODEL)
+    shake_heads(stage)
+    terms = stage(with_sky(make_batch(recipe, (0, 1))))
+    assert set(terms) == {"depth_log", "depth_edges", "sky", TOTAL}
+    assert all(term.shape == (2,) and bool(term.isfinite().all()) for term in terms.values())
+    terms[TOTAL].sum().backward()
+    learnt = {name for name, p in stage.named_parameters() if p.grad is not None}
+    assert learnt and all(name.startswith("ldrm.detail.picture_depth.") for name in learnt)
+
+
+def test_the_total_is_the_weighted_sum() -> None:
+    recipe = depth_recipe(depth_log=2.0, depth_edges=3.0, sky=5.0)
+    terms = make_stage(recipe, model=MODEL)(with_sky(make_batch(recipe, (0,))))
+    wanted = 2 * terms["depth_log"] + 3 * terms["depth_edges"] + 5 * terms["sky"]
+    torch.testing.assert_close(terms[TOTAL], wanted)
+
+
+def test_sky_that_is_far_enough_costs_nothing() -> None:
+    recipe = depth_recipe()
+    stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0,)))
+    near = float(stage(batch)["sky"].detach())
+    assert near == pytest.approx(float(torch.tensor(SKY_DEPTH / PLANE_DEPTH).log()), rel=1e-4)
+    with torch.no_grad():
+        stage.ldrm.detail.picture_depth.head.bias += 10
+    assert float(stage(batch)["sky"].detach()) == 0
+
+
+def test_without_any_depth_there_is_nothing_to_learn_but_sky() -> None:
+    recipe = depth_recipe()
+    batch = make_batch(recipe, (0,))
+    empty = replace(
+        batch,
+        depth=torch.zeros_like(batch.depth),
+        target_depth=torch.zeros_like(batch.target_depth),
+    )
+    stage = make_stage(recipe, model=MODEL)
+    terms = {name: float(term.detach()) for name, term in stage(empty).items()}
+    assert terms["depth_log"] == terms["depth_edges"] == 0 < terms["sky"]
+    measures = stage.eval().measure(empty)
+    assert bool(measures["depth_error"].isnan()) and bool(measures["depth_correlation"].isnan())
+
+
+def test_light_is_drawn_anew_for_every_picture_and_alike_every_time() -> None:
+    recipe = depth_recipe()
+    stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe, (0, 1))
+    rgb = depth_pictures(batch).rgb
+    lit = stage._in_other_light(rgb, batch)
+    assert torch.equal(lit, stage._in_other_light(rgb, batch))
+    assert float(lit.min()) >= 0 and float(lit.max()) <= 1
+    change = (lit / rgb.clamp_min(1e-3)).flatten(1).median(1).values
+    assert len(set(change.tolist())) == len(change)
+
+
+def test_a_step_learns_and_a_panel_shows_it() -> None:
+    recipe = depth_recipe()
+    stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0, 1)))
+    optimizer = torch.optim.Adam(stage.ldrm.detail.picture_depth.parameters(), 1e-2)
+    losses = []
+    for _ in range(12):
+        optimizer.zero_grad()
+        loss = stage(batch)[TOTAL].mean()
+        loss.backward()
+        optimizer.step()
+        losses.append(float(loss.detach()))
+    assert losses[-1] < 0.9 * losses[0]
+    shown = stage.eval().panel(batch)
+    assert bool(shown.isfinite().all()) and shown.shape[-1] == 3
+    assert set(stage.measure(batch)) == {"depth_error", "depth_correlation"}
+
+
+@pytest.mark.parametrize("missing", ["width", "picture_width"])
+def test_a_recipe_without_the_network_is_refused(missing: str) -> None:
+    without = replace(MODEL, detail=replace(DETAIL, **{missing: 0}))
+    with pytest.raises(ConfigError, match="picture_width: expected a network for its kind"):
+        Recipe(name="test", seed=0, model=without, stages=(depth_recipe(),))
