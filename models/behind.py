@@ -17,7 +17,7 @@ from diff4splat.scene.gaussians import Gaussians
 
 BEHIND = 1.1
 """Depth over that of the farthest cell of the picture around it."""
-AROUND = 7
+AROUND = 11
 """Cells on a side; one of the layer covers four, and its footprint more."""
 
 

@@ -5,7 +5,8 @@ photograph (25 to 33 dB). Blending is linear in colour, and a Gaussian that stil
 pixel of the input view is what that pixel shows most of, so Richardson iteration on the render
 itself undoes the blur:
 
-    colour_i += photograph_i − render_i          (3 steps: 30 to 44 dB on the same photographs)
+    colour_i += photograph_i − render_i          (3 steps: 30 to 44 dB on the same photographs,
+                                                  more where pixels are smaller: docs/adr/0023)
 
 Colours stay in [0, 1]: what sharpens the input view must not ring in other views.
 """

@@ -7,6 +7,8 @@ are edges of colour, and every picture with a true depth can teach it: no scene 
     picture, place ─ cells of 2 ─ 1/2 ── 1/4 ── 1/8 ── 1/16 ── 1/8 ── 1/4 ── 1/2 ─ raw distance
 """
 
+from itertools import pairwise
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -28,7 +30,7 @@ class PictureDepth(nn.Module):
     def __init__(self, width: int) -> None:
         super().__init__()
         channels = [width * share for share in GROWTH]
-        steps = list(zip(channels, channels[1:], strict=False))
+        steps = list(pairwise(channels))
         self.enter = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
         self.down = nn.ModuleList([ConvBlock(count) for count in channels])
         self.shrink = nn.ModuleList(
