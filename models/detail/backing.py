@@ -23,7 +23,7 @@ from diff4splat.scene.gaussians import Gaussians
 
 AROUND = 7
 """Pixels on a side of what is near."""
-BEHIND = 1.1
+BEHIND = 1.03
 """Depth over that of the farthest pixel near it."""
 ONE_SURFACE = 0.15
 """Difference of log depth up to which pixels belong to what lies behind."""

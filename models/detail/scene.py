@@ -27,7 +27,7 @@ from diff4splat.models.heads import PixelBase, activate
 from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.scene.gaussians import Gaussians, concatenate
 
-PIXEL_FOOTPRINT_PX = 0.15
+PIXEL_FOOTPRINT_PX = 0.2
 """Standard deviation of a Gaussian of one picture; its backing fills the gaps."""
 
 
