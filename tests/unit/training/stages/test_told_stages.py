@@ -61,6 +61,21 @@ def test_terms_and_gradients_are_finite_and_reach_what_learns(kind: str) -> None
         assert all(bool(gradient.isfinite().all()) for gradient in gradients)
 
 
+def test_the_depth_of_pictures_is_used_and_left_as_it_is() -> None:
+    recipe = told(TOLD)
+    model = replace(MODEL, detail=replace(DETAIL, picture_width=4))
+    stage = make_stage(recipe, model=model)
+    shake_heads(stage)
+    batch = moving_batch(recipe)
+    before = stage(batch)[TOTAL].detach()
+    stage(batch)[TOTAL].sum().backward()
+    learnt = {name for name, p in stage.ldrm.named_parameters() if p.grad is not None}
+    assert learnt and not any("picture_depth" in name for name in learnt)
+    with torch.no_grad():
+        stage.ldrm.detail.picture_depth.head.bias += 1
+    assert not torch.equal(stage(batch)[TOTAL].detach(), before)
+
+
 def test_the_branch_learns_and_nothing_else_of_the_video_model() -> None:
     recipe = told(BRANCH)
     stage = make_stage(recipe, model=MODEL)
