@@ -1,7 +1,8 @@
 """How different the futures are that different seeds give one picture.
 
 Run ``python benchmarks/futures.py --model small --out futures.md``. Per held-out picture of
-``text_v1`` a few seeds, with the clip's own caption and without any text:
+``text_v1`` a few seeds, with the clip's own caption and without any text, by the mean of what the
+words allow (one step of the motion branch, the default) and by draws from it (eight):
 
     way        mean distance that the named object's surface goes until the last frame, in units of
                which the median depth of the picture is 4
@@ -14,6 +15,7 @@ Axes: ``h w`` pixels.
 import argparse
 import itertools
 import statistics
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -21,6 +23,7 @@ import torch
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.image import psnr
 from diff4splat.models.pipeline import Diff4SplatPipeline
+from diff4splat.models.settings import GenerationSettings
 from diff4splat.render.api import render
 from diff4splat.scene.scene import Scene
 from diff4splat.training.evaluation.answers import scene_flow
@@ -53,30 +56,40 @@ def judged(found: TextCase, scenes: list[Scene]) -> tuple[float, float, float]:
     return way, statistics.stdev(rightward), alike
 
 
+def subject_of(pipeline: Diff4SplatPipeline, steps: int) -> Generator:
+    """The pipeline with so many steps of its motion branch."""
+    motion = replace(GenerationSettings().motion, steps=steps)
+    return Generator(pipeline=pipeline, settings=GenerationSettings(motion=motion))
+
+
 @torch.no_grad()
 def main() -> None:
-    """A row with captions and one without."""
+    """For every number of steps a row with captions and one without."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="small")
     parser.add_argument("--items", type=int, default=16)
     parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--steps", type=int, nargs="+", default=[1, 8])
     parser.add_argument("--out", type=Path, required=True, help="markdown file")
     options = parser.parse_args()
-    subject = Generator(pipeline=Diff4SplatPipeline.from_pretrained(options.model))
+    pipeline = Diff4SplatPipeline.from_pretrained(options.model)
+    subjects = {steps: subject_of(pipeline, steps) for steps in options.steps}
     loaded = load_protocol(PROTOCOL)
     clips, protocol = open_clips(loaded), loaded.protocol
-    rows: dict[str, list[tuple[float, float, float]]] = {"own caption": [], "no text": []}
+    rows: dict[tuple[str, int], list[tuple[float, float, float]]] = {}
     for item in range(options.items):
         case = make_case(clips.clip(protocol.source.first + item), protocol, "text")
         found = text_case(case)
         if found is None:
             continue
-        for row, prompt in (("own caption", case.clip.note.caption), ("no text", None)):
-            rows[row].append(judged(found, futures(subject, found, prompt, options.seeds)))
-    lines = ["| | way | spread | pictures [dB] |", "|---|---:|---:|---:|"]
-    for row, values in rows.items():
+        prompts = (("own caption", case.clip.note.caption), ("no text", None))
+        for (row, prompt), (steps, subject) in itertools.product(prompts, subjects.items()):
+            scenes = futures(subject, found, prompt, options.seeds)
+            rows.setdefault((row, steps), []).append(judged(found, scenes))
+    lines = ["| | steps | way | spread | pictures [dB] |", "|---|---:|---:|---:|---:|"]
+    for (row, steps), values in rows.items():
         way, spread, alike = map(statistics.fmean, zip(*values, strict=True))
-        lines.append(f"| {row} | {way:.3f} | {spread:.3f} | {alike:.1f} |")
+        lines.append(f"| {row} | {steps} | {way:.3f} | {spread:.3f} | {alike:.1f} |")
     print("\n".join(lines))
     write_text(options.out, "\n".join(lines) + "\n")
 
