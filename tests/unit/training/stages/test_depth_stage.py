@@ -92,12 +92,12 @@ def test_without_any_depth_there_is_nothing_to_learn_but_sky() -> None:
 def test_light_is_drawn_anew_for_every_picture_and_alike_every_time() -> None:
     recipe = depth_recipe()
     stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe, (0, 1))
-    rgb = depth_pictures(batch).rgb
+    count = len(depth_pictures(batch).rgb)
+    rgb = torch.rand(1, 3, 8, 8).expand(count, -1, -1, -1)
     lit = stage._in_other_light(rgb, batch)
     assert torch.equal(lit, stage._in_other_light(rgb, batch))
     assert float(lit.min()) >= 0 and float(lit.max()) <= 1
-    change = (lit / rgb.clamp_min(1e-3)).flatten(1).median(1).values
-    assert len(set(change.tolist())) == len(change)
+    assert len(lit.flatten(1).unique(dim=0)) == count
 
 
 def test_a_step_learns_and_a_panel_shows_it() -> None:
