@@ -1,10 +1,12 @@
 """The video model: flow matching on the latents of true videos (Diff4Splat, flow matching).
 
-video ─ vae (frozen) ─ clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
-first latent frame: clean, level 0, no loss
-captions ─ text encoder ─┐
-cameras ─ Plücker maps ──┤
-first picture ─ draft ───┴─ conditions
+    video ─ vae (frozen) ─ clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
+                                    first latent frame: clean, level 0, no loss
+    captions ─ text encoder ─┐
+    cameras ─ Plücker maps ──┤
+    first picture ─ draft ───┴─ conditions
+
+How captions are varied and dropped stands in ``captioned``.
 """
 
 from collections.abc import Mapping

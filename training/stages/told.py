@@ -3,11 +3,11 @@
     picture ─ vae (frozen) ─ latent ─ ldrm ─ Gaussians ─ match colours ─ move ─ render ─ losses
     truth ──────────────────────────── motion per cell ───────────────────┘
 
-Depth, what lies behind things that move away and what the camera uncovers are learnt from the
-pictures in which they are seen. Some steps are given whole videos instead, moved by the deformation
-network: without them LDRM forgets how to read one within a few hundred steps. Colours are matched
-to the picture as generation does, so that sizes and opacities suit the colours that are shown in
-the end; no gradient passes the matching.
+What lies behind things that move away and what the camera uncovers are learnt from the pictures in
+which they are seen; so is depth, where no network of its own tells it. Some steps are given whole
+videos instead, moved by the deformation network: without them LDRM forgets how to read one within a
+few hundred steps. Colours are matched to the picture as generation does, so that everything else
+suits the colours that are shown in the end; no gradient passes the matching.
 """
 
 from dataclasses import replace
