@@ -154,7 +154,7 @@ def _depth(single: StageRecipe) -> StageRecipe:
         global_batch=8,
         micro_batch=8,
         optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
-        losses=LossWeights(depth_log=1.0, depth_edges=0.5, sky=0.2),
+        losses=LossWeights(depth_log=1.0, depth_edges=0.5, depth_shift=1.0, sky=0.2),
         data=replace(single.data, target_frames=4, moving_targets=True),
     )
 

@@ -30,9 +30,9 @@ ONE_SURFACE = 0.1
 """Difference of log depth up to which neighbours are one surface."""
 
 
-OPAQUE, WIDEST_PX = 0.95, 0.6
-"""What the photograph shows is not seen through, and a pixel of it hides no other: cells may be
-fainter and wider, where networks are unsure of an edge."""
+OPAQUE, NARROWEST_PX, WIDEST_PX = 0.95, 0.35, 0.6
+"""What the photograph shows is not seen through, and a pixel of it hides no other and lets none
+shine through: cells may be fainter, and narrower or wider."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,14 +71,14 @@ def finer(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) 
     grown = torch.cat([pixels.log_depth.exp(), torch.ones_like(behind, dtype=torch.float32)])
     return FinerScene(
         gaussians=concatenate([fine, rest]),
-        motion=_inherited(motion, torch.cat([pixels.parent, behind]), grown),
+        motion=inherited(motion, torch.cat([pixels.parent, behind]), grown),
         cells=torch.cat([pixels.kept, outside]),
     )
 
 
 def _rest(canonical: Canonical, first: int, small: Picture) -> Gaussians:
-    """Later frames as they are, and the surroundings behind the picture."""
-    own = len(canonical.cells)
+    """Later frames and what backs them as they are, and the surroundings behind the picture."""
+    own = len(canonical.told_cells)
     cells, size_px = canonical.cells[:first], small.camera.size_px
     depth = project(small.camera, canonical.gaussians.means[:first])[1]
     surface = depth.new_zeros(math.prod(size_px)).index_copy(0, cells, depth).view(size_px)
@@ -116,19 +116,19 @@ def _fine_gaussians(
     depth = project(small.camera, parent.means)[1] * pixels.log_depth.exp()
     whole = depth.new_ones(photo.rgb[..., 0].numel()).index_copy(0, pixels.kept, depth)
     distance = distance_from_depth(photo.camera, whole.view(photo.camera.size_px)).flatten()
-    widest = WIDEST_PX * depth / photo.camera.focal_px.prod().sqrt()
+    pixel = (depth / photo.camera.focal_px.prod().sqrt())[:, None]
     scales = parent.scales * (pixels.log_depth.exp() / side)[:, None]
     origins, directions = (rays.flatten(0, 1)[pixels.kept] for rays in world_rays(photo.camera))
     return replace(
         parent,
         means=origins + distance[pixels.kept, None] * directions,
-        scales=torch.minimum(scales, widest[:, None]),
+        scales=scales.clamp(NARROWEST_PX * pixel, WIDEST_PX * pixel),
         opacities=parent.opacities.clamp_min(OPAQUE),
         sh=dc_from_color(photo.rgb.flatten(0, 1)[pixels.kept])[:, None].to(parent.sh),
     )
 
 
-def _inherited(motion: Motion, parent: Int[Tensor, " q"], grown: Float[Tensor, " q"]) -> Motion:
+def inherited(motion: Motion, parent: Int[Tensor, " q"], grown: Float[Tensor, " q"]) -> Motion:
     """Every Gaussian moves as its parent did; farther ones by as much more."""
     if not isinstance(motion, KeyframeMotion):
         return StaticMotion(time_range_s=motion.time_range_s)

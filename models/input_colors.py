@@ -21,7 +21,8 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera, project
 from diff4splat.geometry.rays import pixel_centers
 from diff4splat.models.picture import Picture
-from diff4splat.render.api import render
+from diff4splat.render.api import DEFAULTS, render
+from diff4splat.render.settings import RenderSettings
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import color_from_dc, dc_from_color
@@ -51,21 +52,26 @@ class InputGrid:
 def match_input_view(scene: Scene, grid: InputGrid, steps: int, log: RunLog) -> Scene:
     """Correct the colours of the Gaussians that lie on their own cell of the input view."""
     first = scene.state_at(scene.motion.time_range_s[0])
+    settings = RenderSettings(dilation_px2=scene.dilation_px2)
     if steps == 0 or not _on_their_cell(first.means, grid).any():
         return scene
     with log.phases.phase("match colours", steps) as advance:
-        sh = matched_colors(first, grid, steps, advance)
+        sh = matched_colors(first, grid, steps, advance, settings)
     return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
 
 
 @torch.no_grad()
 def matched_colors(
-    gaussians: Gaussians, grid: InputGrid, steps: int, advance: Callable[[], None] = lambda: None
+    gaussians: Gaussians,
+    grid: InputGrid,
+    steps: int,
+    advance: Callable[[], None] = lambda: None,
+    settings: RenderSettings = DEFAULTS,
 ) -> Float[Tensor, "n c 3"]:
     """Harmonics with which ``gaussians``, as they are at the first moment, show the picture."""
     own = _on_their_cell(gaussians.means, grid).nonzero()[:, 0]
     for _ in range(steps):
-        seen = render(gaussians, grid.picture.camera).rgb
+        seen = render(gaussians, grid.picture.camera, settings=settings).rgb
         residual = _per_cell(grid.picture.rgb.to(seen) - seen, grid.stride)
         gaussians = _add_color(gaussians, own, residual[grid.cells[own]])
         advance()

@@ -27,6 +27,7 @@ from diff4splat import __version__
 from diff4splat.geometry.rays import plucker_map, relative_to_first
 from diff4splat.models.base_only import base_canonical, base_motion, leave_out_video
 from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.between import with_between
 from diff4splat.models.context import agree_on_lens, as_path, context_path
 from diff4splat.models.deformation_heads import DeformationUnits
 from diff4splat.models.draft import draft_latent
@@ -46,7 +47,7 @@ from diff4splat.models.video_motion import told_offsets
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
-from diff4splat.scene.scene import Provenance, Scene
+from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,14 +143,14 @@ class Diff4SplatPipeline:
         context = replace(context, cameras=context.cameras.resized(small.camera.size_px))
         build = self._from_video if self.model.runs_video_model else self._from_picture
         canonical, motion = build(replace(request, picture=small), context, log)
-        fine = FinerScene(gaussians=canonical.gaussians, motion=motion, cells=canonical.every_cell)
-        if small is not photo:
-            fine = finer(canonical, motion, small, photo)
+        fine = _fine(canonical, motion, small, photo)
         scene = Scene(
             gaussians=fine.gaussians,
             motion=fine.motion,
             path=request.path,
             provenance=self._provenance(request),
+            # Pixels as they are have all the blur they need.
+            dilation_px2=0.0 if canonical.is_picture else DILATION_PX2,
         )
         request = replace(request, picture=photo)
         scene = self._match_colors(scene, fine.cells, request, log)
@@ -259,3 +260,12 @@ class Diff4SplatPipeline:
             prompt=request.prompt,
             untrained=self.model.untrained,
         )
+
+
+def _fine(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) -> FinerScene:
+    """What networks made of ``small``, as fine as ``photo`` is and needs."""
+    if small is not photo:
+        return finer(canonical, motion, small, photo)
+    if canonical.is_picture:
+        return with_between(canonical, motion, photo)
+    return FinerScene(gaussians=canonical.gaussians, motion=motion, cells=canonical.every_cell)

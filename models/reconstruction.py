@@ -48,6 +48,11 @@ class Canonical:
     """The cell with which each of the next b goes, if that is told to go; all others stand."""
 
     @property
+    def is_picture(self) -> bool:
+        """One picture as it is; only that has a backing."""
+        return self.backing is not None and len(self.backing) > 0
+
+    @property
     def told_cells(self) -> Int[Tensor, " mb"]:
         """Whose motion the first m + b Gaussians are told."""
         return self.cells if self.backing is None else torch.cat([self.cells, self.backing])

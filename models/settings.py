@@ -60,7 +60,7 @@ class GenerationSettings:
     min_opacity: float = MIN_OPACITY
     still_px: float = 0.05
     """Gaussians that never move by more than this many pixels of the input view stand still."""
-    color_steps: int = 6
+    color_steps: int = 12
     """Corrections of the input pixels' colours against the rendered input view; 0 switches off."""
 
     def __post_init__(self) -> None:

@@ -64,6 +64,9 @@ class LossWeights:
     """|log depth − log truth| of the Gaussians themselves at their own pixels (after MoVieS)."""
     depth_edges: float = 0.0
     """|∇ (log depth − log truth)| of a picture's depth at several scales (after MiDaS)."""
+    depth_shift: float = 0.0
+    """|1 / depth − 1 / truth| of a picture, in units of one over the plane's depth (ours): how far
+    a pixel lands from its place when the camera steps aside."""
     sky: float = 0.0
     """How much nearer than the sky a picture's depth is where it has no truth (ours): for data in
     which nothing else has none."""

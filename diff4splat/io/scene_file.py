@@ -31,7 +31,12 @@ def save_scene(scene: Scene, file: Path | str) -> None:
     """
     motion = pack_motion(scene.motion)
     size_px = (int(scene.path.cameras.size_px[0]), int(scene.path.cameras.size_px[1]))
-    metadata = SceneMetadata(motion=motion.settings, size_px=size_px, provenance=scene.provenance)
+    metadata = SceneMetadata(
+        motion=motion.settings,
+        size_px=size_px,
+        provenance=scene.provenance,
+        dilation_px2=scene.dilation_px2,
+    )
     tensors = {**_gaussian_tensors(scene.gaussians), **_path_tensors(scene.path), **motion.tensors}
     try:
         _assemble(tensors, metadata)  # what cannot be read back is not written
@@ -76,6 +81,7 @@ def _assemble(tensors: Mapping[str, Tensor], metadata: SceneMetadata) -> Scene:
         motion=unpack_motion(motion, len(gaussians)),
         path=_read_path(tensors, metadata.size_px),
         provenance=metadata.provenance,
+        dilation_px2=metadata.dilation_px2,
     )
 
 

@@ -1,17 +1,19 @@
 """The text part of a scene file: format mark, version and one JSON object.
 
-The JSON object has ``motion``, ``path``, ``provenance`` and ``conventions``. Readers ignore keys
-that they do not know; the version changes only when an old reader would show something wrong.
+The JSON object has ``motion``, ``path``, ``provenance``, ``rendering`` and ``conventions``. Readers
+ignore keys that they do not know; the version changes only when an old reader would show something
+wrong.
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from diff4splat.errors import FileFormatError
 from diff4splat.io.tensor_checks import take_numbers, take_value
-from diff4splat.scene.scene import Provenance
+from diff4splat.scene.scene import DILATION_PX2, Provenance
 
 FORMAT = "diff4splat-scene"
 VERSION = 1
@@ -39,6 +41,8 @@ class SceneMetadata:
     size_px: tuple[int, int]
     """(height, width) of the suggested path's pictures."""
     provenance: Provenance
+    dilation_px2: float = DILATION_PX2
+    """What the scene asks renderers for; files that do not say mean the usual."""
 
 
 def encode(metadata: SceneMetadata) -> dict[str, str]:
@@ -49,6 +53,8 @@ def encode(metadata: SceneMetadata) -> dict[str, str]:
         "path": {"size_px": list(metadata.size_px)},
         "provenance": asdict(metadata.provenance),
     }
+    if metadata.dilation_px2 != DILATION_PX2:
+        document["rendering"] = {"dilation_px2": metadata.dilation_px2}
     text = json.dumps(document, sort_keys=True)
     return {"format": FORMAT, "version": str(VERSION), "scene": text}
 
@@ -79,7 +85,17 @@ def decode(strings: Mapping[str, str]) -> SceneMetadata:
             license=take_value(provenance, "license", str, "unknown"),
             untrained=take_value(provenance, "untrained", bool, False),
         ),
+        dilation_px2=_dilation(take_value(document, "rendering", dict, {})),
     )
+
+
+def _dilation(rendering: Mapping[str, Any]) -> float:
+    found = take_value(rendering, "dilation_px2", float | int, DILATION_PX2)
+    if not 0 <= found < math.inf:
+        raise FileFormatError(
+            f"rendering.dilation_px2: expected a finite number of at least 0, got {found}"
+        )
+    return float(found)
 
 
 def _require_version(strings: Mapping[str, str]) -> None:

@@ -1,12 +1,19 @@
 """How photographs were taken, as plain JSON values: what their bits depend on."""
 
 from diff4splat.errors import ConfigError, FileFormatError
-from diff4splat.io.strict_json import JsonObject, optional_whole, take_flag, take_number, take_whole
+from diff4splat.io.strict_json import (
+    JsonObject,
+    optional_number,
+    optional_whole,
+    take_flag,
+    take_number,
+    take_whole,
+)
 from diff4splat.render.physical.settings import PhotoSettings
 
 
 def settings_json(settings: PhotoSettings) -> dict[str, object]:
-    """``settings`` without memory, cutoffs and colours; ``samples`` null is the default of each."""
+    """``settings`` without memory, cutoffs and colours; null is the default of each."""
     return {
         "samples": settings.samples,
         "seed": settings.seed,
@@ -29,7 +36,7 @@ def read_settings(own: JsonObject, where: str) -> PhotoSettings:
             samples=optional_whole(own, "samples", where, least=1),
             seed=take_whole(own, "seed", where),
             pixel_area=take_flag(own, "pixel_area", where),
-            smoothing_px2=take_number(own, "smoothing_px2", where),
+            smoothing_px2=optional_number(own, "smoothing_px2", where),
             tolerance_px=take_number(own, "tolerance_px", where),
             rows_per_chunk=optional_whole(own, "rows_per_chunk", where, least=1),
             most_intervals=take_whole(own, "most_intervals", where, least=1),

@@ -14,6 +14,7 @@ _KIND_NAMES: dict[type | UnionType, str] = {
     list: "a list",
     str: "text",
     bool: "true or false",
+    float | int: "a number",
     str | None: "text or null",
     int | None: "a whole number or null",
 }

@@ -56,6 +56,7 @@ def render(
         InputError: a camera with NaN, infinity or a focal length of 0 or less, or such features.
     """
     wanted = _require_sources(require_outputs(outputs), settings)
+    settings = made_for(scene_or_gaussians, settings)
     if camera.batch_shape == () and not isinstance(time_s, Tensor):
         job = _job(scene_or_gaussians, camera, time_s, wanted, settings)
         return choose(backend, job).render(job)
@@ -128,7 +129,7 @@ def render_video(
     Raises:
         ConfigError: an unknown output.
     """
-    wanted = require_outputs(outputs)
+    wanted, settings = require_outputs(outputs), made_for(scene, settings)
     if "flow" not in wanted:
         _require_sources(wanted, settings)
     return _frames(scene, path, wanted, settings, backend, advance)
@@ -165,6 +166,13 @@ def _frames(
             )
         advance()
         yield picture
+
+
+def made_for(subject: Scene | Gaussians, settings: RenderSettings) -> RenderSettings:
+    """The settings with what the subject itself asks for, where they leave it open."""
+    if settings.dilation_px2 is not None or not isinstance(subject, Scene):
+        return settings
+    return replace(settings, dilation_px2=subject.dilation_px2)
 
 
 def _require_sources(outputs: frozenset[str], settings: RenderSettings) -> frozenset[str]:

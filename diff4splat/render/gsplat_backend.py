@@ -145,7 +145,7 @@ def _rasterize(
         near_plane=float(np.nextafter(np.float32(settings.near_depth), np.float32(np.inf))),
         far_plane=float(np.finfo(np.float32).max),
         radius_clip=0.0,
-        eps2d=settings.dilation_px2,
+        eps2d=settings.added_px2,
         sh_degree=degree,
         packed=False,
         render_mode=mode,

@@ -56,9 +56,9 @@ def footprints(gaussians: Gaussians, camera: Camera, settings: RenderSettings) -
     local = camera_space(camera, gaussians.means)
     root = _covariance_root(gaussians, camera, local)
     # All lengths in units of the largest entry, so that no square over- or underflows.
-    size = root.detach().abs().amax((1, 2)).clamp_min(max(settings.dilation_px2, 1e-30) ** 0.5)
+    size = root.detach().abs().amax((1, 2)).clamp_min(max(settings.added_px2, 1e-30) ** 0.5)
     row_x, row_y = (root / size[:, None, None]).unbind(1)
-    dilation = (settings.dilation_px2**0.5 / size).square()
+    dilation = (settings.added_px2**0.5 / size).square()
     area = torch.linalg.cross(row_x, row_y)
     spread_x, spread_y = row_x.square().sum(-1), row_y.square().sum(-1)
     determinant = area.square().sum(-1) + dilation * (spread_x + spread_y + dilation)

@@ -15,6 +15,7 @@ from torch import Tensor
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import Camera
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.scene import DILATION_PX2
 
 OUTPUTS = ("rgb", "depth", "median_depth", "alpha", "flow", "features")
 """Every picture that a renderer can make."""
@@ -29,8 +30,9 @@ class RenderSettings:
 
     background: tuple[float, float, float] | Float[Tensor, "3"] = (0.0, 0.0, 0.0)
     """RGB behind the scene; a tensor gets a gradient."""
-    dilation_px2: float = 0.3
-    """Variance added to both axes of every footprint, in square pixels; 0 switches it off."""
+    dilation_px2: float | None = None
+    """Variance added to both axes of every footprint, in square pixels; 0 switches it off. None is
+    what a scene was made for (``Scene.dilation_px2``), and 0.3 for bare Gaussians."""
     antialias: bool = False
     """Scale opacities by sqrt(det / det_dilated): dilation adds no light (Yu et al. 2024)."""
     alpha_cutoff: float = 1 / 255
@@ -56,7 +58,7 @@ class RenderSettings:
     def __post_init__(self) -> None:
         accepted = {
             "background": is_finite_rgb(self.background),
-            "dilation_px2": 0 <= self.dilation_px2 < math.inf,
+            "dilation_px2": self.dilation_px2 is None or 0 <= self.dilation_px2 < math.inf,
             "alpha_cutoff": 0 < self.alpha_cutoff < 1,
             "alpha_max": self.alpha_cutoff < self.alpha_max < 1,
             "near_depth": 0 < self.near_depth < math.inf,
@@ -66,6 +68,11 @@ class RenderSettings:
             "memory_bytes": self.memory_bytes >= _LEAST_MEMORY,
         }
         require_accepted(self, accepted, _EXPECTED)
+
+    @property
+    def added_px2(self) -> float:
+        """The dilation, where no scene says another."""
+        return DILATION_PX2 if self.dilation_px2 is None else self.dilation_px2
 
 
 def require_accepted(settings: object, accepted: dict[str, bool], expected: dict[str, str]) -> None:

@@ -133,7 +133,7 @@ def dilation_knob() -> Knob:
         summary="blurring footprints instead of averaging over pixels",
         error_unit=_ERROR_UNIT,
         settings=(Dilation(variance_px2=0.0), *settings),
-        default=Dilation(variance_px2=_DEFAULTS.dilation_px2, compensated=_DEFAULTS.antialias),
+        default=Dilation(variance_px2=_DEFAULTS.added_px2, compensated=_DEFAULTS.antialias),
         reference=Dilation(variance_px2=0.0, samples=SAMPLES),
         run=lambda dilation: averaged_picture(fine_gaussians(GAUSSIANS), dilation),
         error=rmse,

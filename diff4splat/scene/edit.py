@@ -144,7 +144,7 @@ def static_if_still(
 
 
 def merge(first: Scene, second: Scene) -> Scene:
-    """Both scenes in one, ``first``'s Gaussians first; the suggested path is ``first``'s.
+    """Both scenes in one, ``first``'s Gaussians first; suggested path and dilation are ``first``'s.
 
     ``second`` is cast to the precision and device of ``first``. Key frames at different times are
     resampled to all of them, which changes nothing between keys because linear motion stays linear.
@@ -162,6 +162,7 @@ def merge(first: Scene, second: Scene) -> Scene:
         motion=_join_motions(first.motion, second.motion, len(first.gaussians), degree),
         path=first.path,
         provenance=_merge_provenance(first.provenance, second.provenance),
+        dilation_px2=first.dilation_px2,
     )
 
 

@@ -1,14 +1,19 @@
 """A scene is Gaussians plus a motion, with suggested cameras and a record of where it came from."""
 
+import math
 from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool
 from torch import Tensor
 
+from diff4splat.errors import ConfigError
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.protocol import Motion
+
+DILATION_PX2 = 0.3
+"""What Kerbl's renderer and most viewers add to footprints; scenes are fitted with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +40,16 @@ class Scene:
     path: CameraPath
     """The suggested camera path; looking along another one is always possible."""
     provenance: Provenance
+    dilation_px2: float = DILATION_PX2
+    """Variance, in square pixels, that renderers add to footprints unless they are told another;
+    0 for one that is sharp as it is. It is the scene's, as sizes and opacities were made for it."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.dilation_px2 < math.inf:
+            raise ConfigError(
+                "Scene.dilation_px2: expected a finite number of at least 0, "
+                f"got {self.dilation_px2}"
+            )
 
     def state_at(self, time_s: float) -> Gaussians:
         """The Gaussians as they stand at ``time_s`` seconds."""

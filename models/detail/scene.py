@@ -27,8 +27,10 @@ from diff4splat.models.heads import PixelBase, activate
 from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.scene.gaussians import Gaussians, concatenate
 
-PIXEL_FOOTPRINT_PX = 0.2
-"""Standard deviation of a Gaussian of one picture; its backing fills the gaps."""
+PIXEL_FOOTPRINT_PX = 0.25
+"""Standard deviation of a Gaussian of one picture, as it is drawn: nothing is to be added."""
+AROUND_CELLS = 0.6
+"""The same of the coarse layer around one picture, in its own cells."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +56,11 @@ def canonical_gaussians(
     depth = key_depth(raw[-1], config)
     around = None
     if maps.surroundings is not None:
-        around = _surroundings(maps.surroundings[0].float(), base, depth[0], config)
+        told, looks = maps.surroundings[0].float(), config
+        if len(depth) == 1:
+            # Wide and faint as networks learn them, they would be fog before one sharp picture.
+            told, looks = torch.zeros_like(told), replace(config, footprint_px=AROUND_CELLS)
+        around = _surroundings(told, base, depth[0], looks)
     if len(depth) == 1:
         return _picture(raw, base, around, config)
     kept = ~covered(depth.detach(), cameras).flatten()

@@ -74,7 +74,7 @@ def shapes(gaussians: Gaussians, camera: Camera, settings: RenderSettings) -> Te
     root = jacobian @ camera.world_from_camera[:3, :3].T @ rotations(gaussians.quats)
     root = root * gaussians.scales[:, None]
     bare = root @ root.mT
-    whole = bare + settings.dilation_px2 * torch.eye(2).to(bare)
+    whole = bare + settings.added_px2 * torch.eye(2).to(bare)
     factor = torch.linalg.cholesky(whole)
     first, shear, second = factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]
     opacities = gaussians.opacities

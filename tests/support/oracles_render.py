@@ -66,7 +66,7 @@ def brute_force(gaussians: Gaussians, camera: Camera, settings: RenderSettings) 
     eye = camera.world_from_camera.numpy()[:3, 3].astype(np.float64)
     splats = []
     for mean, quat, scale, opacity, sh in zip(*arrays, strict=True):
-        pixel, z, bare, covariance = footprint(mean, quat, scale, camera, settings.dilation_px2)
+        pixel, z, bare, covariance = footprint(mean, quat, scale, camera, settings.added_px2)
         if z <= settings.near_depth:
             continue
         kept = np.sqrt(np.linalg.det(bare) / np.linalg.det(covariance)) if settings.antialias else 1

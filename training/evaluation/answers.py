@@ -90,7 +90,7 @@ def scene_flow(
         return torch.zeros(len(times_s), height, width, 3)
     start = scene.state_at(source_s)
     moved = [scene.state_at(time_s).means - start.means for time_s in times_s]
-    settings = RenderSettings(features=torch.cat(moved, -1))
+    settings = RenderSettings(features=torch.cat(moved, -1), dilation_px2=scene.dilation_px2)
     seen = render(start, camera, outputs=("features", "alpha"), settings=settings)
     covered = seen.alpha > LEAST_COVERAGE
     share = torch.where(covered, seen.alpha, 1.0)[..., None]

@@ -56,7 +56,7 @@ class DepthStage(ModelStage):
         self.ldrm.detail.picture_depth.requires_grad_(True)
 
     def forward(self, batch: ClipBatch) -> Terms:
-        """The terms ``depth_log``, ``depth_edges`` and ``sky``."""
+        """The terms ``depth_log``, ``depth_edges``, ``depth_shift`` and ``sky``."""
         shown, weights = depth_pictures(batch), self.plan.recipe.losses
         log_depth = self.log_depth(self._in_other_light(shown.rgb, batch))
         difference = log_depth - shown.depth.log()
@@ -64,6 +64,7 @@ class DepthStage(ModelStage):
         terms = {
             "depth_log": masked_mean(difference.abs().flatten(1), shown.known.flatten(1)),
             "depth_edges": edge_error(difference, shown.known),
+            "depth_shift": _shift_error(log_depth, shown),
             "sky": masked_mean(too_near.flatten(1), ~shown.known.flatten(1)),
         }
         terms = {name: _by_sample(term, batch) for name, term in terms.items()}
@@ -118,6 +119,12 @@ def depth_pictures(batch: ClipBatch) -> DepthPictures:
     scaled, known = own_scale(depth.flatten(0, 1), PLANE_DEPTH)
     pictures = unit_rgb(rgb.flatten(0, 1)).movedim(-1, 1)
     return DepthPictures(rgb=pictures, depth=scaled, known=known)
+
+
+def _shift_error(log_depth: Float[Tensor, "n h w"], shown: DepthPictures) -> Float[Tensor, " n"]:
+    """Difference of PLANE_DEPTH / depth, where a truth is known."""
+    told, true = PLANE_DEPTH * (-log_depth).exp(), PLANE_DEPTH / shown.depth
+    return masked_mean((told - true).abs().flatten(1), shown.known.flatten(1))
 
 
 def _by_sample(values: Float[Tensor, " n"], batch: ClipBatch) -> Float[Tensor, " b"]:

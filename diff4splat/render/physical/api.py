@@ -6,6 +6,7 @@ camera, scene ─ effects that show ─ none: rasteriser
 
 import math
 from collections.abc import Collection
+from dataclasses import replace
 
 import torch
 
@@ -17,7 +18,7 @@ from diff4splat.render.physical.pinhole import drawn
 from diff4splat.render.physical.settings import OUTPUTS, Photograph, PhotoSettings
 from diff4splat.render.settings import require_outputs
 from diff4splat.scene.gaussians import Gaussians
-from diff4splat.scene.scene import Scene
+from diff4splat.scene.scene import DILATION_PX2, Scene
 
 DEFAULTS = PhotoSettings()
 
@@ -45,6 +46,7 @@ def photograph(
     own = scene_or_gaussians
     means = (own if isinstance(own, Gaussians) else own.gaussians).means
     camera = _usable(camera, time_s).to(means.dtype).to(means.device)
+    settings = made_for(own, settings)
     effects = find_effects(own, camera, time_s, settings)
     if backend == "trace" or effects.any:
         if backend not in ("trace", "auto"):
@@ -56,6 +58,14 @@ def photograph(
         )
         return exposure.take(wanted)
     return drawn(own, camera, time_s, wanted, settings, effects, backend)
+
+
+def made_for(subject: Scene | Gaussians, settings: PhotoSettings) -> PhotoSettings:
+    """The settings with what the subject itself asks for, where they leave it open."""
+    if settings.smoothing_px2 is not None:
+        return settings
+    asked = subject.dilation_px2 if isinstance(subject, Scene) else DILATION_PX2
+    return replace(settings, smoothing_px2=asked)
 
 
 def _usable(camera: PhysicalCamera, time_s: float) -> PhysicalCamera:

@@ -33,9 +33,10 @@ class PhotoSettings:
     """Of the samples."""
     pixel_area: bool = False
     """Average over the square of a pixel; else all rays go through its middle."""
-    smoothing_px2: float = 0.3
-    """Variance by which Gaussians are widened, in square pixels at their distance: what the
-    rasteriser adds to footprints, and what scenes were fitted with; 0 switches it off."""
+    smoothing_px2: float | None = None
+    """Variance by which Gaussians are widened, in square pixels at their distance, as the
+    rasteriser widens footprints; 0 switches it off. None is what a scene was made for
+    (``Scene.dilation_px2``), and 0.3 for bare Gaussians."""
     tolerance_px: float = 0.1
     """How far anything may be from where it is at the time of a ray: sets the intervals of time in
     which Gaussians keep their shape and go straight."""
@@ -52,7 +53,7 @@ class PhotoSettings:
     def __post_init__(self) -> None:
         accepted = {
             "samples": self.samples is None or 1 <= self.samples <= MOST_SAMPLES,
-            "smoothing_px2": 0 <= self.smoothing_px2 < math.inf,
+            "smoothing_px2": self.smoothing_px2 is None or 0 <= self.smoothing_px2 < math.inf,
             "tolerance_px": 0 < self.tolerance_px < math.inf,
             "rows_per_chunk": self.rows_per_chunk is None or self.rows_per_chunk >= 1,
             "most_intervals": self.most_intervals >= 1,
@@ -63,7 +64,7 @@ class PhotoSettings:
 
 _EXPECTED = {
     "samples": f"1 to {MOST_SAMPLES}, or None",
-    "smoothing_px2": "a finite number of at least 0",
+    "smoothing_px2": "a finite number of at least 0, or None",
     "tolerance_px": "a finite number above 0",
     "rows_per_chunk": "at least 1, or None",
     "most_intervals": "at least 1",

@@ -44,7 +44,7 @@ def make_plan(
         grid=_grid(camera.size_px, settings.tile_px or DEFAULT_TILE_PX),
         # Whole numbers would compile every kernel again.
         rules=Rules(
-            dilation_px2=float(settings.dilation_px2),
+            dilation_px2=float(settings.added_px2),
             antialias=bool(settings.antialias),
             log2_cutoff=max(math.log2(settings.alpha_cutoff), _LEAST_EXPONENT),
             alpha_max=min(float(settings.alpha_max), _LARGEST_ALPHA),

@@ -51,6 +51,13 @@ def test_a_moving_scene_comes_back_exactly(tmp_path: Path, dtype: torch.dtype) -
     assert_same_tensors(scene.motion, back.motion, names)
 
 
+@pytest.mark.parametrize("dilation_px2", [0.0, 0.3, 2.5])
+def test_the_dilation_it_was_made_for_comes_back(tmp_path: Path, dilation_px2: float) -> None:
+    scene = replace(oracles_io.scene(), dilation_px2=dilation_px2)
+    save_scene(scene, tmp_path / "s.safetensors")
+    assert load_scene(tmp_path / "s.safetensors").dilation_px2 == dilation_px2
+
+
 @pytest.mark.parametrize("k", [1, 4, 9, 16])
 def test_a_static_scene_stores_no_keys(tmp_path: Path, k: int) -> None:
     scene = oracles_io.scene(moving=False, k=k)

@@ -1,5 +1,8 @@
 """What lies around a picture is pushed behind it, along its own rays."""
 
+from dataclasses import replace
+
+import pytest
 import torch
 
 from diff4splat.geometry.camera import Camera, pinhole, project
@@ -51,6 +54,35 @@ def test_the_farthest_cell_around_decides() -> None:
     surface[4, 7] = 8.0
     found = behind_picture(seen_at([[0.0, 0.0, 5.0]]), surface, camera())
     torch.testing.assert_close(project(camera(), found.means)[1], torch.tensor([8.0 * BEHIND]))
+
+
+def test_a_footprint_is_looked_at_as_far_as_it_reaches() -> None:
+    surface = torch.full(GRID, 4.0)
+    surface[4, 10] = 8.0
+    # Four cells from the middle; at z = 5 one of the grid's cells is 0.5 wide.
+    for sigma_cells, wanted in [(0.5, 5.0), (1.5, 8.0 * BEHIND)]:
+        given = seen_at([[0.0, 0.0, 5.0]])
+        given = replace(given, scales=torch.full((1, 3), 0.5 * sigma_cells))
+        found = behind_picture(given, surface, camera())
+        z = project(camera(), found.means)[1]
+        torch.testing.assert_close(z, torch.tensor([wanted]))
+
+
+def test_what_reaches_into_the_picture_from_outside_is_pushed_too() -> None:
+    # One and two standard deviations beside the left border, and four.
+    given = seen_at([[-1.4, 0.0, 2.0], [-1.6, 0.0, 2.0], [-2.2, 0.0, 2.0]])
+    found = behind_picture(given, torch.full(GRID, 4.0), camera())
+    z = project(camera(), found.means)[1]
+    torch.testing.assert_close(z, torch.tensor([4.0 * BEHIND, 4.0 * BEHIND, 2.0]))
+
+
+@pytest.mark.parametrize("extreme", [1e-30, 1e30, float("inf")])
+def test_extreme_sizes_stay_what_they_are(extreme: float) -> None:
+    given = seen_at([[0.0, 0.0, 2.0], [0.0, 0.0, 2.0]])
+    given.scales[0] = extreme
+    found = behind_picture(given, torch.full(GRID, 4.0), camera())
+    torch.testing.assert_close(project(camera(), found.means)[1], torch.full((2,), 4.0 * BEHIND))
+    assert not bool(found.scales.isnan().any())
 
 
 def test_a_picture_that_shows_nothing_asks_for_nothing() -> None:

@@ -11,7 +11,7 @@ from diff4splat.geometry.camera import pinhole, project
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.rays import pixel_centers, world_rays
 from diff4splat.models.behind import behind_picture
-from diff4splat.models.finer import ONE_SURFACE, OPAQUE, WIDEST_PX, FinerScene, finer
+from diff4splat.models.finer import NARROWEST_PX, ONE_SURFACE, OPAQUE, WIDEST_PX, FinerScene, finer
 from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture, smaller
 from diff4splat.models.reconstruction import Canonical
@@ -106,8 +106,9 @@ def test_where_cells_look_like_their_pixels_each_takes_after_its_own_cell() -> N
     photo = photograph(as_cells(torch.rand(*GRID, 3)))
     canonical = scene(photo)
     found, parents = refined(canonical, photo), canonical.gaussians.select(own_cells())
-    wanted = (parents.scales / SIDE).clamp_max(WIDEST_PX * 4.0 / 20.0)
+    wanted = (parents.scales / SIDE).clamp(NARROWEST_PX * 4.0 / 20.0, WIDEST_PX * 4.0 / 20.0)
     assert bool((wanted < parents.scales / SIDE).any())
+    assert bool((wanted > parents.scales / SIDE).any())
     torch.testing.assert_close(found.gaussians.scales[:PIXELS], wanted)
     assert torch.equal(found.gaussians.quats[:PIXELS], parents.quats)
     assert torch.equal(found.gaussians.opacities[:PIXELS], parents.opacities.clamp_min(OPAQUE))
@@ -194,7 +195,8 @@ def test_what_is_farther_than_its_parent_is_larger_and_moves_as_much_more() -> N
     torch.testing.assert_close(found.motion.offsets, motion.offsets[:, parents] * farther[:, None])
     torch.testing.assert_close(found.motion.rotations, motion.rotations[:, parents])
     wanted = canonical.gaussians.scales[parents] * farther[:, None] / SIDE
-    wanted = torch.minimum(wanted, (WIDEST_PX * z / 20.0)[:, None])
+    pixel = (z / 20.0)[:, None]
+    wanted = wanted.clamp(NARROWEST_PX * pixel, WIDEST_PX * pixel)
     torch.testing.assert_close(found.gaussians.scales[:PIXELS], wanted)
 
 
@@ -206,7 +208,8 @@ def test_what_lies_behind_the_cells_goes_behind_the_picture_and_never_moves() ->
     around = behind_picture(around, torch.full(GRID, 4.0), photo.camera.resized(GRID))
     for field in fields(Gaussians):
         before = getattr(around, field.name)
-        assert torch.equal(getattr(found.gaussians, field.name)[PIXELS:], before), field.name
+        after = getattr(found.gaussians, field.name)[PIXELS:]
+        torch.testing.assert_close(after, before, msg=field.name)
     assert torch.equal(found.motion.moving_index, torch.arange(PIXELS))
 
 
@@ -220,6 +223,15 @@ def test_cells_of_later_frames_keep_their_gaussians_and_their_motion() -> None:
     assert found.cells[PIXELS:].tolist() == [PIXELS] * AROUND
     assert int(found.motion.moving_index[-1]) == PIXELS
     torch.testing.assert_close(found.motion.offsets[:, -1], motion.offsets[:, 1])
+
+
+def test_what_backs_the_cells_stays_where_it_is() -> None:
+    photo = photograph()
+    canonical = replace(scene(photo), backing=torch.tensor([2, CELLS]))
+    found = refined(canonical, photo).gaussians
+    backs = slice(PIXELS, PIXELS + 2)
+    assert torch.equal(found.means[backs], canonical.gaussians.means[CELLS : CELLS + 2])
+    assert torch.equal(found.scales[backs], canonical.gaussians.scales[CELLS : CELLS + 2])
 
 
 def test_what_stands_still_goes_on_standing() -> None:

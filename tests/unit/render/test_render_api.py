@@ -68,6 +68,25 @@ def test_a_scene_is_seen_at_its_time() -> None:
     torch.testing.assert_close(render(scene, CAMERA, 0.5).rgb, render(moved, CAMERA).rgb)
 
 
+@pytest.mark.parametrize("backend", ["reference", "raster"])
+def test_a_scene_is_dilated_as_it_asks_unless_something_else_is_asked_for(backend: str) -> None:
+    scene = replace(scene_with(StaticMotion()), dilation_px2=0.7)
+    bare = scene.gaussians
+    own, other = RenderSettings(dilation_px2=0.7), RenderSettings(dilation_px2=0.0)
+    asked = render(bare, CAMERA, settings=own, backend=backend).rgb
+    assert torch.equal(render(scene, CAMERA, backend=backend).rgb, asked)
+    assert torch.equal(next(render_video(scene, scene.path, backend=backend)).rgb, asked)
+    told = render(scene, CAMERA, settings=other, backend=backend).rgb
+    assert torch.equal(told, render(bare, CAMERA, settings=other, backend=backend).rgb)
+    assert not torch.equal(told, asked)
+
+
+@pytest.mark.parametrize("bad", [-0.1, float("nan"), float("inf")])
+def test_a_scene_asks_for_a_dilation_that_there_is(bad: float) -> None:
+    with pytest.raises(ConfigError, match=r"Scene\.dilation_px2: expected a finite number"):
+        replace(scene_with(StaticMotion()), dilation_px2=bad)
+
+
 def test_the_camera_takes_the_dtype_of_the_gaussians() -> None:
     assert render(random_gaussians(COUNT), CAMERA).rgb.dtype == torch.float64
 

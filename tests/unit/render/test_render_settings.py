@@ -9,6 +9,7 @@ from diff4splat.render.settings import RenderSettings, require_outputs
     [
         ("background", (0.0, 0.0, float("nan")), "three finite numbers"),
         ("dilation_px2", -0.1, "at least 0"),
+        ("dilation_px2", float("nan"), "at least 0"),
         ("dilation_px2", float("inf"), "finite"),
         ("alpha_cutoff", 0.0, "above 0 and below 1"),
         ("alpha_max", 1.0, "above alpha_cutoff and below 1"),
@@ -24,7 +25,9 @@ def test_a_wrong_setting_is_named(setting: str, value: object, expected: str) ->
 
 
 def test_the_defaults_are_fine() -> None:
-    assert RenderSettings() == RenderSettings(background=(0.0, 0.0, 0.0), dilation_px2=0.3)
+    assert RenderSettings() == RenderSettings(background=(0.0, 0.0, 0.0), dilation_px2=None)
+    assert RenderSettings().added_px2 == 0.3
+    assert RenderSettings(dilation_px2=0.0).added_px2 == 0.0
 
 
 def test_outputs_come_back_as_a_set() -> None:

@@ -126,7 +126,7 @@ def test_defaults_are_those_of_the_renderer() -> None:
         knob = build()
         assert torch.equal(knob.run(knob.default), made), knob.name
     settings, dilation = RenderSettings(), render_knobs.dilation_knob().default
-    assert dilation.variance_px2 == settings.dilation_px2
+    assert dilation.variance_px2 == settings.added_px2
     assert dilation.compensated == settings.antialias
     assert str(render_knobs.precision_knob().default) == "raster float32"
 

@@ -348,8 +348,8 @@ def halves(merged: Scene, count: int) -> tuple[Scene, Scene]:
 def test_merge_then_select_gives_the_parts(times: list[float]) -> None:
     first = moving_scene(4, degree=1)
     second = scene(gaussians(3, 1, seed=20), keyframes(times, [0, 2], seed=30))
-    merged = merge(first, second)
-    assert merged.motion.moving_index.tolist() == [1, 3, 4, 6]
+    merged = merge(replace(first, dilation_px2=0.1), second)
+    assert merged.motion.moving_index.tolist() == [1, 3, 4, 6] and merged.dilation_px2 == 0.1
     for part, original in zip(halves(merged, 4), (first, second), strict=True):
         assert_same_at_all_times(part, original)
 

@@ -9,6 +9,7 @@ from diff4splat.geometry.camera import pinhole, project
 from diff4splat.models.base_scene import OPAQUE
 from diff4splat.models.config import ActivationConfig
 from diff4splat.models.detail.scene import (
+    AROUND_CELLS,
     PIXEL_FOOTPRINT_PX,
     DetailedGaussians,
     canonical_gaussians,
@@ -68,7 +69,8 @@ def test_looks_that_networks_tell_are_not_asked() -> None:
     raw = maps()
     other = raw.gaussians.clone()
     other[:, :-1] += 1
-    changed = canonical_gaussians(replace(raw, gaussians=other), sight(), CONFIG)
+    raw = replace(raw, gaussians=other, surroundings=raw.surroundings + 1)
+    changed = canonical_gaussians(raw, sight(), CONFIG)
     for name in ("means", "scales", "quats", "opacities", "sh"):
         assert torch.equal(getattr(changed.gaussians, name), getattr(one().gaussians, name)), name
 
@@ -83,13 +85,18 @@ def test_surroundings_stand_behind_what_the_picture_shows() -> None:
     assert bool((z[seen] > depth[row, column]).all())
 
 
-def test_depth_and_surroundings_learn_and_the_backing_does_not() -> None:
+def test_surroundings_are_opaque_and_just_meet() -> None:
+    around = one().gaussians.select(slice(2 * PIXELS, None))
+    assert float(around.opacities.min()) > 0.98
+    z = project(sight().cameras[0][0], around.means)[1]
+    # A cell of theirs is four pixels wide.
+    footprint = AROUND_CELLS * 4 * z / 20.0
+    torch.testing.assert_close(around.scales, footprint[:, None].expand(-1, 3))
+
+
+def test_depth_learns_and_the_backing_does_not() -> None:
     raw = maps()
-    raw = replace(
-        raw,
-        gaussians=raw.gaussians.requires_grad_(),
-        surroundings=raw.surroundings.requires_grad_(),
-    )
+    raw = replace(raw, gaussians=raw.gaussians.requires_grad_())
     found = canonical_gaussians(raw, sight(), CONFIG).gaussians
     behind = found.select(slice(PIXELS, 2 * PIXELS))
     (behind.means.sum() * 1.0 + found.means.sum() * 0 + found.sh.sum() * 0).backward()
@@ -97,7 +104,6 @@ def test_depth_and_surroundings_learn_and_the_backing_does_not() -> None:
     found = canonical_gaussians(raw, sight(), CONFIG).gaussians
     (found.means.square().sum() + found.scales.sum()).backward()
     assert bool(raw.gaussians.grad[:, -1].any()) and not raw.gaussians.grad[:, :-1].any()
-    assert bool(raw.surroundings.grad.any()) and bool(raw.surroundings.grad.isfinite().all())
 
 
 def test_whole_videos_have_no_backing_and_keep_their_looks() -> None:

@@ -207,6 +207,21 @@ def test_pixel_areas_are_averaged() -> None:
     assert float(area.sum() - area[1, 1]) == 0.0
 
 
+def test_a_scene_is_widened_as_it_asks_unless_something_else_is_asked_for() -> None:
+    scene = replace(drifting(CLOUD, (0, 0, 0)), dilation_px2=0.7)
+    taken = {
+        (told, subject.__class__.__name__): shot(
+            subject, camera_of((5, 5)), LENS, PhotoSettings(samples=4, smoothing_px2=told)
+        ).rgb
+        for told in (None, 0.3, 0.7)
+        for subject in (scene, CLOUD)
+    }
+    assert torch.equal(taken[None, "Scene"], taken[0.7, "Scene"])
+    assert torch.equal(taken[None, "Gaussians"], taken[0.3, "Gaussians"])
+    assert torch.equal(taken[0.3, "Scene"], taken[0.3, "Gaussians"])
+    assert not torch.equal(taken[None, "Scene"], taken[0.3, "Scene"])
+
+
 def test_bare_gaussians_need_no_scene() -> None:
     own = PhysicalCamera(camera=camera_of((5, 5)), optics=LENS)
     settings = replace(SHARP, samples=4)

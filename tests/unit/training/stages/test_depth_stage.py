@@ -20,7 +20,7 @@ MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
 
 
 def depth_recipe(**losses: float) -> StageRecipe:
-    weights = {"depth_log": 1.0, "depth_edges": 0.5, "sky": 0.2} | losses
+    weights = {"depth_log": 1.0, "depth_edges": 0.5, "depth_shift": 1.0, "sky": 0.2} | losses
     like = stage_recipe("dynamic", **weights)
     data = replace(like.data, track_stride=4)
     return replace(like, name="depth", kind="depth", data=data, trained=("ldrm",))
@@ -50,7 +50,7 @@ def test_terms_are_finite_and_only_the_pictures_depth_learns() -> None:
     stage = make_stage(recipe, model=MODEL)
     shake_heads(stage)
     terms = stage(with_sky(make_batch(recipe, (0, 1))))
-    assert set(terms) == {"depth_log", "depth_edges", "sky", TOTAL}
+    assert set(terms) == {"depth_log", "depth_edges", "depth_shift", "sky", TOTAL}
     assert all(term.shape == (2,) and bool(term.isfinite().all()) for term in terms.values())
     terms[TOTAL].sum().backward()
     learnt = {name for name, p in stage.named_parameters() if p.grad is not None}
@@ -58,10 +58,21 @@ def test_terms_are_finite_and_only_the_pictures_depth_learns() -> None:
 
 
 def test_the_total_is_the_weighted_sum() -> None:
-    recipe = depth_recipe(depth_log=2.0, depth_edges=3.0, sky=5.0)
+    recipe = depth_recipe(depth_log=2.0, depth_edges=3.0, depth_shift=7.0, sky=5.0)
     terms = make_stage(recipe, model=MODEL)(with_sky(make_batch(recipe, (0,))))
     wanted = 2 * terms["depth_log"] + 3 * terms["depth_edges"] + 5 * terms["sky"]
-    torch.testing.assert_close(terms[TOTAL], wanted)
+    torch.testing.assert_close(terms[TOTAL], wanted + 7 * terms["depth_shift"])
+
+
+def test_the_shift_is_that_of_inverse_depths_where_they_are_known() -> None:
+    recipe = depth_recipe()
+    batch = with_sky(make_batch(recipe, (0,)))
+    shown = depth_pictures(batch)
+    # A fresh network puts everything on the plane.
+    off = (1 - PLANE_DEPTH / shown.depth).abs()
+    wanted = torch.stack([one[known].mean() for one, known in zip(off, shown.known, strict=True)])
+    found = make_stage(recipe, model=MODEL)(batch)["depth_shift"]
+    torch.testing.assert_close(found, wanted.mean()[None])
 
 
 def test_sky_that_is_far_enough_costs_nothing() -> None:
@@ -84,7 +95,7 @@ def test_without_any_depth_there_is_nothing_to_learn_but_sky() -> None:
     )
     stage = make_stage(recipe, model=MODEL)
     terms = {name: float(term.detach()) for name, term in stage(empty).items()}
-    assert terms["depth_log"] == terms["depth_edges"] == 0 < terms["sky"]
+    assert terms["depth_log"] == terms["depth_edges"] == terms["depth_shift"] == 0 < terms["sky"]
     measures = stage.eval().measure(empty)
     assert bool(measures["depth_error"].isnan()) and bool(measures["depth_correlation"].isnan())
 
