@@ -1,6 +1,6 @@
 """What a picture shows between its pixels: Gaussians half a pixel from each other (ours).
 
-Axes: ``h w`` pixels of a picture that networks see as it is, ``q`` = (2 h − 1) (2 w − 1) − h w
+Axes: ``h w`` pixels of a picture, ``q`` = (2 h − 1) (2 w − 1) − h w
 places between them, ``n`` Gaussians before. Seen from elsewhere, pixels of one surface come to lie
 between those of the new picture, where small Gaussians leave gaps and large ones blur. The places
 between them are filled by cubic interpolation of colour and linear interpolation of inverse depth,
@@ -22,35 +22,32 @@ from diff4splat.models.detail.scene import PIXEL_FOOTPRINT_PX
 from diff4splat.models.finer import FinerScene, inherited
 from diff4splat.models.heads import PixelBase, activate
 from diff4splat.models.picture import Picture
-from diff4splat.models.reconstruction import Canonical
 from diff4splat.scene.gaussians import Gaussians, concatenate
-from diff4splat.scene.motion.protocol import Motion
 
 _WHOLE = 0.999
 """Of what a place is made of, but for rounding."""
 
 
-def with_between(canonical: Canonical, motion: Motion, picture: Picture) -> FinerScene:
+def with_between(scene: FinerScene, picture: Picture) -> FinerScene:
     """The scene of one picture, with Gaussians between those of its pixels behind all others.
 
     Each moves as the pixel nearest to it. Beside pixels that were pruned there are none.
     """
-    means = canonical.gaussians.means
-    depth = project(picture.camera, means[: len(canonical.cells)])[1]
+    means, known = scene.gaussians.means, scene.cells[: scene.pixels]
+    depth = project(picture.camera, means[: scene.pixels])[1]
     own = depth.new_full((picture.rgb[..., 0].numel(),), torch.nan)
-    own = own.index_copy(0, canonical.cells, depth).view(picture.camera.size_px)
+    own = own.index_copy(0, known, depth).view(picture.camera.size_px)
     lattice_depth = _lattice_depth(own)
     places, cells = _places(lattice_depth, own)
-    row = canonical.cells.new_zeros(own.numel())
-    row[canonical.cells] = torch.arange(len(canonical.cells), device=row.device)
     every = torch.arange(len(means), device=means.device)
+    row = known.new_zeros(own.numel()).index_copy(0, known, every[: scene.pixels])
     grown = lattice_depth.flatten()[places] / own.flatten()[cells]
-    return FinerScene(
-        gaussians=concatenate([canonical.gaussians, _lattice(picture, lattice_depth, places)]),
-        motion=inherited(
-            motion, torch.cat([every, row[cells]]), torch.cat([torch.ones_like(means[:, 0]), grown])
-        ),
-        cells=torch.cat([canonical.every_cell, torch.full_like(cells, own.numel())]),
+    grown = torch.cat([torch.ones_like(means[:, 0]), grown])
+    return replace(
+        scene,
+        gaussians=concatenate([scene.gaussians, _lattice(picture, lattice_depth, places)]),
+        motion=inherited(scene.motion, torch.cat([every, row[cells]]), grown),
+        cells=torch.cat([scene.cells, torch.full_like(cells, own.numel())]),
     )
 
 

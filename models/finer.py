@@ -30,19 +30,21 @@ ONE_SURFACE = 0.1
 """Difference of log depth up to which neighbours are one surface."""
 
 
-OPAQUE, NARROWEST_PX, WIDEST_PX = 0.95, 0.35, 0.6
-"""What the photograph shows is not seen through, and a pixel of it hides no other and lets none
-shine through: cells may be fainter, and narrower or wider."""
+OPAQUE, WIDEST_PX = 0.95, 0.6
+"""What the photograph shows is not seen through, and a pixel of it hides no other: cells may be
+fainter and wider, where networks are unsure of an edge."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FinerScene:
-    """What ``finer`` makes."""
+    """A scene whose first Gaussians are pixels of a photograph."""
 
     gaussians: Gaussians
     motion: Motion
     cells: Int[Tensor, " q"]
     """Pixel of the photograph that each lies on; the number after the last for all others."""
+    pixels: int
+    """How many of the first are those pixels themselves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +75,7 @@ def finer(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) 
         gaussians=concatenate([fine, rest]),
         motion=inherited(motion, torch.cat([pixels.parent, behind]), grown),
         cells=torch.cat([pixels.kept, outside]),
+        pixels=len(pixels.kept),
     )
 
 
@@ -116,13 +119,13 @@ def _fine_gaussians(
     depth = project(small.camera, parent.means)[1] * pixels.log_depth.exp()
     whole = depth.new_ones(photo.rgb[..., 0].numel()).index_copy(0, pixels.kept, depth)
     distance = distance_from_depth(photo.camera, whole.view(photo.camera.size_px)).flatten()
-    pixel = (depth / photo.camera.focal_px.prod().sqrt())[:, None]
+    widest = WIDEST_PX * depth / photo.camera.focal_px.prod().sqrt()
     scales = parent.scales * (pixels.log_depth.exp() / side)[:, None]
     origins, directions = (rays.flatten(0, 1)[pixels.kept] for rays in world_rays(photo.camera))
     return replace(
         parent,
         means=origins + distance[pixels.kept, None] * directions,
-        scales=scales.clamp(NARROWEST_PX * pixel, WIDEST_PX * pixel),
+        scales=torch.minimum(scales, widest[:, None]),
         opacities=parent.opacities.clamp_min(OPAQUE),
         sh=dc_from_color(photo.rgb.flatten(0, 1)[pixels.kept])[:, None].to(parent.sh),
     )

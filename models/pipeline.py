@@ -263,9 +263,13 @@ class Diff4SplatPipeline:
 
 
 def _fine(canonical: Canonical, motion: Motion, small: Picture, photo: Picture) -> FinerScene:
-    """What networks made of ``small``, as fine as ``photo`` is and needs."""
+    """What networks made of ``small``, as fine as ``photo``; one picture has no gaps."""
+    fine = FinerScene(
+        gaussians=canonical.gaussians,
+        motion=motion,
+        cells=canonical.every_cell,
+        pixels=len(canonical.cells),
+    )
     if small is not photo:
-        return finer(canonical, motion, small, photo)
-    if canonical.is_picture:
-        return with_between(canonical, motion, photo)
-    return FinerScene(gaussians=canonical.gaussians, motion=motion, cells=canonical.every_cell)
+        fine = finer(canonical, motion, small, photo)
+    return with_between(fine, photo) if canonical.is_picture else fine

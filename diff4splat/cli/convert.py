@@ -35,9 +35,15 @@ class Convert:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.io.ply import write_ply, write_ply_sequence
         from diff4splat.io.scene_file import load_scene
+        from diff4splat.scene.scene import DILATION_PX2
 
         require_inputs_kept((self.scene,), (self.out,))
         scene = load_scene(self.scene)
+        if scene.dilation_px2 < DILATION_PX2:
+            note(
+                f"made for a dilation of {scene.dilation_px2:g} px², which a PLY cannot say: "
+                f"viewers add {DILATION_PX2:g} and show it softer"
+            )
         start_s, _ = scene.motion.time_range_s
         if self.out.suffix.lower() == ".ply":
             time_s = start_s if self.time is None else self.time

@@ -84,6 +84,7 @@ def scene_lines(file: Path) -> list[str]:
         "moving": f"{len(scene.motion.moving_index):,} ({type(scene.motion).__name__})",
         "harmonics": f"degree {scene.gaussians.degree}",
         "time": f"{start_s:g} to {stop_s:g} s",
+        "dilation": f"{scene.dilation_px2:g} px²",
         "cameras": f"{len(scene.path)} of {width} by {height} px",
         "depth": f"near {depths.near:.3g}, median {depths.focus:.3g} scene units",
         **{key: str(value) for key, value in asdict(scene.provenance).items()},

@@ -1,6 +1,7 @@
 """The main path on the command line, with the ``test`` model: what appears, and that it agrees."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from diff4splat.cli.main import run
 from diff4splat.io.exr import read_depth_exr
 from diff4splat.io.images import read_photo, write_png
 from diff4splat.io.ply import read_ply
-from diff4splat.io.scene_file import load_scene
+from diff4splat.io.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.render.api import render, render_video
@@ -90,6 +91,16 @@ def test_scene_file_and_ply_render_like_the_scene_in_memory(folder: Path, tmp_pa
         expected = render(scene, scene.path.cameras[index]).rgb
         actual = render(read_ply(ply), scene.path.cameras[index]).rgb
         assert float(psnr(actual, expected)) >= 50
+
+
+def test_a_ply_that_viewers_show_softer_is_said_to_be(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    scene, file = load_scene(folder / "scene.safetensors"), tmp_path / "scene.safetensors"
+    for dilation_px2, said in ((0.0, True), (scene.dilation_px2, False)):
+        save_scene(replace(scene, dilation_px2=dilation_px2), file)
+        assert run(["convert", str(file), "--out", str(tmp_path / "scene.ply")]) == 0
+        assert ("which a PLY cannot say" in capsys.readouterr().err) == said
 
 
 def test_render_needs_nothing_but_the_scene_file(folder: Path, tmp_path: Path) -> None:

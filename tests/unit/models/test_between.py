@@ -13,9 +13,7 @@ from diff4splat.models.base_scene import OPAQUE
 from diff4splat.models.between import lattice_camera, with_between
 from diff4splat.models.detail.scene import PIXEL_FOOTPRINT_PX
 from diff4splat.models.finer import FinerScene
-from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
-from diff4splat.models.reconstruction import Canonical
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians, concatenate
@@ -30,9 +28,6 @@ BETWEEN = 9 * 11 - PIXELS
 STILL = StaticMotion(time_range_s=(0.0, 2.0))
 POSE = torch.tensor(
     [[0.8, 0.0, 0.6, 1.0], [0.0, 1.0, 0.0, -2.0], [-0.6, 0.0, 0.8, 0.5], [0.0, 0.0, 0.0, 1.0]]
-)
-MAPS = ReconstructionMaps(
-    gaussians=torch.zeros(1, 12, 1, *SIZE_PX), tokens=torch.zeros(1, 1, 1, 1, 1)
 )
 
 
@@ -59,22 +54,22 @@ def plain(means: Tensor) -> Gaussians:
     )
 
 
-def scene(depth: Tensor, kept: Tensor | None = None) -> Canonical:
+def scene(depth: Tensor, motion: Motion = STILL, kept: Tensor | None = None) -> FinerScene:
     """Gaussians of pixels at their depth, and a few that are not of the picture."""
     origins, directions = world_rays(picture().camera)
     own = origins + distance_from_depth(picture().camera, depth)[..., None] * directions
     kept = torch.arange(PIXELS) if kept is None else kept
     own = plain(own.flatten(0, 1)[kept])
-    return Canonical(
+    return FinerScene(
         gaussians=concatenate([own, plain(torch.randn(OTHERS, 3))]),
-        cells=kept,
-        maps=MAPS,
-        backing=torch.tensor([0, 1, PIXELS, PIXELS]),
+        motion=motion,
+        cells=torch.cat([kept, torch.tensor([0, 1, PIXELS, PIXELS])]),
+        pixels=len(kept),
     )
 
 
 def filled(depth: Tensor, motion: Motion = STILL, shown: Picture | None = None) -> FinerScene:
-    return with_between(scene(depth), motion, shown or picture())
+    return with_between(scene(depth, motion), shown or picture())
 
 
 def added(found: FinerScene) -> Gaussians:
@@ -135,7 +130,7 @@ def test_colours_stay_colours_beside_hard_edges() -> None:
 
 def test_beside_pruned_pixels_there_is_nothing() -> None:
     kept = torch.arange(PIXELS)[torch.arange(PIXELS) != 14]
-    found = with_between(scene(plane(), kept), STILL, picture())
+    found = with_between(scene(plane(), kept=kept), picture())
     assert len(found.gaussians) == PIXELS - 1 + OTHERS + BETWEEN - 8
     assert bool(found.gaussians.means.isfinite().all())
     pixels = project(picture().camera, found.gaussians.means[PIXELS - 1 + OTHERS :])[0]
