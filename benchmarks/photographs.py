@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -39,6 +40,7 @@ from diff4splat.models.pretrained import find_multiple_px
 from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings
 from diff4splat.render.api import render, render_video
+from diff4splat.render.settings import RenderSettings
 from diff4splat.report.phases import peak_memory_bytes
 from diff4splat.scene.scene import Scene
 
@@ -60,7 +62,8 @@ class Row:
     first_view_db: float
     orbit_share: float
     orbit_finite: bool
-    strip: Float[Tensor, "h w 3"]
+    strip: Float[np.ndarray, "h w 3"]
+    """No tensor: its memory would end with the process that measured it."""
     flow_px: float
     flow_error_px: float
     file_db: float
@@ -88,7 +91,7 @@ def measure(name: str) -> Row:
     return Row(
         orbit_share=share,
         orbit_finite=finite,
-        strip=strip,
+        strip=strip.numpy(),
         name=name,
         size_px=picture.camera.size_px,
         first_view_db=float(psnr(frames[0].rgb.clamp(0, 1), picture.rgb)),
@@ -157,7 +160,9 @@ def through_files(scene: Scene, again: Scene) -> tuple[float, float, bool]:
         save_scene(again, files[1])
         write_ply(scene.state_at(0.0), files[2])
         from_file = render(load_scene(files[0]), camera).rgb
-        from_ply = render(read_ply(files[2]), camera).rgb
+        # A PLY cannot say what dilation a scene was made for.
+        asked = RenderSettings(dilation_px2=scene.dilation_px2)
+        from_ply = render(read_ply(files[2]), camera, settings=asked).rgb
         same_bits = files[0].read_bytes() == files[1].read_bytes()
     return float(psnr(from_file, expected)), float(psnr(from_ply, expected)), same_bits
 
@@ -176,7 +181,7 @@ def main() -> None:
     for row in rows:
         height, width = row.size_px
         if options.pictures:
-            write_png(row.strip, options.pictures / f"photograph-{row.name}.png")
+            write_png(torch.from_numpy(row.strip), options.pictures / f"photograph-{row.name}.png")
         print(
             f"| {row.name} | {width}×{height} | {row.first_view_db:.1f} dB "
             f"| {row.orbit_share:.1%}{'' if row.orbit_finite else ', not finite'} "

@@ -158,6 +158,9 @@ class DataSettings:
     """Tracked points per clip."""
     moving_targets: bool = True
     """False judges moving clips at their first frame alone: for stages in which nothing moves."""
+    moments: bool = False
+    """Clips hold only the first frame and the last of each latent frame, which are quickly drawn:
+    all that a motion branch looks at."""
     track_stride: int = 1
     """Input frames from one to the next whose pixels carry Gaussians, and so can be followed."""
     workers: int = 1
@@ -184,7 +187,12 @@ class DataSettings:
     @property
     def clip_frames(self) -> int:
         """Frames of a clip from the first input frame to the last."""
-        return 1 + (self.frames - 1) * self.input_stride
+        return 1 + (self.frames - 1) * self.input_stride // self.moment_stride
+
+    @property
+    def moment_stride(self) -> int:
+        """Frames of a whole clip from one that is there to the next."""
+        return TIME_STRIDE * self.input_stride if self.moments else 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -295,6 +303,8 @@ class Recipe:
         _require(fits, f"{what}: data.sources", "latents for a generator stage alone", stage.kind)
         told = stage.data.augment and stage.kind in READING
         _require(not told, f"{what}: data.augment", "false where captions are read", "true")
+        fits = not stage.data.moments or stage.kind == "branch"
+        _require(fits, f"{what}: data.moments", "false but for a motion branch", "true")
         stride, framed = stage.data.track_stride, detail and stage.kind in RECONSTRUCTING
         fits = not framed or stride == TIME_STRIDE
         branches = stage.kind not in ("branch", "generated") or self.model.dit.motion_width > 0

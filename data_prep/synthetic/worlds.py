@@ -28,6 +28,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import Camera
 
 ATTEMPTS = 60
+FPS = 8.0
 Names = tuple[str, ...] | None
 
 
@@ -47,7 +48,7 @@ class WorldRecipe:
     size_px: tuple[int, int] = (128, 128)
     """(height, width)"""
     views: int = 3
-    fps: float = 8.0
+    fps: float = FPS
     """17 frames make 2 seconds."""
     rig: bool = False
     """Cameras stand all around the stage; otherwise each goes its own way near the input view."""

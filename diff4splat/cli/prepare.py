@@ -29,6 +29,8 @@ class PrepareSynthetic:
     """Picture side in pixels."""
     frames: int = 17
     """Frames per clip, 1 + 4 k for training."""
+    fps: float = 8.0
+    """Frames per second; 3 frames at 1 are the moments that a motion branch needs."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     rig: bool = False
@@ -57,6 +59,7 @@ class PrepareSynthetic:
             against_share=self.against_share,
             frozen_share=self.frozen_share,
             frames=self.frames,
+            fps=self.fps,
             size_px=(self.size, self.size),
             views=self.views,
             rig=self.rig,

@@ -1,4 +1,4 @@
-"""The shipped size: on pictures of two sizes, and on the demo's picture as ``make demo`` runs it."""
+"""The shipped size: on pictures of two sizes, and on the demo's as ``make demo`` runs it."""
 
 import json
 import subprocess

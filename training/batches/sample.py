@@ -23,7 +23,7 @@ from diff4splat.training.batches.motion_truth import (
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
-from diff4splat.training.batches.window import cut
+from diff4splat.training.batches.window import cut, held
 from diff4splat.training.recipe import DataSettings
 from diff4splat.training.stage import SampleKey
 
@@ -44,7 +44,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
     """
     generator = origin.key.generator()
     _require_views(clip, settings.views)
-    clip = resized(cut(clip, settings.clip_frames, generator), settings.size_px)
+    clip = resized(_window(clip, settings, generator), settings.size_px)
     clip = augmented(clip, settings, generator)
     clip = normalized(clip, settings.least_depth_share)
     targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
@@ -73,6 +73,17 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
     )
+
+
+def _window(clip: Clip, settings: DataSettings, generator: torch.Generator) -> Clip:
+    if not settings.moments:
+        return cut(clip, settings.clip_frames, generator)
+    if clip.frames != settings.clip_frames:
+        raise InputError(
+            f"clip {clip.note.identifier}: expected {settings.clip_frames} moments, got "
+            f"{clip.frames} frames; draw such clips or train with data.moments=false"
+        )
+    return held(clip, settings.moment_stride)
 
 
 def _require_views(clip: Clip, views: int) -> None:

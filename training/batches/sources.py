@@ -13,7 +13,7 @@ from diff4splat.data.clip_folder import ClipFolder, Selection
 from diff4splat.data.clip_part import ClipPart
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
-from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
+from diff4splat.data_prep.synthetic.worlds import FPS, WorldRecipe, make_world
 from diff4splat.errors import InputError
 from diff4splat.training.batches.places import Places, ShuffledPlaces, split_places
 from diff4splat.training.recipe import DataSettings, SourceSettings
@@ -107,6 +107,7 @@ def world_clips(settings: SourceSettings, data: DataSettings, seed: int) -> "Wor
         split=settings.split,
         still_share=settings.still_share,
         frames=data.clip_frames,
+        fps=FPS / data.moment_stride,
         size_px=data.size_px,
         views=data.views,
     )

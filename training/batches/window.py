@@ -1,4 +1,4 @@
-"""A clip's frames from a random start.
+"""A clip's frames from a random start, or moments that stand for all frames.
 
 Axes: ``f`` frames. The world of what is cut out is again its first input camera.
 """
@@ -6,6 +6,8 @@ Axes: ``f`` frames. The world of what is cut out is again its first input camera
 from dataclasses import replace
 
 import torch
+from jaxtyping import Int
+from torch import Tensor
 
 from diff4splat.data.clip import Clip, Tracks
 from diff4splat.errors import InputError
@@ -29,7 +31,13 @@ def cut(clip: Clip, frames: int, generator: torch.Generator) -> Clip:
     return from_first_camera(_frames(clip, slice(first, first + frames)))
 
 
-def _frames(clip: Clip, window: slice) -> Clip:
+def held(clip: Clip, stride: int) -> Clip:
+    """Moments as a whole clip, in which each stands for the ``stride`` frames up to it."""
+    every = torch.arange(1 + (clip.frames - 1) * stride)
+    return _frames(clip, (every + stride - 1) // stride)
+
+
+def _frames(clip: Clip, window: slice | Int[Tensor, " t"]) -> Clip:
     views = tuple(
         replace(
             view,

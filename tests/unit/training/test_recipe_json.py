@@ -138,6 +138,15 @@ def test_clips_reach_from_the_first_input_frame_to_the_last() -> None:
     assert (data.frames, data.input_stride, data.clip_frames) == (9, 2, 17)
 
 
+def test_moments_are_for_motion_branches_and_few() -> None:
+    branch = recipe_by_name("small").stage("branch")
+    data = replace(branch.data, moments=True)
+    assert (data.clip_frames, data.moment_stride) == (3, 8)
+    assert replace(branch, data=data).data.moments
+    with pytest.raises(ConfigError, match=r"stage dynamic: data\.moments: expected false but for"):
+        changed(recipe_by_name("small"), ["stages.dynamic.data.moments=true"])
+
+
 def test_a_global_batch_is_made_of_micro_batches() -> None:
     with pytest.raises(ConfigError, match=r"stage vae: expected .* got 100, 3 and 2"):
         replace(recipe_by_name("test").stage("vae"), global_batch=3, micro_batch=2)

@@ -17,7 +17,7 @@ from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.targets import LEAST_MOTION, draw_targets, draw_tracks
-from diff4splat.training.batches.window import cut
+from diff4splat.training.batches.window import _frames, cut, held
 from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
 from diff4splat.training.stage import SampleKey
 
@@ -126,6 +126,31 @@ def test_longer_clips_are_cut_and_start_at_the_identity() -> None:
 def test_clips_that_are_too_short_say_so() -> None:
     with pytest.raises(InputError, match="clip-0: expected at least 5 frames, got 3"):
         sample(make_clip(frames=3))
+
+
+def test_moments_tell_a_branch_what_whole_clips_do() -> None:
+    whole = make_clip(frames=17, static=False, tracks=20)
+    data = replace(DATA, input_stride=2)
+    moments = sample(_frames(whole, slice(None, None, 8)), replace(data, frames=9, moments=True))
+    wanted = sample(whole, replace(data, frames=9))
+    assert bool(wanted.moving.any())
+    for name in ("field", "moving", "motion"):
+        torch.testing.assert_close(getattr(moments, name), getattr(wanted, name), msg=name)
+    assert torch.equal(moments.video[:, 0], wanted.video[:, 0])
+    assert moments.video.shape == wanted.video.shape
+
+
+def test_a_moment_stands_for_the_frames_up_to_it() -> None:
+    clip = held(make_clip(frames=3), 4)
+    times_s = make_clip(frames=3).times_s
+    wanted = [0, 1, 1, 1, 1, 2, 2, 2, 2]
+    torch.testing.assert_close(clip.times_s, times_s[wanted])
+
+
+def test_whole_clips_are_not_taken_for_moments() -> None:
+    data = replace(DATA, frames=9, input_stride=2, moments=True)
+    with pytest.raises(InputError, match="expected 3 moments, got 17 frames"):
+        sample(make_clip(frames=17), data)
 
 
 def test_smaller_pictures_keep_depth_and_rays_together() -> None:

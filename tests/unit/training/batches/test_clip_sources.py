@@ -19,7 +19,7 @@ from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError, InputError
 from diff4splat.training.batches.places import KEPT_BACK
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.batches.sources import EndlessClips, open_source
+from diff4splat.training.batches.sources import EndlessClips, open_source, world_clips
 from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
 from diff4splat.training.trainer.loader import load_batch
 from diff4splat.training.trainer.samples import EVALUATION_START
@@ -226,6 +226,14 @@ def test_every_index_is_one_world(worlds: EndlessClips, index: int) -> None:
     assert (first.frames, first.size_px, len(first.views)) == (FRAMES, SIZE_PX, 2)
     assert not first.note.is_static
     assert first.views[0].flow is None
+
+
+def test_moments_are_drawn_as_far_apart_as_the_video_is_long() -> None:
+    data = DataSettings(frames=9, input_stride=2, moments=True)
+    moments = world_clips(SourceSettings(), data, 0).recipe
+    whole = world_clips(SourceSettings(), replace(data, moments=False), 0).recipe
+    assert (moments.frames, moments.fps) == (3, 1.0)
+    assert (whole.frames, whole.fps) == (17, 8.0)
 
 
 def test_neighbours_are_other_worlds(worlds: EndlessClips) -> None:
