@@ -31,6 +31,8 @@ RECONSTRUCTION = LossWeights(
     photometric=4.0, perceptual=0.0, depth_log=0.5, motion_size=0.0, motion_width=0.2
 )
 """Without the paper's pull to standstill, which costs more than half of what motion gains."""
+TRACKS = 512
+"""Points from which it is read where things go, also where none of them is judged."""
 TRACK_GATE = Gate(measure="track_share", bound=0.8, direction="at_most")
 
 
@@ -168,7 +170,7 @@ def _told(single: StageRecipe) -> StageRecipe:
         steps=2_500,
         losses=replace(single.losses, photometric=12.0),
         optimizer=replace(single.optimizer, learning_rate=2e-4),
-        data=replace(single.data, target_frames=4, moving_targets=True),
+        data=replace(single.data, target_frames=4, moving_targets=True, tracks=TRACKS),
     )
 
 
@@ -185,7 +187,7 @@ def _generator(dynamic: StageRecipe) -> StageRecipe:
         micro_batch=16,
         optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
         losses=replace(stage.losses, flow_level=0.4, flow_energy=0.5, flow_motion=200.0),
-        data=replace(stage.data, augment=False),
+        data=replace(stage.data, augment=False, tracks=TRACKS),
         level_shift=3.0,
         vary_captions=True,
     )
@@ -203,6 +205,7 @@ def _branch(generator: StageRecipe) -> StageRecipe:
         steps=4_000,
         trained=("dit",),
         losses=replace(generator.losses, flow_motion=1.0, moves=10.0),
+        data=replace(generator.data, moments=True),
         level_shift=16.0,
     )
 

@@ -147,6 +147,11 @@ def test_moments_are_for_motion_branches_and_few() -> None:
         changed(recipe_by_name("small"), ["stages.dynamic.data.moments=true"])
 
 
+@pytest.mark.parametrize("name", ["told", "generator", "branch", "joint"])
+def test_stages_that_learn_where_things_go_follow_points(name: str) -> None:
+    assert recipe_by_name("small").stage(name).data.tracks > 0
+
+
 def test_a_global_batch_is_made_of_micro_batches() -> None:
     with pytest.raises(ConfigError, match=r"stage vae: expected .* got 100, 3 and 2"):
         replace(recipe_by_name("test").stage("vae"), global_batch=3, micro_batch=2)
