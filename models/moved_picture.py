@@ -20,6 +20,7 @@ from diff4splat.models.picture import Picture
 from diff4splat.models.pretrained import Model
 from diff4splat.models.reconstruction import Canonical, told_motion
 from diff4splat.models.settings import why_unguided
+from diff4splat.models.uncovered import uncovered
 from diff4splat.models.video_motion import moved_offsets
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
@@ -41,8 +42,9 @@ def moved_picture(
         return canonical, base_motion(context)
     made = _sampled(model, picture, frames, wish, log)
     depth = first_depth(canonical, model.config)
-    told = moved_offsets(made.field, made.moving(wish.settings.motion.moves_above), depth)
-    return canonical, told_motion(canonical, context.times_s, told)
+    moving = made.moving(wish.settings.motion.moves_above)
+    told = moved_offsets(made.field, moving, depth)
+    return uncovered(canonical, moving, picture), told_motion(canonical, context.times_s, told)
 
 
 def _sampled(
