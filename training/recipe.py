@@ -165,6 +165,8 @@ class DataSettings:
     """Input frames from one to the next whose pixels carry Gaussians, and so can be followed."""
     workers: int = 1
     """Processes that make samples; 0 makes them in the training process."""
+    in_memory: bool = False
+    """Clips of shards are read and decoded once, and kept by every process that makes samples."""
     least_depth_share: float = 0.01
     """Clips whose input view has less valid depth are skipped and counted (MoVieS)."""
 
@@ -251,6 +253,8 @@ class TrainerSettings:
 
     precision: Precision = "float32"
     """Of network activations; geometry, rendering and losses stay in float32."""
+    compile: bool = False
+    """The networks that a stage names run through ``torch.compile``; most stages name none."""
     parallel: Parallel = "none"
     checkpoint_every: int = 500
     evaluate_every: int = 500

@@ -60,7 +60,8 @@ def fingerprint(recipe: Recipe, stage: str, features: str = "") -> str:
     """
     own = asdict(recipe.stage(stage))
     own.pop("micro_batch")
-    own["data"].pop("workers")
+    for name in ("workers", "in_memory"):
+        own["data"].pop(name)
     for source in own["data"]["sources"]:
         source.pop("folder")
     facts = {"seed": recipe.seed, "model": json.loads(recipe.model.to_json()), "stage": own}

@@ -41,6 +41,10 @@ class Stage(nn.Module):
         """Loss terms, one value per batch element, with ``TOTAL`` among them."""
         raise NotImplementedError
 
+    def compilable(self) -> tuple[nn.Module, ...]:
+        """Networks that ``torch.compile`` makes faster: few shapes, one call, most of a step."""
+        return ()
+
     def measure(self, batch: Batch) -> Mapping[str, Float[Tensor, " b"]]:
         """What evaluation and gates look at, such as ``psnr``; without gradients."""
         raise NotImplementedError

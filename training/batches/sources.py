@@ -47,9 +47,12 @@ class WorldClips:
 class FolderClips:
     """A folder of shards, shuffled anew in every epoch."""
 
-    def __init__(self, settings: SourceSettings, views: int, seed: int) -> None:
+    def __init__(
+        self, settings: SourceSettings, views: int, seed: int, in_memory: bool = False
+    ) -> None:
         self.folder = Path(settings.folder)
         self.views = views
+        self.kept: dict[int, Clip] | None = {} if in_memory else None
         self.order = ShuffledPlaces(settings.still_share, seed)
 
     @cached_property
@@ -59,7 +62,12 @@ class FolderClips:
 
     def clip(self, index: int) -> Clip:
         """Still and moving clips in the asked share, each shuffled on its own."""
-        return self._read(self.order.place(index, self._places))
+        position = self.order.place(index, self._places)
+        if self.kept is None:
+            return self._read(position)
+        if position not in self.kept:
+            self.kept[position] = self._read(position)
+        return self.kept[position]
 
     def _read(self, position: int) -> Clip:
         """Without flow, and no more views than samples have."""
@@ -82,7 +90,7 @@ def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> Endl
         return world_clips(settings, data, seed)
     # A missing folder stops the run now, not every sample later.
     _require_clips(ClipFolder(settings.folder), settings)
-    return FolderClips(settings, data.views, seed)
+    return FolderClips(settings, data.views, seed, data.in_memory)
 
 
 def _require_clips(clips: ClipFolder, settings: SourceSettings) -> None:

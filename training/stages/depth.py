@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import torch
 from jaxtyping import Bool, Float
-from torch import Tensor
+from torch import Tensor, nn
 
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.depth import depth_pearson
@@ -54,6 +54,10 @@ class DepthStage(ModelStage):
         super().__init__(networks, plan)
         self.ldrm.requires_grad_(False)
         self.ldrm.detail.picture_depth.requires_grad_(True)
+
+    def compilable(self) -> tuple[nn.Module, ...]:
+        """The one network."""
+        return (self.ldrm.detail.picture_depth,)
 
     def forward(self, batch: ClipBatch) -> Terms:
         """The terms ``depth_log``, ``depth_edges``, ``depth_shift`` and ``sky``."""

@@ -25,6 +25,7 @@ from torch.nn.parallel import DistributedDataParallel
 from diff4splat.errors import ConfigError, ShapeError
 from diff4splat.training.recipe import Precision, TrainerSettings
 from diff4splat.training.stage import TOTAL, Batch, Stage
+from diff4splat.training.trainer.compiling import compile_networks
 from diff4splat.training.trainer.distributed import Processes
 
 
@@ -90,11 +91,13 @@ def parallelise(stage: Stage, processes: Processes, settings: TrainerSettings) -
     """Freeze what does not learn, move the stage to its device, and wrap it.
 
     Raises:
-        ConfigError: a trained part does not exist.
+        ConfigError: a trained part does not exist, or compiling needs a compiler that is not there.
         ShapeError: master weights are not float32.
     """
     freeze(stage)
     stage.to(processes.device)
+    if settings.compile:
+        compile_networks(stage)
     module = StageModule(stage, processes.device, settings.precision)
     losses: nn.Module = module
     if settings.parallel == "ddp":

@@ -19,7 +19,12 @@ from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError, InputError
 from diff4splat.training.batches.places import KEPT_BACK
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.batches.sources import EndlessClips, open_source, world_clips
+from diff4splat.training.batches.sources import (
+    EndlessClips,
+    FolderClips,
+    open_source,
+    world_clips,
+)
 from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
 from diff4splat.training.trainer.loader import load_batch
 from diff4splat.training.trainer.samples import EVALUATION_START
@@ -239,3 +244,25 @@ def test_moments_are_drawn_as_far_apart_as_the_video_is_long() -> None:
 def test_neighbours_are_other_worlds(worlds: EndlessClips) -> None:
     assert worlds.clip(0).note.identifier != worlds.clip(EVALUATION_START).note.identifier
     assert not torch.equal(worlds.clip(0).views[0].rgb, worlds.clip(EVALUATION_START).views[0].rgb)
+
+
+def test_clips_kept_in_memory_are_read_once_and_stay_as_they_were(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = SourceSettings(kind="shards", folder=str(folder), still_share=0.5)
+    data = replace(DATA, augment=True)
+    read: list[int] = []
+    plain = FolderClips._read
+    monkeypatch.setattr(
+        FolderClips, "_read", lambda self, place: (read.append(place), plain(self, place))[1]
+    )
+
+    def pictures(in_memory: bool) -> list[torch.Tensor]:
+        kept = replace(data, in_memory=in_memory)
+        samples = ClipSamples.open(recipe(given, data=kept), seed=0)
+        return [samples[index].video for index in (*range(40), *range(40))]
+
+    before, counted = pictures(in_memory=False), len(read)
+    after = pictures(in_memory=True)
+    assert counted == 80 and len(read) - counted == len(set(read[counted:])) < 40
+    assert all(torch.equal(one, other) for one, other in zip(before, after, strict=True))

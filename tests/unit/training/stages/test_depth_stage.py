@@ -4,32 +4,14 @@ from dataclasses import replace
 
 import pytest
 import torch
-from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
+from depth_stages import MODEL, depth_recipe, with_sky
+from stage_fixtures import make_batch, make_stage, shake_heads
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.base_scene import PLANE_DEPTH
-from diff4splat.models.config import DetailConfig, ModelConfig
-from diff4splat.models.sizes import test_size as tiny_size
-from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.recipe import Recipe, StageRecipe
+from diff4splat.training.recipe import Recipe
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.depth import SKY_DEPTH, depth_pictures
-
-DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4, picture_width=4)
-MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
-
-
-def depth_recipe(**losses: float) -> StageRecipe:
-    weights = {"depth_log": 1.0, "depth_edges": 0.5, "depth_shift": 1.0, "sky": 0.2} | losses
-    like = stage_recipe("dynamic", **weights)
-    data = replace(like.data, track_stride=4)
-    return replace(like, name="depth", kind="depth", data=data, trained=("ldrm",))
-
-
-def with_sky(batch: ClipBatch) -> ClipBatch:
-    depth, target = batch.depth.clone(), batch.target_depth.clone()
-    depth[..., :8, :], target[..., :8, :] = 0, 0
-    return replace(batch, depth=depth, target_depth=target)
 
 
 def test_every_key_frame_and_target_is_a_picture() -> None:
@@ -130,6 +112,6 @@ def test_a_step_learns_and_a_panel_shows_it() -> None:
 
 @pytest.mark.parametrize("missing", ["width", "picture_width"])
 def test_a_recipe_without_the_network_is_refused(missing: str) -> None:
-    without = replace(MODEL, detail=replace(DETAIL, **{missing: 0}))
+    without = replace(MODEL, detail=replace(MODEL.detail, **{missing: 0}))
     with pytest.raises(ConfigError, match="picture_width: expected a network for its kind"):
         Recipe(name="test", seed=0, model=without, stages=(depth_recipe(),))
