@@ -9,6 +9,7 @@ import torch
 from diff4splat.errors import ConfigError
 from diff4splat.flow.guidance import CallCount, Guidance
 from diff4splat.geometry.camera import pinhole
+from diff4splat.models import moved_picture
 from diff4splat.models.base_scene import PLANE_DEPTH
 from diff4splat.models.factory import create_networks
 from diff4splat.models.motion_branch.branch import MotionBranch
@@ -21,6 +22,7 @@ from diff4splat.models.motion_sampling import (
 from diff4splat.models.picture import Picture
 from diff4splat.models.pipeline import Diff4SplatPipeline
 from diff4splat.models.pretrained import Model
+from diff4splat.models.reconstruction import Canonical
 from diff4splat.models.settings import GenerationSettings, MotionSettings
 from diff4splat.models.sizes import test_size as tiny_size
 from diff4splat.models.video_dit import VideoDiT
@@ -174,3 +176,21 @@ def test_likelihoods_are_shared_within_a_colour_and_not_across() -> None:
     assert float(shared[0, :, 16:].max()) < 1e-3
     flat = torch.full((1, SIDE_PX, SIDE_PX), 0.4)
     torch.testing.assert_close(along_colors(flat, torch.rand(1, 3, SIDE_PX, SIDE_PX)), flat)
+
+
+def test_what_stands_behind_what_goes_is_part_of_the_scene(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    says(model, right=2.0)
+    asked: list[torch.Tensor] = []
+
+    def faint(canonical: Canonical, moving: torch.Tensor, seen: Picture) -> Canonical:
+        asked.append(moving)
+        assert seen.camera.size_px == moving.shape
+        half = torch.full_like(canonical.gaussians.opacities, 0.5)
+        return replace(canonical, gaussians=replace(canonical.gaussians, opacities=half))
+
+    monkeypatch.setattr(moved_picture, "uncovered", faint)
+    scene = Diff4SplatPipeline(model)(picture(), "arc", "a ball rolls")
+    assert len(asked) == 1 and bool(asked[0].all())
+    assert bool((scene.gaussians.opacities == 0.5).all())

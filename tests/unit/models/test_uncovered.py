@@ -1,5 +1,7 @@
 """The layer behind what goes takes the colours of what stands around it."""
 
+from dataclasses import replace
+
 import torch
 from torch import Tensor
 
@@ -44,7 +46,7 @@ def plain(means: Tensor, color: Tensor) -> Gaussians:
         quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]]).expand(count, 4),
         scales=torch.full((count, 3), 0.1),
         opacities=torch.full((count,), 0.9),
-        sh=dc_from_color(color).expand(count, 1, 3).clone(),
+        sh=torch.cat([dc_from_color(color).expand(count, 1, 3), torch.full((count, 3, 3), 0.1)], 1),
     )
 
 
@@ -72,7 +74,20 @@ def test_only_the_layer_behind_what_goes_changes_and_only_its_colour() -> None:
     assert torch.equal(changed[2 * PIXELS : 3 * PIXELS].view(SIDE, SIDE), wanted)
     colors = color_from_dc(after.sh[changed, 0])
     torch.testing.assert_close(colors, GREEN.expand(len(colors), 3), atol=1e-5, rtol=0)
+    assert not after.sh[changed, 1:].any()
     assert bool((project(picture().camera, after.means[changed])[1] > 0).all())
+
+
+def test_pixels_at_the_border_of_a_thing_lend_no_colour() -> None:
+    mixed = picture().rgb
+    mixed[6:18, 6:18] = 0.5 * (GREEN + BLUE)
+    mixed[thing()] = BLUE
+    before = canonical().gaussians
+    after = uncovered(canonical(), thing(), replace(picture(), rgb=mixed)).gaussians
+    changed = (after.sh != before.sh).flatten(1).any(1)
+    colors = color_from_dc(after.sh[changed, 0])
+    assert len(colors) >= 64
+    torch.testing.assert_close(colors, GREEN.expand(len(colors), 3), atol=1e-5, rtol=0)
 
 
 def test_backing_that_stands_changes_too() -> None:

@@ -100,6 +100,9 @@ def test_the_fingerprint_follows_what_decides_the_weights_of_its_stage() -> None
         "trainer.precision=bfloat16",
         "stages.dynamic.steps=3",
         "stages.vae.micro_batch=2",
+        "stages.vae.data.workers=2",
+        "stages.vae.data.in_memory=true",
+        "trainer.compile=true",
     ):
         assert fingerprint(changed(recipe, [same]), "vae") == before
     for other in ("stages.vae.steps=3", "seed=1", "model.vae.latent_channels=5"):
