@@ -151,6 +151,8 @@ class DitConfig:
     motion_width: int = 0
     """Width of a branch that tells that motion instead, from the pixels of the first picture (ours;
     docs/adr/0022); 0 is none."""
+    motion_outline: int = 0
+    """Width of what that branch sees the edges of things with (ours; docs/adr/0025); 0 is none."""
 
     def __post_init__(self) -> None:
         require_counts(
@@ -163,6 +165,11 @@ class DitConfig:
         require(fits, "DitConfig.motion_width", multiple, self.motion_width)
         told = self.motion or not self.motion_width
         require(told, "DitConfig.motion", "true where a branch tells it", self.motion)
+        width = self.motion_outline
+        whole = isinstance(width, int) and not isinstance(width, bool) and width >= 0
+        require(whole, "DitConfig.motion_outline", "a whole number of at least 0", width)
+        told = bool(self.motion_width) or not width
+        require(told, "DitConfig.motion_outline", "0 without a branch that it belongs to", width)
         known = self.predicts in ("velocity", "clean")
         require(known, "DitConfig.predicts", "velocity or clean", self.predicts)
         for name in ("draft", "motion", "pooled_text"):

@@ -17,11 +17,14 @@ from diff4splat.models.config_parts import MOTION_CELL_PX
 from diff4splat.models.motion_branch.branch import MotionBranch
 from diff4splat.models.picture import Picture
 from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.wholes import things
 
 AROUND_PX, NEAR_PX, ALIKE, ROUNDS = 15, 5.0, 0.05, 2
 """Window and standard deviations, in pixels and in colour, of sharing likelihoods."""
 LIKELY = 0.1
 """What does not even move with this probability stands."""
+SEED = 0.6
+"""A thing of which no pixel is as likely to move as this stands, but for the likeliest of all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,9 +51,14 @@ class SampledMotion:
         """Pixels that are more likely to move than ``above``.
 
         Where none is as likely as that, the likeliest thing moves: the words may say that something
-        does, and the picture not which. Below ``LIKELY`` nothing does.
+        does, and the picture not which. Below ``LIKELY`` nothing does. Pixels that touch are one
+        thing, and a thing moves where some of it is likely to (Canny's two thresholds, 1986).
         """
-        return self.moves > min(above, max(float(self.moves.max()) / 2, LIKELY))
+        most = float(self.moves.max())
+        thing = things(self.moves > min(above, max(most / 2, LIKELY)))
+        likely = self.moves.new_zeros(int(thing.max()) + 1)
+        likely = likely.scatter_reduce(0, thing.flatten(), self.moves.flatten(), "amax")
+        return (thing > 0) & (likely >= min(SEED, most))[thing]
 
 
 def sample_motion(

@@ -21,7 +21,7 @@ from diff4splat.models.pretrained import Model
 from diff4splat.models.reconstruction import Canonical, told_motion
 from diff4splat.models.settings import why_unguided
 from diff4splat.models.uncovered import uncovered
-from diff4splat.models.video_motion import moved_offsets
+from diff4splat.models.wholes import whole_offsets
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.report.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
@@ -42,9 +42,9 @@ def moved_picture(
         return canonical, base_motion(context)
     made = _sampled(model, picture, frames, wish, log)
     depth = first_depth(canonical, model.config)
-    moving = made.moving(wish.settings.motion.moves_above)
-    told = moved_offsets(made.field, moving, depth)
-    return uncovered(canonical, moving, picture), told_motion(canonical, context.times_s, told)
+    told = whole_offsets(made.field, made.moving(wish.settings.motion.moves_above), depth)
+    goes = told.any(-1).any(0)
+    return uncovered(canonical, goes, picture), told_motion(canonical, context.times_s, told)
 
 
 def _sampled(

@@ -55,6 +55,7 @@ def small_size() -> ModelConfig:
             draft=True,
             motion=True,
             motion_width=64,
+            motion_outline=32,
             pooled_text=True,
         ),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),

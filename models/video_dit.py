@@ -92,7 +92,9 @@ class VideoDiT(nn.Module):
         self.head = zero_(nn.Linear(dit.width, channels * TOKEN_PATCH**2))
         self.motion_branch = None
         if dit.motion_width:
-            self.motion_branch = MotionBranch(dit.motion_width, dit.heads, config.text)
+            self.motion_branch = MotionBranch(
+                dit.motion_width, dit.heads, config.text, outline_width=dit.motion_outline
+            )
 
     def forward(
         self,

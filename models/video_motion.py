@@ -61,13 +61,17 @@ def told_offsets(
     return torch.stack(fields).movedim(1, -1) * UNIT * depth[..., None]
 
 
+def pixel_ways(field: Float[Tensor, "c t hc wc"]) -> Float[Tensor, "t c hh ww"]:
+    """A smooth ``field`` of cells at every pixel."""
+    return torch.nn.functional.interpolate(
+        field.transpose(0, 1), scale_factor=MOTION_CELL_PX, mode="bilinear", align_corners=False
+    )
+
+
 def moved_offsets(
-    field: Float[Tensor, "c t hc wc"],
+    ways: Float[Tensor, "t c hh ww"],
     moves: Bool[Tensor, "hh ww"] | Float[Tensor, "hh ww"],
     depth: Float[Tensor, "hh ww"],
 ) -> Float[Tensor, "t hh ww 3"]:
-    """The same where it is told apart what moves, and how: a smooth ``field`` of all cells."""
-    pixels = torch.nn.functional.interpolate(
-        field.transpose(0, 1), scale_factor=MOTION_CELL_PX, mode="bilinear", align_corners=False
-    )
-    return (pixels * moves).movedim(1, -1) * UNIT * depth[..., None]
+    """The same where it is told apart what moves, and how."""
+    return (ways * moves).movedim(1, -1) * UNIT * depth[..., None]

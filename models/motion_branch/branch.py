@@ -6,10 +6,12 @@ condition. Motion in the units of ``video_motion``. Noise level 0 is data and 1 
 
     picture, place ─ conv ─┐
     noisy motion ─── conv ─┴ + ─ 1/4 ─ 1/8 ─ 1/16 ─ 1/8 ─ 1/4 ─┬ conv (zero) ─ clean motion
-    level, time, mean of the words ─ scale and shift of every block ┘
-    words ─ reader ─ attention of every cell, on the way down ──────┘
+    level, time, mean of the words ─ scale and shift of every block ┤
+    words ─ reader ─ attention of every cell, on the way down ──────┤
+                                                                    └ mean over time ─ what moves
 
-The latent frames of a sample see each other through the mean of their features.
+The latent frames of a sample see each other through the mean of their features. Cells know which
+thing moves; where it ends, a second look at the pixels tells (``outline``).
 """
 
 from dataclasses import replace
@@ -24,6 +26,7 @@ from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embeddin
 from diff4splat.models.config_parts import TextConfig
 from diff4splat.models.detail.layers import CELL_PX, cells
 from diff4splat.models.motion_branch.layers import ModulatedConvBlock, Stage
+from diff4splat.models.motion_branch.outline import Outline
 from diff4splat.models.motion_branch.reader import Reader
 from diff4splat.models.motion_branch.words import Words, words_of
 
@@ -42,7 +45,12 @@ class MotionBranch(nn.Module):
     """
 
     def __init__(
-        self, width: int, heads: int, text: TextConfig, frequency_width: int = 128
+        self,
+        width: int,
+        heads: int,
+        text: TextConfig,
+        frequency_width: int = 128,
+        outline_width: int = 0,
     ) -> None:
         super().__init__()
         fine, middle, coarse = widths(width, heads)
@@ -67,6 +75,7 @@ class MotionBranch(nn.Module):
         # No norm before it: at low levels the answer is the noisy motion itself, size and all.
         self.head = zero_(nn.Conv2d(fine, CHANNELS, 3, padding=1))
         self.moves = zero_(nn.Conv2d(fine, CELL_PX**2, 3, padding=1))
+        self.outline = Outline(outline_width, fine) if outline_width else None
 
     def forward(
         self,
@@ -99,8 +108,10 @@ class MotionBranch(nn.Module):
             ShapeError: as ``forward``.
         """
         features = self.features(picture, noisy, level, text, text_mask)
-        by_frame = torch.nn.functional.pixel_shuffle(self.moves(features), CELL_PX)
-        moves = by_frame.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)[:, 0]
+        told = features.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)
+        moves = torch.nn.functional.pixel_shuffle(self.moves(told), CELL_PX)[:, 0]
+        if self.outline is not None:
+            moves = moves + self.outline(picture, told)
         return self._motion(features, noisy), moves
 
     def features(

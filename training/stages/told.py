@@ -23,7 +23,7 @@ from diff4splat.models.maps import ReconstructionMaps
 from diff4splat.models.picture import Picture
 from diff4splat.models.reconstruction import Canonical, told_states
 from diff4splat.models.settings import GenerationSettings
-from diff4splat.models.video_motion import moved_offsets
+from diff4splat.models.video_motion import moved_offsets, pixel_ways
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stages.model_stage import StagePlan, network_rays
@@ -71,7 +71,7 @@ class ToldStage(DynamicStage):
         moved = []
         for index, scene in enumerate(scenes):
             picture = first_picture(batch, index)
-            told = moved_offsets(batch.field[index], batch.moving[index], depth[index])
+            told = moved_offsets(pixel_ways(batch.field[index]), batch.moving[index], depth[index])
             states = told_states(scene, told, batch.target_time[index].tolist())
             shown = matched(scene, picture)
             moved.append([deformed(shown, state) for state in states])

@@ -41,7 +41,7 @@ OTHER_VALUES = {
     "pooled_text": True,
 }
 """Valid values where doubling the old one is not."""
-BOUND = [("ldrm", "reads"), ("dit", "motion_width")]
+BOUND = [("ldrm", "reads"), ("dit", "motion_width"), ("dit", "motion_outline")]
 """Fields that may not change alone."""
 
 
@@ -69,12 +69,17 @@ def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
 
 def test_a_branch_for_motion_needs_a_motion_and_room_for_its_heads() -> None:
     dit = dataclasses.replace(test_size().dit, motion=True, motion_width=8)
-    assert dataclasses.replace(test_size(), dit=dit).fingerprint() != test_size().fingerprint()
+    outlined = dataclasses.replace(dit, motion_outline=4)
+    prints = {dataclasses.replace(test_size(), dit=own).fingerprint() for own in (dit, outlined)}
+    assert len(prints | {test_size().fingerprint()}) == 3
     for change, words in (
         ({"motion": False}, "DitConfig.motion: expected true where a branch tells it"),
         ({"motion_width": 6}, "motion_width: expected 0 or a multiple of 4, twice the heads"),
         ({"motion_width": -8}, "motion_width: expected 0 or a multiple"),
         ({"motion_width": True}, "motion_width: expected 0 or a multiple"),
+        ({"motion_outline": -1}, "motion_outline: expected a whole number of at least 0, got -1"),
+        ({"motion_outline": True}, "motion_outline: expected a whole number"),
+        ({"motion_width": 0, "motion_outline": 4}, "expected 0 without a branch that it belongs"),
     ):
         with pytest.raises(ConfigError, match=words):
             dataclasses.replace(dit, **change)

@@ -120,8 +120,29 @@ def test_the_likeliest_moves_where_nothing_is_likely() -> None:
     made = SampledMotion(field=none, moves=moves, calls=CallCount())
     assert made.moving(0.5).tolist() == [[False, True], [True, False]]
     assert made.moving(0.1).tolist() == [[False, True], [True, True]]
+    assert not SampledMotion(field=none, moves=0 * moves, calls=CallCount()).moving(0.3).any()
     sure = SampledMotion(field=none, moves=moves + 0.6, calls=CallCount())
     assert sure.moving(0.5).all()
+
+
+@pytest.mark.parametrize(("second", "goes"), [(0.59, False), (0.61, True)])
+def test_a_thing_moves_where_some_of_it_is_likely_to(second: float, goes: bool) -> None:
+    moves = torch.full((6, 9), 0.2)
+    moves[1:3, 1:4] = torch.tensor([[0.4, 0.5, 0.35], [0.4, 0.95, 0.4]])
+    moves[2:5, 6:8] = torch.tensor([[0.4, 0.31], [0.5, second], [0.29, 0.4]])
+    made = SampledMotion(field=torch.zeros(3, 2, 1, 1), moves=moves, calls=CallCount())
+    wanted = moves > 0.3
+    wanted[:, 5:] &= goes
+    assert torch.equal(made.moving(0.3), wanted)
+
+
+def test_alone_the_likeliest_thing_moves_whole() -> None:
+    moves = torch.zeros(6, 9)
+    moves[1:3, 1:4], moves[1, 1], moves[4:, 6:] = 0.4, 0.5, 0.45
+    made = SampledMotion(field=torch.zeros(3, 2, 1, 1), moves=moves, calls=CallCount())
+    wanted = torch.zeros(6, 9, dtype=torch.bool)
+    wanted[1:3, 1:4] = True
+    assert torch.equal(made.moving(0.3), wanted)
 
 
 def test_motion_begins_at_nothing_and_ends_at_the_answer(model: Model) -> None:

@@ -7,6 +7,7 @@ from diff4splat.models.video_motion import (
     motion_cells,
     moved_offsets,
     packed_motion,
+    pixel_ways,
     told_offsets,
     with_still_motion,
 )
@@ -60,7 +61,7 @@ def test_only_what_moves_goes_as_the_field_says() -> None:
     moves = torch.zeros(16, 16, dtype=torch.bool)
     moves[3:6, 2:9] = True
     depth = torch.rand(16, 16) + 1
-    found = moved_offsets(field, moves, depth)
+    found = moved_offsets(pixel_ways(field), moves, depth)
     assert found.shape == (2, 16, 16, 3)
     torch.testing.assert_close(found[1, ..., 1], 2 * UNIT * depth * moves)
     assert not found[0].any() and not found[1, ..., 0].any()
