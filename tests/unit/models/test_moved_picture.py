@@ -27,6 +27,7 @@ from diff4splat.models.settings import GenerationSettings, MotionSettings
 from diff4splat.models.sizes import test_size as tiny_size
 from diff4splat.models.video_dit import VideoDiT
 from diff4splat.models.video_motion import UNIT
+from diff4splat.models.wholes import LEAST_WAY
 from diff4splat.report.run_log import RunLog
 
 SIDE_PX = 32
@@ -215,3 +216,21 @@ def test_what_stands_behind_what_goes_is_part_of_the_scene(
     scene = Diff4SplatPipeline(model)(picture(), "arc", "a ball rolls")
     assert len(asked) == 1 and bool(asked[0].all())
     assert bool((scene.gaussians.opacities == 0.5).all())
+
+
+def test_nothing_is_uncovered_by_what_hardly_goes(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[bool] = []
+
+    def note(canonical: Canonical, goes: torch.Tensor, seen: Picture) -> Canonical:
+        del seen
+        asked.append(bool(goes.any()))
+        return canonical
+
+    monkeypatch.setattr(moved_picture, "uncovered", note)
+    for way in (0.9 * LEAST_WAY, 1.1 * LEAST_WAY):
+        says(model, right=way / UNIT)
+        scene = Diff4SplatPipeline(model)(picture(), "arc", "a ball rolls")
+        assert bool(len(scene.motion.moving_index)) is asked[-1]
+    assert asked == [False, True]

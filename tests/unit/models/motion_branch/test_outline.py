@@ -77,3 +77,11 @@ def test_every_weight_has_a_gradient() -> None:
     network = outline()
     network(*inputs()).square().sum().backward()
     assert all(bool(weight.grad.any()) for weight in network.parameters())
+
+
+def test_pixels_reach_the_answer_past_the_cells() -> None:
+    network, (picture, told) = outline(), inputs()
+    with torch.no_grad():
+        network.grow.weight.zero_()
+    assert bool((network(1 - picture, told) != network(picture, told)).all())
+    assert torch.equal(network(picture, told + 1), network(picture, told))
