@@ -23,7 +23,7 @@ AROUND_PX, NEAR_PX, ALIKE, ROUNDS = 15, 5.0, 0.05, 2
 """Window and standard deviations, in pixels and in colour, of sharing likelihoods."""
 LIKELY = 0.1
 """What does not even move with this probability stands."""
-SEED = 0.6
+SEED = 0.4
 """A thing of which no pixel is as likely to move as this stands, but for the likeliest of all."""
 
 

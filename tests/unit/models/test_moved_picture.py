@@ -126,11 +126,11 @@ def test_the_likeliest_moves_where_nothing_is_likely() -> None:
     assert sure.moving(0.5).all()
 
 
-@pytest.mark.parametrize(("second", "goes"), [(0.59, False), (0.61, True)])
+@pytest.mark.parametrize(("second", "goes"), [(0.39, False), (0.41, True)])
 def test_a_thing_moves_where_some_of_it_is_likely_to(second: float, goes: bool) -> None:
     moves = torch.full((6, 9), 0.2)
     moves[1:3, 1:4] = torch.tensor([[0.4, 0.5, 0.35], [0.4, 0.95, 0.4]])
-    moves[2:5, 6:8] = torch.tensor([[0.4, 0.31], [0.5, second], [0.29, 0.4]])
+    moves[2:5, 6:8] = torch.tensor([[0.35, 0.31], [0.38, second], [0.29, 0.35]])
     made = SampledMotion(field=torch.zeros(3, 2, 1, 1), moves=moves, calls=CallCount())
     wanted = moves > 0.3
     wanted[:, 5:] &= goes
@@ -139,7 +139,7 @@ def test_a_thing_moves_where_some_of_it_is_likely_to(second: float, goes: bool) 
 
 def test_alone_the_likeliest_thing_moves_whole() -> None:
     moves = torch.zeros(6, 9)
-    moves[1:3, 1:4], moves[1, 1], moves[4:, 6:] = 0.4, 0.5, 0.45
+    moves[1:3, 1:4], moves[1, 1], moves[4:, 6:] = 0.32, 0.38, 0.36
     made = SampledMotion(field=torch.zeros(3, 2, 1, 1), moves=moves, calls=CallCount())
     wanted = torch.zeros(6, 9, dtype=torch.bool)
     wanted[1:3, 1:4] = True
