@@ -73,5 +73,5 @@ def moved_offsets(
     moves: Bool[Tensor, "hh ww"] | Float[Tensor, "hh ww"],
     depth: Float[Tensor, "hh ww"],
 ) -> Float[Tensor, "t hh ww 3"]:
-    """The same where it is told apart what moves, and how."""
+    """How far pixels have gone: by their ``ways``, where something ``moves``."""
     return (ways * moves).movedim(1, -1) * UNIT * depth[..., None]

@@ -12,7 +12,7 @@ from diff4splat.training.stage import Stage
 
 
 def compile_networks(stage: Stage) -> None:
-    """Compile what the stage says is worth it; it happens at the first call, in about a minute.
+    """Compile what the stage says is worth it; it happens at the first call, in half a minute.
 
     Raises:
         ConfigError: there is no C++ compiler that PyTorch can use.

@@ -5,11 +5,17 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 from depth_stages import MODEL, depth_recipe
 from stage_fixtures import make_stage, stage_recipe
 
 from diff4splat.errors import ConfigError
+from diff4splat.training.recipe import TrainerSettings
+from diff4splat.training.stage import Stage
+from diff4splat.training.trainer import parallel
 from diff4splat.training.trainer.compiling import compile_networks
+from diff4splat.training.trainer.distributed import Processes
+from diff4splat.training.trainer.parallel import parallelise
 
 SUPPORT = Path(__file__).parents[3] / "support"
 PROGRAM = """
@@ -52,6 +58,19 @@ def test_compiling_without_a_compiler_is_refused(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("CXX", "no-such-compiler")
     with pytest.raises(ConfigError, match="got no no-such-compiler; install one"):
         compile_networks(make_stage(depth_recipe(), model=MODEL))
+
+
+def test_the_setting_compiles_before_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled: list[Stage] = []
+    monkeypatch.setattr(parallel, "compile_networks", compiled.append)
+    stage, alone = (
+        make_stage(depth_recipe(), model=MODEL),
+        Processes(rank=0, count=1, device=torch.device("cpu")),
+    )
+    parallelise(stage, alone, TrainerSettings())
+    assert not compiled
+    parallelise(stage, alone, TrainerSettings(compile=True))
+    assert compiled == [stage]
 
 
 def test_a_stage_that_names_nothing_to_compile_runs_as_it_is(
