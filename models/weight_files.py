@@ -49,7 +49,7 @@ def save_networks(
         }
         _require_finite(tensors, name)
         with atomic_path(part_file(folder, name)) as temporary:
-            save_file(tensors, temporary)
+            _save_readable(tensors, temporary)
     write_text(folder / CONFIG_FILE, config.to_json())
 
 
@@ -148,6 +148,14 @@ def _refuse(found: list[str], what: str) -> None:
         raise CheckpointError(
             f"{what} {len(found)} ({listed}); the weights belong to another configuration"
         )
+
+
+def _save_readable(tensors: dict[str, Tensor], file: Path) -> None:
+    """As readable as any other file; safetensors would make it the owner's alone."""
+    file.touch()
+    mode = file.stat().st_mode
+    save_file(tensors, file)
+    file.chmod(mode)
 
 
 def _require_finite(tensors: dict[str, Tensor], name: str) -> None:

@@ -30,6 +30,11 @@ def rewrite(folder: Path, part: str, change: dict[str, torch.Tensor | None]) -> 
     )
 
 
+def test_weights_are_as_readable_as_the_configuration(folder: Path) -> None:
+    modes = {file.stat().st_mode for file in folder.iterdir()}
+    assert len(modes) == 1
+
+
 @pytest.mark.parametrize("with_text", [True, False])
 def test_round_trip_is_exact(folder: Path, with_text: bool) -> None:
     config, networks = load_networks(folder, with_text=with_text)
