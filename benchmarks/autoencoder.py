@@ -15,13 +15,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.generation.input_image import choose_focal, prepare_image
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.image import psnr
-from diff4splat.models.picture import choose_focal, prepare_picture
-from diff4splat.models.pretrained import Model, load_model
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol_json import load_protocol
+from diff4splat.models.hub.pretrained import Model, load_model
 
 PROTOCOL = "held_out_v2"
 PHOTOGRAPHS = ("astronaut", "coffee", "chelsea", "rocket")
@@ -52,7 +52,7 @@ def photograph(name: str, side: int, frames: int) -> Float[Tensor, "f h w 3"]:
 
     rgb = torch.from_numpy(getattr(skimage.data, name)()).float() / 255
     focal = choose_focal((rgb.shape[0], rgb.shape[1]), None, None)
-    return prepare_picture(rgb, focal, side).rgb.expand(frames, -1, -1, -1)
+    return prepare_image(rgb, focal, side).rgb.expand(frames, -1, -1, -1)
 
 
 def table(model: Model, clips: int) -> str:

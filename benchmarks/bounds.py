@@ -18,20 +18,20 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.evaluation.baselines import BEST_PLANE, make_baseline
+from diff4splat.evaluation.covisibility import covisible
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.predictions import Answer
+from diff4splat.evaluation.protocol import Pair
+from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.sample import Case, make_case
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.image import psnr
-from diff4splat.models.base_scene import OPAQUE
-from diff4splat.models.config_parts import ActivationConfig
-from diff4splat.models.heads import PixelBase, activate
+from diff4splat.models.config.networks import ActivationConfig
+from diff4splat.models.ldrm.gaussian_head import PixelBase, activate
+from diff4splat.models.ldrm.plane_prior import OPAQUE
 from diff4splat.render.api import render
-from diff4splat.training.evaluation.answers import Answer
-from diff4splat.training.evaluation.baselines import BEST_PLANE, make_baseline
-from diff4splat.training.evaluation.case import Case, make_case
-from diff4splat.training.evaluation.covisibility import covisible
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol import Pair
-from diff4splat.training.evaluation.protocol_json import load_protocol
 
 SKY_DEPTH = 400.0
 """Where pixels without a depth stand; the median of the first frame is 4."""

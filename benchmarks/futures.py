@@ -20,18 +20,18 @@ from pathlib import Path
 
 import torch
 
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.predictions import scene_flow
+from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.sample import make_case
+from diff4splat.evaluation.systems import Generator
+from diff4splat.evaluation.text_measures import TextCase, text_case
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.image import psnr
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.settings import GenerationSettings
 from diff4splat.render.api import render
 from diff4splat.scene.scene import Scene
-from diff4splat.training.evaluation.answers import scene_flow
-from diff4splat.training.evaluation.case import make_case
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol_json import load_protocol
-from diff4splat.training.evaluation.subjects import Generator
-from diff4splat.training.evaluation.text_measures import TextCase, text_case
 
 PROTOCOL = "text_v1"
 EQUAL_DB = 100.0

@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diff4splat.report.phases import peak_memory_bytes
+from diff4splat.progress.phases import peak_memory_bytes
 
 if TYPE_CHECKING:
     from diff4splat.training.recipe import StageRecipe

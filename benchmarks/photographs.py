@@ -26,6 +26,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.generation.input_cameras import path_frame
+from diff4splat.generation.input_image import InputImage, choose_focal, prepare_image
+from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.geometry.rays import pixel_centers
@@ -33,15 +36,12 @@ from diff4splat.io.images import write_png
 from diff4splat.io.ply import read_ply, write_ply
 from diff4splat.io.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
-from diff4splat.models.context import view_of
-from diff4splat.models.picture import Picture, choose_focal, prepare_picture
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.pretrained import find_multiple_px
+from diff4splat.models.hub.pretrained import find_multiple_px
 from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings
+from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.render.api import render, render_video
 from diff4splat.render.settings import RenderSettings
-from diff4splat.report.phases import peak_memory_bytes
 from diff4splat.scene.scene import Scene
 
 SIDE_PX = 256
@@ -106,21 +106,21 @@ def measure(name: str) -> Row:
     )
 
 
-def load(name: str) -> Picture:
+def load(name: str) -> InputImage:
     """A photograph of scikit-image at the default size of ``small``."""
     import skimage.data
 
     rgb = torch.from_numpy(getattr(skimage.data, name)()).float() / 255
     focal = choose_focal((rgb.shape[0], rgb.shape[1]), None, None)
-    return prepare_picture(rgb, focal, SIDE_PX, find_multiple_px("small", SIDE_PX))
+    return prepare_image(rgb, focal, SIDE_PX, find_multiple_px("small", SIDE_PX))
 
 
-def around(scene: Scene, picture: Picture) -> tuple[float, bool, Float[Tensor, "h w 3"]]:
+def around(scene: Scene, picture: InputImage) -> tuple[float, bool, Float[Tensor, "h w 3"]]:
     """Least share of a frame that shows something, whether all is finite, and frames in a row."""
     shares, finite, frames = [], True, []
     for orbit in ORBITS:
         settings = PathSettings(frames=ORBIT_FRAMES, fps=ORBIT_FRAMES - 1)
-        for camera in build_path(orbit, view_of(picture.camera), settings).cameras:
+        for camera in build_path(orbit, path_frame(picture.camera), settings).cameras:
             seen = render(scene, camera, outputs=("rgb", "alpha", "depth"))
             shares.append(float((seen.alpha > SHOWN).float().mean()))
             finite &= all(bool(part.isfinite().all()) for part in (seen.rgb, seen.depth))

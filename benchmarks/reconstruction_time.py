@@ -12,14 +12,14 @@ from pathlib import Path
 
 import torch
 
+from diff4splat.error_time.tables import this_machine
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.generation.video_to_scene import scene_from_video
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.pretrained import load_model
-from diff4splat.models.video_to_scene import scene_from_video
+from diff4splat.models.hub.pretrained import load_model
 from diff4splat.paths.camera_path import CameraPath
-from diff4splat.report.tables import this_machine
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol_json import load_protocol
 
 
 def held_out_video(side: int) -> tuple[torch.Tensor, CameraPath]:

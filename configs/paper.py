@@ -16,7 +16,7 @@ from diff4splat.configs.stages import (
     reconstruction_gates,
     static_stage,
 )
-from diff4splat.models.sizes import paper_size
+from diff4splat.models.config.sizes import paper_size
 from diff4splat.training.recipe import (
     DataSettings,
     OptimizerSettings,

@@ -15,8 +15,8 @@ from diff4splat.configs.stages import (
     reconstruction_gates,
     static_stage,
 )
-from diff4splat.models.config_parts import TIME_STRIDE
-from diff4splat.models.sizes import small_size
+from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.models.config.sizes import small_size
 from diff4splat.training.recipe import (
     DataSettings,
     Gate,

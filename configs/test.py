@@ -11,7 +11,7 @@ from diff4splat.configs.stages import (
     static_data,
     static_stage,
 )
-from diff4splat.models.sizes import test_size
+from diff4splat.models.config.sizes import test_size
 from diff4splat.training.recipe import (
     DataSettings,
     OptimizerSettings,

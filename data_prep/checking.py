@@ -16,7 +16,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.comparing.spread import Share
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 USUAL_SIDE_PX, THIN_SHARE = 128, 0.05
 """At this picture side, as many points may lie on leaves and posts thinner than a pixel."""

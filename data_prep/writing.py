@@ -22,7 +22,7 @@ from diff4splat.data_prep.synthetic.drawing.warm import prepare_drawing
 from diff4splat.data_prep.synthetic.narration import SOURCE
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.errors import ConfigError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

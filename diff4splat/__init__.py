@@ -10,7 +10,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "Camera": "diff4splat.geometry.camera",
     "CameraPath": "diff4splat.paths.camera_path",
-    "Diff4SplatPipeline": "diff4splat.models.pipeline",
+    "Diff4SplatPipeline": "diff4splat.generation.pipeline",
     "Gaussians": "diff4splat.scene.gaussians",
     "KeyframeMotion": "diff4splat.scene.motion.keyframes",
     "Scene": "diff4splat.scene.scene",

@@ -11,13 +11,13 @@ from types import MappingProxyType
 import torch
 from torch import nn
 
-from diff4splat.models.config import ModelConfig
-from diff4splat.models.deformation import DeformationNetwork
-from diff4splat.models.detail.deformation import DetailDeformation
-from diff4splat.models.ldrm import Ldrm
-from diff4splat.models.text_encoder import TextEncoder
-from diff4splat.models.video_dit import VideoDiT
-from diff4splat.models.video_vae import VideoVae
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.deformation.network import DeformationNetwork
+from diff4splat.models.deformation.refined_network import RefinedDeformation
+from diff4splat.models.ldrm.ldrm import Ldrm
+from diff4splat.models.text_encoder.encoder import TextEncoder
+from diff4splat.models.video_dit.dit import VideoDiT
+from diff4splat.models.video_vae.vae import VideoVae
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ class Networks:
     """None when there is no prompt."""
     dit: VideoDiT
     ldrm: Ldrm
-    deformation: DeformationNetwork | DetailDeformation
+    deformation: DeformationNetwork | RefinedDeformation
 
     def parts(self) -> list[tuple[str, nn.Module]]:
         """(name, network) of the parts that exist."""
@@ -75,9 +75,9 @@ def create_networks(
     )
 
 
-def _deformation(config: ModelConfig) -> DeformationNetwork | DetailDeformation:
+def _deformation(config: ModelConfig) -> DeformationNetwork | RefinedDeformation:
     """On tokens (paper), or on the detail decoder's features where there is one."""
-    return (DetailDeformation if config.detail.used else DeformationNetwork)(config)
+    return (RefinedDeformation if config.detail.used else DeformationNetwork)(config)
 
 
 def create_text_encoder(

@@ -1,6 +1,6 @@
 """Mean and deviation of the latents of a trained autoencoder, over fixed evaluation samples.
 
-Everything after the autoencoder works with standardised latents (``models/video_vae.py``). The
+Everything after the autoencoder works with standardised latents (``models/video_vae/vae.py``). The
 statistics are of the averaged weights, and lie beside their checkpoints.
 
 Axes: ``c`` latent channels.
@@ -14,8 +14,8 @@ from torch import Tensor
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.tensor_file import TensorFile, read_tensors, write_tensors
-from diff4splat.models.video_vae import VideoVae
-from diff4splat.report.phases import Advance
+from diff4splat.models.video_vae.vae import VideoVae
+from diff4splat.progress.phases import Advance
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.stages.model_stage import network_video
 from diff4splat.training.trainer.loader import load_batch, require_batch

@@ -9,9 +9,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.linear_code import LinearCode
-from diff4splat.models.video_vae import VideoVae
-from diff4splat.report.phases import Phases
+from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
+from diff4splat.models.video_vae.vae import VideoVae
+from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.stages.model_stage import network_video
 from diff4splat.training.trainer.loader import load_batch, require_batch
@@ -39,7 +39,7 @@ def start_from_components(vae: VideoVae, samples: ClipSamples, phases: Phases) -
 class BlockMoments:
     """Sums over blocks, in double precision."""
 
-    def __init__(self, code: LinearCode) -> None:
+    def __init__(self, code: PcaShortcut) -> None:
         self.code = code
         values = code.to_latent.in_features
         self.count = 0
@@ -54,7 +54,7 @@ class BlockMoments:
         self.squares += rows.mT @ rows
 
 
-def set_principal_components(code: LinearCode, moments: BlockMoments) -> None:
+def set_principal_components(code: PcaShortcut, moments: BlockMoments) -> None:
     """The directions of largest variance become the code."""
     mean = moments.total / moments.count
     covariance = moments.squares / moments.count - torch.outer(mean, mean)

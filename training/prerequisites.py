@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import PARTS, Networks, create_networks
-from diff4splat.models.pretrained import Model
+from diff4splat.models.hub.pretrained import Model
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
 from diff4splat.training.recipe import Recipe, StageRecipe
 from diff4splat.training.stages.factory import STAGES

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.config import ModelConfig
-from diff4splat.models.config_parts import TIME_STRIDE
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.networks import TIME_STRIDE
 
 StageKind = Literal[
     "vae",

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from typing import Any
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.config import ModelConfig
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.training.recipe import Recipe
 from diff4splat.training.typed_json import TypedReader
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.features.load import load_features
 from diff4splat.models.factory import PARTS
-from diff4splat.models.pretrained import Model, save_model
-from diff4splat.report.phases import Phases
+from diff4splat.models.hub.pretrained import Model, save_model
+from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latent_statistics import CLIPS, measure_statistics, write_statistics
 from diff4splat.training.latents.samples import LatentSamples, open_samples

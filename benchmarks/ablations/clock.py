@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from diff4splat.report.phases import Advance, Phases
+from diff4splat.progress.phases import Advance, Phases
 from diff4splat.training.recipe import StageRecipe
 from diff4splat.training.trainer.run_files import LOG_FILE, EventLog
 

@@ -14,18 +14,18 @@ from torch import Tensor
 from ablations.variants import Variant
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.pretrained import Model, load_model
-from diff4splat.models.video_vae import LatentDistribution, VideoVae
-from diff4splat.report.phases import Phases
-from diff4splat.training.evaluation.measuring import Setup
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol import Protocol
-from diff4splat.training.evaluation.protocol_json import LoadedProtocol, load_protocol
-from diff4splat.training.evaluation.runner import Outcome, require_some, run_items
-from diff4splat.training.evaluation.sources import ClipSource
-from diff4splat.training.evaluation.store import NAME, ItemStore, run_key
-from diff4splat.training.evaluation.subjects import Reconstructor, model_identity, reconstruct_clip
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.measuring import Setup
+from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocol_json import LoadedProtocol, load_protocol
+from diff4splat.evaluation.result_store import NAME, ItemStore, run_key
+from diff4splat.evaluation.runner import Outcome, require_some, run_items
+from diff4splat.evaluation.sources import ClipSource
+from diff4splat.evaluation.systems import Reconstructor, model_identity, reconstruct_clip
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.models.hub.pretrained import Model, load_model
+from diff4splat.models.video_vae.vae import LatentDistribution, VideoVae
+from diff4splat.progress.phases import Phases
 from diff4splat.training.stage_run import MODEL_FOLDER
 
 SHIPPED = "held_out_v2"

@@ -16,7 +16,7 @@ from pathlib import Path
 from benchmarks.fitting.scenes import HELD_OUT, SCENES, FitScene, draw, mean_picture_db
 from benchmarks.fitting.tables import table
 from benchmarks.fitting.variants import ABLATIONS, VARIANTS
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 
 def main() -> None:

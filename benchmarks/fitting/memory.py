@@ -60,11 +60,11 @@ def fit_once(motion: str, times: int) -> dict[str, float | str]:
     import torch
 
     from diff4splat.data.capture.capture import Capture, PointCloud
+    from diff4splat.fitting.fit import FitRun, fit_scene
+    from diff4splat.fitting.settings import Density, FitSettings, Stillness
     from diff4splat.geometry import rigid
     from diff4splat.geometry.camera import pinhole, stack_cameras
-    from diff4splat.report.phases import peak_memory_bytes
-    from diff4splat.training.per_scene.fit import FitRun, fit_scene
-    from diff4splat.training.per_scene.settings import Density, FitSettings, Stillness
+    from diff4splat.progress.phases import peak_memory_bytes
 
     lens = pinhole(1.1 * SIDE_PX, (SIDE_PX, SIDE_PX), torch.float64)
     poses = []

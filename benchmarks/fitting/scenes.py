@@ -12,7 +12,7 @@ from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe
 from diff4splat.data_prep.writing import WorldJob, write_worlds
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 RIGID = ("slides", "rolls", "hops", "drives", "rises", "bounces")
 SOFT = ("squashes", "grows", "wobbles", "bends", "walks", "slithers")

@@ -19,21 +19,21 @@ import torch
 from benchmarks.optics_fitting.captures import seen_db, taken, told
 from benchmarks.optics_fitting.worlds import views, world
 from diff4splat.data.capture.capture import Capture
+from diff4splat.fitting.evaluator import mean_psnr_db
+from diff4splat.fitting.fit import FitResult, FitRun, fit_scene
+from diff4splat.fitting.optics.coefficients import largest_displacement_px
+from diff4splat.fitting.settings import (
+    CameraSettings,
+    Density,
+    FitSettings,
+    Stillness,
+)
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.geometry.lenses.build import fisheye_camera
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
 from diff4splat.render.physical.viewer import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
-from diff4splat.training.per_scene.fit import FitResult, FitRun, fit_scene
-from diff4splat.training.per_scene.judging import mean_psnr_db
-from diff4splat.training.per_scene.optics.coefficients import largest_displacement_px
-from diff4splat.training.per_scene.settings import (
-    CameraSettings,
-    Density,
-    FitSettings,
-    Stillness,
-)
 
 Row = dict[str, str | float]
 SIDE_PX = 64

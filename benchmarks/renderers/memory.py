@@ -9,7 +9,7 @@ import resource
 from contextlib import suppress
 from pathlib import Path
 
-from diff4splat.report.phases import peak_memory_bytes
+from diff4splat.progress.phases import peak_memory_bytes
 
 _STATUS, _CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 _MEMINFO = Path("/proc/meminfo")

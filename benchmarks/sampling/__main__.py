@@ -22,10 +22,10 @@ from benchmarks.sampling.motion import motion_table
 from benchmarks.sampling.scenes import kept_back, scene_table
 from benchmarks.sampling.video import video_table
 from diff4splat.flow.guidance import UNGUIDED, Guidance
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.atomic import write_text
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.pretrained import load_model, with_text_encoder
-from diff4splat.models.settings import GenerationSettings, MotionSettings
+from diff4splat.models.hub.pretrained import load_model, with_text_encoder
 
 SOLVERS = tuple(
     GenerationSettings(steps=steps, sampler=sampler, shift=shift, guidance=UNGUIDED)

@@ -11,18 +11,18 @@ from pathlib import Path
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocol_json import LoadedProtocol
+from diff4splat.evaluation.systems import input_picture
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
+from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.motion_sampling import MotionWish, sample_motion
-from diff4splat.models.picture import Picture
-from diff4splat.models.pretrained import Model
-from diff4splat.models.settings import GenerationSettings, MotionSettings
+from diff4splat.models.hub.pretrained import Model
 from diff4splat.training.batches.motion_truth import continued, moving_pixels, pixel_motion
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.window import from_first_camera
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol import Protocol
-from diff4splat.training.evaluation.protocol_json import LoadedProtocol
-from diff4splat.training.evaluation.subjects import input_picture
 
 REFERENCE = MotionSettings(steps=64)
 INPUT_STRIDE = 2
@@ -33,14 +33,14 @@ INPUT_STRIDE = 2
 class Told:
     """One clip: what the branch is given, and the truth."""
 
-    picture: Picture
+    picture: InputImage
     text: Float[Tensor, "1 s d"]
     truth: Float[Tensor, "3 t hc wc"]
 
     def sampled(self, model: Model, settings: MotionSettings, seed: int) -> tuple[Tensor, int]:
         """Motion, and the network calls that it took."""
         asked = GenerationSettings(motion=settings)
-        wish = MotionWish(text=self.text, seed=seed, settings=asked)
+        wish = MotionRequest(text=self.text, seed=seed, settings=asked)
         frames = self.truth.shape[1]
         made = sample_motion(model.networks.dit.motion_branch, self.picture, frames, wish)
         return made.field, made.calls.conditional + made.calls.unconditional

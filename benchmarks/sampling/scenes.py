@@ -5,18 +5,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from diff4splat.evaluation.captions import grammar_caption
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocol_json import LoadedProtocol, load_protocol
+from diff4splat.evaluation.records import Score
+from diff4splat.evaluation.sample import Case, make_case
+from diff4splat.evaluation.systems import Generator
+from diff4splat.evaluation.text_measures import text_entries
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.metrics.image import psnr
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.settings import GenerationSettings
 from diff4splat.render.api import render
-from diff4splat.training.evaluation.captions import grammar_caption
-from diff4splat.training.evaluation.case import Case, make_case
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol import Protocol
-from diff4splat.training.evaluation.protocol_json import LoadedProtocol, load_protocol
-from diff4splat.training.evaluation.records import Score
-from diff4splat.training.evaluation.subjects import Generator
-from diff4splat.training.evaluation.text_measures import text_entries
 
 SEED = 4711
 """Of the worlds: no training series has it."""

@@ -12,16 +12,16 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.configs.small import small_recipe
+from diff4splat.evaluation.datasets import open_clips
+from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocol_json import LoadedProtocol
 from diff4splat.flow.guidance import Guidance
+from diff4splat.generation.settings import GenerationSettings
+from diff4splat.generation.video_sampling import Conditions, sample_video
 from diff4splat.metrics.image import psnr
-from diff4splat.models.latent_sampling import Conditions, sample_video
-from diff4splat.models.pretrained import Model
-from diff4splat.models.settings import GenerationSettings
+from diff4splat.models.hub.pretrained import Model
 from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.window import from_first_camera
-from diff4splat.training.evaluation.opening import open_clips
-from diff4splat.training.evaluation.protocol import Protocol
-from diff4splat.training.evaluation.protocol_json import LoadedProtocol
 from diff4splat.training.latents.encode import encode_clip
 from diff4splat.training.stages.model_stage import camera_rays, shown_video
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diff4splat.data.clip import ClipNote, ObjectNote
+from diff4splat.data.clip import ClipMetadata, ObjectNote
 from diff4splat.data_prep.synthetic.action import direction_seen
 from diff4splat.data_prep.synthetic.assembly import Named
 from diff4splat.data_prep.synthetic.captions.colors import color_name
@@ -72,7 +72,7 @@ def _is_seen(one: Named, camera: Camera) -> bool:
 
 def note_of(
     facts: CaptionFacts, named: tuple[Named, ...], identifier: str, variant: int
-) -> ClipNote:
+) -> ClipMetadata:
     """The note of a clip: caption, and one object note per instance."""
     events = iter(facts.events)
     objects: list[ObjectNote] = []
@@ -83,7 +83,7 @@ def note_of(
         for instance, texture in zip(one.instances, one.textures, strict=True):
             color = color_name(dominant_color(texture))
             objects.append(ObjectNote(instance=instance, name=name, color=color, motion=words))
-    return ClipNote(
+    return ClipMetadata(
         identifier=identifier,
         source=SOURCE,
         license=LICENSE,

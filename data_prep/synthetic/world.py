@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from diff4splat.data.clip import ClipNote
+from diff4splat.data.clip import ClipMetadata
 from diff4splat.geometry.camera import Camera
 
 
@@ -92,7 +92,7 @@ class Sky:
 class World:
     """A scene over time with the cameras that look at it."""
 
-    note: ClipNote
+    note: ClipMetadata
     times_s: Float64[np.ndarray, " t"]
     objects: tuple[WorldObject, ...]
     light: Light

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from diff4splat.report.phases import Advance, Phases
+from diff4splat.progress.phases import Advance, Phases
 
 CONSOLE = Console(stderr=True, highlight=False)
 

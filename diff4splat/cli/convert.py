@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.overwriting import require_inputs_kept
+from diff4splat.cli.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from diff4splat.cli import fields, installation, worlds
 from diff4splat.errors import Diff4SplatError
 
 if TYPE_CHECKING:
-    from diff4splat.report.phases import Phases
+    from diff4splat.progress.phases import Phases
 
 EXTRAS = (
     ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),

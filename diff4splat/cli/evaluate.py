@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from diff4splat.training.evaluation.subjects import Subject
+    from diff4splat.evaluation.systems import Subject
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,12 +43,12 @@ class Evaluate:
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.cli.worlds import prepare_sources
+        from diff4splat.evaluation.captions import grammar_caption
+        from diff4splat.evaluation.datasets import open_clips
+        from diff4splat.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
+        from diff4splat.evaluation.measuring import Setup
+        from diff4splat.evaluation.protocol_json import load_protocol
         from diff4splat.metrics.features.load import load_features
-        from diff4splat.training.evaluation.captions import grammar_caption
-        from diff4splat.training.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
-        from diff4splat.training.evaluation.measuring import Setup
-        from diff4splat.training.evaluation.opening import open_clips
-        from diff4splat.training.evaluation.protocol_json import load_protocol
 
         loaded, phases = load_protocol(self.protocol), ConsolePhases()
         if self.size is not None:
@@ -82,14 +82,14 @@ class Evaluate:
         from dataclasses import replace
         from functools import partial
 
-        from diff4splat.models.pipeline import Diff4SplatPipeline
-        from diff4splat.models.settings import GenerationSettings
-        from diff4splat.training.evaluation.subjects import (
+        from diff4splat.evaluation.systems import (
             Generator,
             Reconstructor,
             model_identity,
             reconstruct_clip,
         )
+        from diff4splat.generation.pipeline import Diff4SplatPipeline
+        from diff4splat.generation.settings import GenerationSettings
 
         settings = GenerationSettings(steps=self.steps)
         pipeline = Diff4SplatPipeline.from_pretrained(self.model)

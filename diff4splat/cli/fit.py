@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.overwriting import require_inputs_kept
+from diff4splat.cli.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from diff4splat.data.capture.capture import Capture
+    from diff4splat.fitting.settings import FitSettings
     from diff4splat.scene.scene import Scene
-    from diff4splat.training.per_scene.settings import FitSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +78,12 @@ class Fit:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import compile_ahead, prepare_renderer
+        from diff4splat.fitting.checkpoint import FILE
+        from diff4splat.fitting.fit import FitRun, fit_scene
+        from diff4splat.fitting.frame_renderer import Sight
+        from diff4splat.fitting.results import RESULT_FILES, FitReport, write_results
+        from diff4splat.progress.run_log import RunLog
         from diff4splat.render.trace import warm as tracer
-        from diff4splat.report.run_log import RunLog
-        from diff4splat.training.per_scene.checkpoint import FILE
-        from diff4splat.training.per_scene.fit import FitRun, fit_scene
-        from diff4splat.training.per_scene.results import RESULT_FILES, FitReport, write_results
-        from diff4splat.training.per_scene.sight import Sight
 
         settings = self.settings()
         outputs = [self.out / name for name in (*RESULT_FILES, FILE)]
@@ -126,8 +126,8 @@ class Fit:
         """Checked before anything is read."""
         from dataclasses import replace
 
-        from diff4splat.training.per_scene.settings import FitSettings
-        from diff4splat.training.per_scene.settings_json import changed
+        from diff4splat.fitting.settings import FitSettings
+        from diff4splat.fitting.settings_json import changed
 
         if self.minutes is not None and not self.minutes > 0:
             raise ConfigError(f"--minutes: expected more than 0, got {self.minutes:g}")
@@ -179,7 +179,7 @@ def shown(value: "float | list[float]") -> str:
 
 def summary(report) -> str:
     """Quality in one line."""
-    from diff4splat.training.per_scene.results import quality_facts
+    from diff4splat.fitting.results import quality_facts
 
     held, trained = quality_facts(report.result.held_out), quality_facts(report.result.training)
     judged = "nothing held out"

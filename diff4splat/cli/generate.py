@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
-from diff4splat.cli.overwriting import require_inputs_kept
+from diff4splat.cli.guard_overwrite import require_inputs_kept
 
 if TYPE_CHECKING:
-    from diff4splat.models.picture import Picture
-    from diff4splat.models.settings import GenerationSettings
+    from diff4splat.generation.settings import GenerationSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,21 +60,21 @@ class Generate:
         """Check everything cheap first, then generate, render and write."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.renderer import left_out, prepare_renderer
+        from diff4splat.generation.input_cameras import path_frame, reconcile_intrinsics
+        from diff4splat.generation.pipeline import Diff4SplatPipeline
         from diff4splat.io.atomic import atomic_folder
-        from diff4splat.models.base_scene import PLANE_DEPTH
-        from diff4splat.models.context import agree_on_lens, view_of
-        from diff4splat.models.pipeline import Diff4SplatPipeline
+        from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+        from diff4splat.outputs.card import Result, describe, write_card
+        from diff4splat.outputs.scene_folder import OUTPUT_FILES, render_frames, write_scene_folder
         from diff4splat.paths.summary import summarize
-        from diff4splat.report.card import Result, describe, write_card
-        from diff4splat.report.run_log import RunLog
-        from diff4splat.report.scene_folder import OUTPUT_FILES, render_frames, write_scene_folder
+        from diff4splat.progress.run_log import RunLog
 
         outputs = [self.out / name for name in OUTPUT_FILES]
         require_inputs_kept((self.image, Path(self.camera)), outputs)
         settings, log = self.settings(), RunLog(phases=ConsolePhases())
         picture = self.picture()
-        asked = choose_path(self.camera, view_of(picture.camera), self.options)
-        picture, path = agree_on_lens(picture, asked)
+        asked = choose_path(self.camera, path_frame(picture.camera), self.options)
+        picture, path = reconcile_intrinsics(picture, asked)
         note("; ".join((f"focal length: {picture.focal_source}", *picture.notes)))
         for warning in summarize(path, PLANE_DEPTH).warnings:
             note(f"camera path: {warning}")
@@ -98,13 +97,13 @@ class Generate:
     def settings(self) -> "GenerationSettings":
         """Seed, prompt, sampling, guidance and pruning, checked before anything is loaded."""
         from diff4splat.flow.guidance import DEFAULT_GUIDANCE
-        from diff4splat.models.pretrained import find_config
-        from diff4splat.models.prompt import require_prompt
-        from diff4splat.models.settings import (
+        from diff4splat.generation.settings import (
             GenerationSettings,
             MotionSettings,
             require_seed,
         )
+        from diff4splat.models.hub.pretrained import find_config
+        from diff4splat.models.text_encoder.prompt import require_prompt
 
         require_seed(self.seed)
         if self.prompt is not None:
@@ -122,12 +121,12 @@ class Generate:
 
     def picture(self) -> "Picture":
         """The photograph at the model's size."""
-        from diff4splat.models.picture import load_picture
-        from diff4splat.models.pretrained import find_multiple_px, find_side_px
+        from diff4splat.generation.input_image import load_image
+        from diff4splat.models.hub.pretrained import find_multiple_px, find_side_px
 
         side_px = find_side_px(self.model) if self.resolution is None else self.resolution
         multiple_px = find_multiple_px(self.model, side_px)
-        return load_picture(self.image, side_px, self.fov, self.convert, multiple_px)
+        return load_image(self.image, side_px, self.fov, self.convert, multiple_px)
 
     def inputs(
         self, picture: "Picture", settings: "GenerationSettings", model_fingerprint: str

@@ -35,8 +35,8 @@ class Inspect:
 
 def size_lines(name: str) -> list[str]:
     """Parameters per network, counted on the meta device."""
+    from diff4splat.models.config.sizes import size_by_name
     from diff4splat.models.factory import parameter_counts
-    from diff4splat.models.sizes import size_by_name
 
     counts = parameter_counts(size_by_name(name))
     width = max(map(len, counts))
@@ -51,9 +51,9 @@ def size_lines(name: str) -> list[str]:
 def model_lines(name: str) -> list[str]:
     """Parts with their state, where the weights lie, their hash, licence and origin."""
     from diff4splat.models.factory import parameter_counts
-    from diff4splat.models.model_facts import model_facts
+    from diff4splat.models.hub.model_info import model_info
 
-    facts = model_facts(name)
+    facts = model_info(name)
     counts = parameter_counts(facts.config)
     rows = [f"{part:<16}{count:>16,}  {facts.states[part]}" for part, count in counts.items()]
     told = {

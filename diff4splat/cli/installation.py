@@ -14,8 +14,8 @@ COMPILE_S = 20
 COMPILE_TRACER_S = 40
 """The same of the ray tracer."""
 LIBRARIES = (
-    "diff4splat.models.pipeline",
-    "diff4splat.report.scene_folder",
+    "diff4splat.generation.pipeline",
+    "diff4splat.outputs.scene_folder",
     "diff4splat.render.raster.warm",
     "diff4splat.render.trace.warm",
 )

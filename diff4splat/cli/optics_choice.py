@@ -78,7 +78,7 @@ def choose_effects(
         ConfigError: options that contradict each other, or a lens that is no fisheye.
         InputError: a lens that cannot be, or a frame that is not over when the next begins.
     """
-    from diff4splat.report.camera_dataset.sequences import EffectChoice, effect_sequences
+    from diff4splat.outputs.camera_dataset.sequences import EffectChoice, effect_sequences
 
     full = _with_every_effect(options, path)
     lens, lens_path = lens_of(full, path)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from diff4splat.cli.overwriting import require_inputs_kept
+from diff4splat.cli.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 MEGABYTE = 1e6
@@ -30,11 +30,11 @@ class Pack:
     def run(self) -> None:
         """Check, write, and print what each part takes."""
         from diff4splat.cli.console import note
-        from diff4splat.models.packing import pack_model
-        from diff4splat.models.pretrained import load_model
+        from diff4splat.models.hub.export import export_model
+        from diff4splat.models.hub.pretrained import load_model
 
         self._require_usable()
-        packed = pack_model(
+        packed = export_model(
             load_model(self.model),
             self.out,
             license=self.license,

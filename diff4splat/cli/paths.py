@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
-from diff4splat.cli.overwriting import require_inputs_kept
+from diff4splat.cli.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ class PreviewPath:
         """Print what the camera does, then write the drawing."""
         from diff4splat.cli.console import note
         from diff4splat.geometry.camera import focal_from_fov, pinhole
+        from diff4splat.outputs.path_plot import save_path_preview
         from diff4splat.paths.settings import PathFrame
         from diff4splat.paths.summary import summarize
-        from diff4splat.report.plot import save_path_preview
 
         require_inputs_kept((Path(self.camera),), (self.out,))
         if self.out.suffix.lower() not in PICTURE_SUFFIXES:

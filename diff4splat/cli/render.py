@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.camera_choice import CameraOptions, choose_path
+from diff4splat.cli.guard_overwrite import require_inputs_kept
 from diff4splat.cli.optics_options import OpticsOptions, require_consistent
-from diff4splat.cli.overwriting import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.paths.camera_path import CameraPath
-    from diff4splat.report.run_log import RunLog
+    from diff4splat.progress.run_log import RunLog
     from diff4splat.scene.scene import Scene
 
 
@@ -45,8 +45,8 @@ class Render:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.renderer import left_out, prepare_renderer
         from diff4splat.io.scene_file import load_scene
-        from diff4splat.report.run_log import RunLog
-        from diff4splat.report.scene_folder import VIEW_SUFFIXES, write_view
+        from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, write_view
+        from diff4splat.progress.run_log import RunLog
 
         if self.time is not None and not math.isfinite(self.time):
             raise ConfigError(f"--time: expected seconds, got {self.time:g}")
@@ -77,8 +77,8 @@ class Render:
     def film(self, scene: "Scene", path: "CameraPath", log: "RunLog") -> None:
         """Through a physical camera."""
         from diff4splat.cli.console import note
-        from diff4splat.cli.filming import film_dataset, film_file
-        from diff4splat.report.photographs import stopped
+        from diff4splat.cli.render_physical import film_dataset, film_file
+        from diff4splat.outputs.photographs import stopped
 
         if self.dataset:
             film_dataset(scene, path, self.optics, self.out, self.time, log)

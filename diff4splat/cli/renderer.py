@@ -5,8 +5,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from diff4splat.progress.phases import Phases
     from diff4splat.render.settings import RenderJob
-    from diff4splat.report.phases import Phases
     from diff4splat.scene.gaussians import Gaussians
     from diff4splat.scene.scene import Scene
 

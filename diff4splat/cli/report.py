@@ -20,7 +20,7 @@ class ErrorTime:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
-        from diff4splat.report import error_time
+        from diff4splat.error_time import report as error_time
 
         phases = ConsolePhases()
         # Knobs of the renderer must not count its compilation.
@@ -36,7 +36,7 @@ class ListKnobs:
 
     def run(self) -> None:
         """Print one line per knob."""
-        from diff4splat.report.known_knobs import known_knobs
+        from diff4splat.error_time.known_knobs import known_knobs
 
         for knob in known_knobs():
             settings = ", ".join(str(setting) for setting in knob.settings)

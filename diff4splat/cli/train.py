@@ -9,7 +9,7 @@ import tyro
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
-    from diff4splat.models.pretrained import Model
+    from diff4splat.models.hub.pretrained import Model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ class Train:
 
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""
-        from diff4splat.models.pretrained import load_model, with_text_encoder
+        from diff4splat.models.hub.pretrained import load_model, with_text_encoder
 
         if self.from_model is None:
             return None

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from diff4splat.report.phases import Phases
-    from diff4splat.training.evaluation.protocol import SourceRange
+    from diff4splat.evaluation.protocol import SourceRange
+    from diff4splat.progress.phases import Phases
     from diff4splat.training.recipe import SourceSettings
 
 COMPILE_S = 20

@@ -70,7 +70,7 @@ class ObjectNote:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ClipNote:
+class ClipMetadata:
     """Where a clip comes from and what it shows; JSON beside the arrays."""
 
     identifier: str
@@ -87,7 +87,7 @@ class ClipNote:
 class Clip:
     """Everything known about one scene over ``t`` frames; ``views[0]`` is the input view."""
 
-    note: ClipNote
+    note: ClipMetadata
     times_s: Float[Tensor, " t"]
     views: tuple[View, ...]
     tracks: Tracks | None = None

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.models.config_parts import TIME_STRIDE
+from diff4splat.models.config.networks import TIME_STRIDE
 
 
 def patchify(

@@ -8,25 +8,25 @@ import torch
 
 from diff4splat.errors import ShapeError
 from diff4splat.flow.path import add_noise, velocity
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.reconstruction import Canonical, deform
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.geometry.depth import depth_from_distance, distance_from_depth, unproject
 from diff4splat.geometry.lenses.pinhole import Pinhole
 from diff4splat.geometry.optics import Optics, Shutter
 from diff4splat.geometry.rays import camera_rays, pixel_centers, plucker_map, world_rays
-from diff4splat.models.base_scene import PLANE_DEPTH
-from diff4splat.models.deformation import DeformationNetwork
-from diff4splat.models.deformation_heads import DeformationUnits
-from diff4splat.models.maps import ReconstructionMaps
-from diff4splat.models.picture import Picture
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.reconstruction import Canonical, deform
-from diff4splat.models.settings import GenerationSettings
-from diff4splat.models.sizes import size_by_name
+from diff4splat.models.config.sizes import size_by_name
+from diff4splat.models.deformation.keyframes import DeformationUnits
+from diff4splat.models.deformation.network import DeformationNetwork
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
 from diff4splat.render.physical.lines import line_shares
-from diff4splat.report.run_log import RunLog
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -249,7 +249,7 @@ def generated() -> Scene:
     """An untrained scene of a smooth picture along a two-second path."""
     y, x = torch.meshgrid(torch.linspace(0, 6, 32), torch.linspace(0, 6, 32), indexing="ij")
     rgb = torch.stack([x.sin(), y.cos(), (x + y).sin()], -1) * 0.4 + 0.5
-    picture = Picture(rgb=rgb, camera=pinhole(30.0, (32, 32)), focal_source="test")
+    picture = InputImage(rgb=rgb, camera=pinhole(30.0, (32, 32)), focal_source="test")
     pipeline = Diff4SplatPipeline.from_pretrained("test")
     return pipeline(picture, "right", settings=GenerationSettings(steps=1))
 
@@ -260,7 +260,7 @@ def test_first_camera(generated: Scene) -> None:
     foreign = generated.path.cameras.world_from_camera[:3] @ elsewhere
     cameras = generated.path.cameras[:3].with_pose(elsewhere @ foreign)
     path = CameraPath(cameras=cameras, times_s=torch.arange(3.0))
-    picture = Picture(rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="")
+    picture = InputImage(rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="")
     pipeline = Diff4SplatPipeline.from_pretrained("test")
     scene = pipeline(picture, path, settings=GenerationSettings(steps=1))
     torch.testing.assert_close(scene.path.cameras.world_from_camera[0], torch.eye(4))
@@ -277,7 +277,7 @@ def test_time(generated: Scene) -> None:
     canonical = Canonical(
         gaussians=generated.gaussians,
         cells=torch.arange(len(generated.gaussians)),
-        maps=ReconstructionMaps(
+        maps=RawGaussianMaps(
             gaussians=torch.zeros(1, 12, 5, 32, 32), tokens=torch.randn(1, 24, 2, 2, 2)
         ),
     )

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from diff4splat.models.config.sizes import SIZES, size_by_name
 from diff4splat.models.factory import PARTS
-from diff4splat.models.pretrained import load_model
-from diff4splat.models.provenance import NOT_STATED
-from diff4splat.models.shipped import CARD_FILE, WEIGHTS_FOLDER
-from diff4splat.models.sizes import SIZES, size_by_name
+from diff4splat.models.hub.bundled_weights import CARD_FILE, WEIGHTS_FOLDER
+from diff4splat.models.hub.pretrained import load_model
+from diff4splat.models.hub.provenance import NOT_STATED
 
 ROOT = Path(__file__).parents[2]
 FILES = {"config.json", "provenance.json", "SHA256SUMS", CARD_FILE}

@@ -48,9 +48,9 @@ def test_weights_and_protocols_are_installed_as_data(
 ) -> None:
     for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
-    weights, protocols = "models/weights/small", "training/evaluation/protocols"
+    weights, protocols = "models/weights/small", "diff4splat/evaluation/protocols"
     expected = {f"{weights}/{name}" for name in SHIPPED} | {f"{protocols}/held_out_v1.json"}
-    modules = [f"{name}/__init__.py" for name in ("diff4splat", *MOUNTED, "training/evaluation")]
+    modules = [f"{name}/__init__.py" for name in ("diff4splat", *MOUNTED, "diff4splat/evaluation")]
     for name in [*expected, *modules, f"{protocols}/__init__.py"]:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()

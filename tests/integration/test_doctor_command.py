@@ -349,7 +349,7 @@ def test_train_compiles_what_draws_its_worlds_ahead(
 def test_eval_compiles_what_draws_its_worlds_ahead(
     cold_drawing: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("diff4splat.training.evaluation.evaluate.evaluate", stopped)
+    monkeypatch.setattr("diff4splat.evaluation.evaluate.evaluate", stopped)
     assert run(["eval", "--model", "test", "--out", str(tmp_path)]) == 2
     assert cold_drawing == list(DRAWING)
 

@@ -8,14 +8,14 @@ import pytest
 import torch
 
 from diff4splat.cli.main import run
+from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.io.exr import read_depth_exr
 from diff4splat.io.images import read_photo, write_png
 from diff4splat.io.ply import read_ply
 from diff4splat.io.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
-from diff4splat.models.pipeline import Diff4SplatPipeline
+from diff4splat.outputs import scene_folder
 from diff4splat.render.api import render, render_video
-from diff4splat.report import scene_folder
 
 FILES = {"scene.safetensors", "video.mp4", "depth.exr", "preview.png", "card.json"}
 

@@ -10,7 +10,7 @@ from training_commands import contents, refusal, rows
 
 from diff4splat.cli.main import run
 from diff4splat.models.factory import PARTS
-from diff4splat.models.pretrained import load_model
+from diff4splat.models.hub.pretrained import load_model
 from diff4splat.training.latents.stored import read_packs
 
 SHORT = ("--set", "stages.generator.steps=2")

@@ -11,8 +11,8 @@ from training_commands import refusal
 from diff4splat.cli.main import run
 from diff4splat.io.images import write_png
 from diff4splat.models.factory import PARTS
-from diff4splat.models.pretrained import load_model
-from diff4splat.models.weight_files import part_file, weights_sha256
+from diff4splat.models.hub.pretrained import load_model
+from diff4splat.models.hub.weights import part_file, weights_sha256
 
 STATED = ("--license", "Apache-2.0", "--origin", "made by a test")
 
@@ -87,7 +87,7 @@ def test_inspect_tells_what_is_trained(
 def test_inspect_of_random_weights(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("diff4splat.models.shipped.WEIGHTS_FOLDER", tmp_path)
+    monkeypatch.setattr("diff4splat.models.hub.bundled_weights.WEIGHTS_FOLDER", tmp_path)
     assert run(["inspect", "--model", "test"]) == 0
     shown = rows(capsys.readouterr().out)
     assert {shown[part][-1] for part in PARTS} == {"random"}

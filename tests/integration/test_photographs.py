@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import torch
 
+from diff4splat.generation.input_image import InputImage, choose_focal, prepare_image
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.geometry.rays import pixel_centers
 from diff4splat.metrics.image import psnr
-from diff4splat.models.picture import Picture, choose_focal, prepare_picture
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.settings import GenerationSettings
 from diff4splat.render.api import render
 from diff4splat.scene.scene import Scene
 
@@ -24,14 +24,14 @@ SIDES_PX = (128, 256)
 pytestmark = pytest.mark.photo
 
 
-def photograph(name: str, side_px: int) -> Picture:
+def photograph(name: str, side_px: int) -> InputImage:
     data = pytest.importorskip("skimage.data", reason="needs scikit-image's photographs")
     rgb = torch.from_numpy(getattr(data, name)()).float() / 255
     focal = choose_focal((rgb.shape[0], rgb.shape[1]), None, None)
-    return prepare_picture(rgb, focal, side_px)
+    return prepare_image(rgb, focal, side_px)
 
 
-def scene_of(picture: Picture, camera: str) -> Scene:
+def scene_of(picture: InputImage, camera: str) -> Scene:
     pipeline = Diff4SplatPipeline.from_pretrained("test")
     return pipeline(picture, camera, settings=GenerationSettings(steps=1))
 

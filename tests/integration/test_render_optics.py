@@ -23,8 +23,8 @@ from diff4splat.io.camera_record import read_camera_record
 from diff4splat.io.exr import read_depth_exr
 from diff4splat.io.images import write_png
 from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.outputs.camera_dataset.sequences import EFFECTS
 from diff4splat.render.physical.api import photograph
-from diff4splat.report.camera_dataset.sequences import EFFECTS
 
 
 @pytest.fixture(scope="module")

@@ -27,8 +27,8 @@ from training_commands import (
 )
 
 from diff4splat.cli.main import run
+from diff4splat.evaluation.protocol_json import protocol_json
 from diff4splat.io.images import write_png
-from diff4splat.training.evaluation.protocol_json import protocol_json
 from diff4splat.training.prerequisites import last_checkpoint
 
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from stage_fixtures import stage_recipe
 
-from diff4splat.models.config import DetailConfig, ModelConfig
-from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.models.config.model import DetailConfig, ModelConfig
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import StageRecipe
 

@@ -17,7 +17,7 @@ from oracles_clip_world import (
     see,
 )
 
-from diff4splat.data.clip import Clip, ClipNote, Flow, ObjectNote, Tracks, View
+from diff4splat.data.clip import Clip, ClipMetadata, Flow, ObjectNote, Tracks, View
 from diff4splat.geometry.camera import Camera
 
 
@@ -58,13 +58,13 @@ def make_clip(
     )
 
 
-def _note(seed: int, static: bool) -> ClipNote:
+def _note(seed: int, static: bool) -> ClipMetadata:
     motions = ("", "" if static else "moves to the right", "")
     objects = tuple(
         ObjectNote(instance=index + 1, name=kind, color="grey", motion=motion)
         for index, (kind, motion) in enumerate(zip(KINDS, motions, strict=True))
     )
-    return ClipNote(
+    return ClipMetadata(
         identifier=f"clip-{seed}",
         source="oracle 1",
         license="CC0-1.0",

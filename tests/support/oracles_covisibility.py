@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from diff4splat.data.clip import Clip, ClipNote, Tracks, View
+from diff4splat.data.clip import Clip, ClipMetadata, Tracks, View
+from diff4splat.evaluation.protocol import Judged
+from diff4splat.evaluation.sample import Case
 from diff4splat.geometry.camera import Camera, pinhole
-from diff4splat.training.evaluation.case import Case
-from diff4splat.training.evaluation.protocol import Judged
 
 
 def seen_by_loops(case: Case) -> np.ndarray:
@@ -83,7 +83,7 @@ FLAT_FRAMES, FLAT_SIZE, FLAT_DEPTH = 5, (8, 10), 4.0
 def flat_case(given: tuple[int, ...] = (0, 2, 4), pair: tuple[int, int] = (1, 1)) -> Case:
     """Two equal cameras that stand before a wall; instance 1, with a tracked point that stays."""
     clip = Clip(
-        note=ClipNote(identifier="flat", source="flat 1", license="CC0-1.0"),
+        note=ClipMetadata(identifier="flat", source="flat 1", license="CC0-1.0"),
         times_s=torch.arange(FLAT_FRAMES, dtype=torch.float64) / 12,
         views=(_flat_view(), _flat_view()),
         tracks=tracked(torch.zeros(FLAT_FRAMES, 1, 3), [1]),

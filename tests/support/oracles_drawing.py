@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from diff4splat.data.clip import ClipNote
+from diff4splat.data.clip import ClipMetadata
 from diff4splat.data_prep.synthetic.world import Light, Mesh, Sky, Texture, World, WorldObject
 from diff4splat.geometry.camera import Camera
 
@@ -148,7 +148,9 @@ def cameras(frames: int, size_px=(24, 32), start=(0.0, -1.6, -4.0), side: float 
 def world(objects, views, frames: int = 3, **changes) -> World:
     return World(
         **{
-            "note": ClipNote(identifier="test", source="test", license="CC0-1.0", metric="exact"),
+            "note": ClipMetadata(
+                identifier="test", source="test", license="CC0-1.0", metric="exact"
+            ),
             "times_s": np.arange(frames) / 8.0,
             "objects": tuple(objects),
             "light": light(),

@@ -6,7 +6,11 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from diff4splat.data.clip import Clip, ClipNote, ObjectNote, Tracks, View
+from diff4splat.data.clip import Clip, ClipMetadata, ObjectNote, Tracks, View
+from diff4splat.evaluation.protocol import Judged, Protocol
+from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.sample import Case
+from diff4splat.evaluation.systems import Identity
 from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
@@ -15,10 +19,6 @@ from diff4splat.scene.harmonics import dc_from_color
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
-from diff4splat.training.evaluation.case import Case
-from diff4splat.training.evaluation.protocol import Judged, Protocol
-from diff4splat.training.evaluation.protocol_json import load_protocol
-from diff4splat.training.evaluation.subjects import Identity
 
 SIZE, FRAMES, LAST_S = (32, 40), 5, 1.0
 BACK, FRONT = 4.0, 3.0
@@ -106,7 +106,7 @@ def filmed(scene: Scene, identifier: str = "filmed", still: bool = False) -> Cli
     views = tuple(_view(scene, view, times_s, positions) for view in range(2))
     found = torch.full((len(index), 2), -1, dtype=torch.long)
     return Clip(
-        note=ClipNote(
+        note=ClipMetadata(
             identifier=identifier,
             source="filmed 1",
             license="CC0-1.0",

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 import torch
 
-from diff4splat.models import shipped
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
-from diff4splat.models.packing import pack_model
-from diff4splat.models.pretrained import Model, load_model, save_model
-from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.models.hub import bundled_weights as shipped
+from diff4splat.models.hub.export import export_model
+from diff4splat.models.hub.pretrained import Model, load_model, save_model
 
 TRAINED = ("vae", "ldrm", "deformation")
 
@@ -30,7 +30,7 @@ def trained_folder(folder: Path, trained: tuple[str, ...] = TRAINED) -> Path:
 def packed_folder(tmp_path: Path, trained: tuple[str, ...] = TRAINED) -> Path:
     """The same, packed."""
     model = load_model(trained_folder(tmp_path / "run-model", trained))
-    pack_model(model, tmp_path / "weights" / "test", license="MIT", origin="made by a test")
+    export_model(model, tmp_path / "weights" / "test", license="MIT", origin="made by a test")
     return tmp_path / "weights" / "test"
 
 

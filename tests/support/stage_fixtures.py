@@ -7,7 +7,7 @@ from oracles_clips import make_clip
 from torch import Tensor
 
 from diff4splat.configs.recipes import recipe_by_name
-from diff4splat.models.config import ModelConfig
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, join_cameras
-from diff4splat.models.detail.sight import camera_frames
+from diff4splat.models.ldrm.refinement.posed_video import camera_frames
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,9 +11,9 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, Tracks, View
-from diff4splat.models.base_scene import PLANE_DEPTH
-from diff4splat.models.config_parts import MOTION_CELL_PX, TIME_STRIDE
-from diff4splat.models.video_motion import UNIT
+from diff4splat.models.config.networks import MOTION_CELL_PX, TIME_STRIDE
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.motion_unet.motion_field import UNIT
 from diff4splat.training.batches.targets import INPUT_VIEW, LEAST_MOTION
 
 

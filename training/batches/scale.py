@@ -1,7 +1,7 @@
 """The unit of length that a model sees.
 
 One picture does not tell its scale, so every clip is scaled until the median depth of its first
-input frame is where the photograph's plane stands (``models/base_scene.py``). Camera paths at
+input frame is where the photograph's plane stands (``models/ldrm/plane_prior.py``). Camera paths at
 generation time are in the same unit.
 """
 
@@ -14,7 +14,7 @@ from torch import Tensor
 from diff4splat.data.clip import Clip, View
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
-from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 
 
 def normalized(clip: Clip, least_depth_share: float = 0.01) -> Clip:

@@ -19,13 +19,13 @@ from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
 from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
 from diff4splat.errors import InputError
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.render_condition import render_condition_latent
 from diff4splat.geometry.camera import stack_cameras
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.draft import draft_latent
-from diff4splat.models.picture import Picture
-from diff4splat.models.pretrained import Model
-from diff4splat.models.video_motion import packed_motion
-from diff4splat.report.phases import Phases
+from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.motion_unet.motion_field import pack_motion
+from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.augment import mirrored
 from diff4splat.training.batches.motion_truth import motion_truth
 from diff4splat.training.batches.resize import resized
@@ -107,10 +107,10 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
     view, frames = clip.views[0], slice(None, data.clip_frames, data.input_stride)
     rgb, cameras = unit_rgb(view.rgb[frames]), view.cameras[frames].to(torch.float32)
     latent = model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean
-    picture = Picture(rgb=rgb[0], camera=cameras[0], focal_source="clip")
+    picture = InputImage(rgb=rgb[0], camera=cameras[0], focal_source="clip")
     return LatentPack(
         latent=latent,
-        draft=draft_latent(model, picture, cameras) if model.config.dit.draft else None,
+        draft=render_condition_latent(model, picture, cameras) if model.config.dit.draft else None,
         motion=true_motion(model, clip, data),
         cameras=stack_cameras([cameras]),
         is_static=torch.tensor([clip.note.is_static]),
@@ -122,5 +122,5 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
 def true_motion(model: Model, clip: Clip, data: DataSettings) -> Float[Tensor, "1 m t h w"]:
     """For a model that makes one; otherwise without channels."""
     cells = motion_truth(clip, data.input_stride)[None]
-    packed = packed_motion(cells, model.config.vae.space_stride)
+    packed = pack_motion(cells, model.config.vae.space_stride)
     return packed[:, : model.config.motion_channels]

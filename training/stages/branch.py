@@ -23,7 +23,7 @@ from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.level_draws import LevelDraw, draw_levels, level_weights
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.captioned import CaptionedStage
+from diff4splat.training.stages.captioned import TextConditionedStage
 from diff4splat.training.stages.generator import JUDGED_LEVELS
 from diff4splat.training.stages.model_stage import StagePlan
 from diff4splat.training.stages.panels import Row, panel
@@ -47,7 +47,7 @@ class NoisyMotion:
         return add_noise(self.clean, self.noise, self.level)
 
 
-class BranchStage(CaptionedStage):
+class MotionDiffusionStage(TextConditionedStage):
     """One branch of the video model."""
 
     parts = ("text_encoder", "dit")

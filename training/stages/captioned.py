@@ -8,8 +8,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.data_prep.synthetic.captions.variety import said_otherwise
-from diff4splat.models.text_encoder import tokenize
+from diff4splat.data_prep.synthetic.captions.paraphrase import said_otherwise
+from diff4splat.models.text_encoder.encoder import tokenize
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.stages.model_stage import ModelStage
@@ -18,7 +18,7 @@ UNSAID = "a scene"
 """What clips without a caption say, so that every process runs the text encoder alike."""
 
 
-class CaptionedStage(ModelStage):
+class TextConditionedStage(ModelStage):
     """A stage with a text encoder."""
 
     def text(

@@ -18,10 +18,10 @@ from torch import Tensor, nn
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.depth import depth_pearson
 from diff4splat.metrics.masked import masked_mean, mean_or_nan
-from diff4splat.models.base_scene import PLANE_DEPTH
-from diff4splat.models.config_parts import TIME_STRIDE
-from diff4splat.models.detail.stabilise import key_depth
+from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.factory import Networks
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.log_depth import edge_error, own_scale
 from diff4splat.training.stage import TOTAL

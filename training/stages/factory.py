@@ -6,10 +6,10 @@ from types import MappingProxyType
 from diff4splat.models.factory import Networks
 from diff4splat.training.recipe import StageKind
 from diff4splat.training.stages.autoencoder import AutoencoderStage
-from diff4splat.training.stages.branch import BranchStage
+from diff4splat.training.stages.branch import MotionDiffusionStage
 from diff4splat.training.stages.depth import DepthStage
-from diff4splat.training.stages.generated import GeneratedStage
-from diff4splat.training.stages.generator import GeneratorStage
+from diff4splat.training.stages.generated import ImageTo4dFinetuneStage
+from diff4splat.training.stages.generator import VideoDiffusionStage
 from diff4splat.training.stages.joint import JointStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
 from diff4splat.training.stages.reconstruction import (
@@ -18,7 +18,7 @@ from diff4splat.training.stages.reconstruction import (
     SightStage,
     StaticStage,
 )
-from diff4splat.training.stages.told import ToldStage
+from diff4splat.training.stages.told import ImageTo4dStage
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
     {
@@ -27,12 +27,12 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "static": StaticStage,
         "motion": MotionStage,
         "depth": DepthStage,
-        "told": ToldStage,
-        "branch": BranchStage,
+        "told": ImageTo4dStage,
+        "branch": MotionDiffusionStage,
         "dynamic": DynamicStage,
-        "generator": GeneratorStage,
+        "generator": VideoDiffusionStage,
         "joint": JointStage,
-        "generated": GeneratedStage,
+        "generated": ImageTo4dFinetuneStage,
     }
 )
 

@@ -14,26 +14,26 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.path import velocity_from_clean
-from diff4splat.models.settings import MotionSettings
+from diff4splat.generation.settings import MotionSettings
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.branch import BranchStage
+from diff4splat.training.stages.branch import MotionDiffusionStage
 from diff4splat.training.stages.joint import STEPS
 from diff4splat.training.stages.measures import reconstruction_measures
 from diff4splat.training.stages.panels import reconstruction_panel
 from diff4splat.training.stages.prediction import Rendered
 from diff4splat.training.stages.terms import rendering_terms
-from diff4splat.training.stages.told import ToldStage
+from diff4splat.training.stages.told import ImageTo4dStage
 
 
-class GeneratedStage(BranchStage, ToldStage):
+class ImageTo4dFinetuneStage(MotionDiffusionStage, ImageTo4dStage):
     """Motion branch and reconstruction in one step."""
 
     parts = ("vae", "text_encoder", "dit", "ldrm", "deformation")
 
     def forward(self, batch: ClipBatch) -> Mapping[str, Float[Tensor, " b"]]:
         """The terms of both stages, and their sum as ``total``; no flow where it teaches nobody."""
-        flow = BranchStage.forward(self, batch) if "dit" in self.trained else {TOTAL: 0.0}
+        flow = MotionDiffusionStage.forward(self, batch) if "dit" in self.trained else {TOTAL: 0.0}
         batch = self.given(batch)
         rendered = self.generated(batch)
         scene = rendering_terms(rendered, batch, self.plan.recipe.losses, self.plan.features)
@@ -68,7 +68,7 @@ class GeneratedStage(BranchStage, ToldStage):
         """Velocity error, and the scenes of regenerated motion."""
         batch = self.given(batch)
         measures = reconstruction_measures(self.generated(batch), batch)
-        return {**BranchStage.measure(self, batch), **measures}
+        return {**MotionDiffusionStage.measure(self, batch), **measures}
 
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:

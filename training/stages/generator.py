@@ -18,17 +18,17 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.path import add_noise, clean_from_velocity
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.render_condition import render_condition_latent
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.config import ModelConfig
-from diff4splat.models.draft import draft_latent
-from diff4splat.models.picture import Picture
-from diff4splat.models.video_motion import packed_motion, with_still_motion
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.motion_unet.motion_field import append_zero_motion, pack_motion
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.level_draws import LevelDraw, draw_levels, level_weights
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.captioned import CaptionedStage
+from diff4splat.training.stages.captioned import TextConditionedStage
 from diff4splat.training.stages.model_stage import camera_rays, shown_video
 from diff4splat.training.stages.panels import Row, panel
 
@@ -59,7 +59,7 @@ class NoisyVideo:
         return self.level[:, None] * (torch.arange(frames, device=self.level.device) > 0)
 
 
-class GeneratorStage(CaptionedStage):
+class VideoDiffusionStage(TextConditionedStage):
     """Video DiT and text encoder."""
 
     parts = ("vae", "text_encoder", "dit")
@@ -91,14 +91,14 @@ class GeneratorStage(CaptionedStage):
 
     def _motion(self, batch: ClipBatch) -> Float[Tensor, "b m t h w"]:
         model = self.plan.model
-        return packed_motion(batch.motion, model.vae.space_stride)[:, : model.motion_channels]
+        return pack_motion(batch.motion, model.vae.space_stride)[:, : model.motion_channels]
 
     def _drafts(self, batch: ClipBatch) -> Float[Tensor, "b c t h w"]:
         rows = []
         for index in range(len(batch)):
             cameras, rgb = batch.cameras[index], unit_rgb(batch.video[index, 0])
-            picture = Picture(rgb=rgb, camera=cameras[0], focal_source="clip")
-            rows.append(draft_latent(self.model, picture, cameras))
+            picture = InputImage(rgb=rgb, camera=cameras[0], focal_source="clip")
+            rows.append(render_condition_latent(self.model, picture, cameras))
         return torch.cat(rows)
 
     def flow_terms(self, batch: LatentBatch) -> Terms:
@@ -159,7 +159,7 @@ class GeneratorStage(CaptionedStage):
         """The model's answer for any latent."""
         text, mask = (None, None) if without_text else self.text(batch)
         channels, draft = self.plan.model.motion_channels, batch.draft
-        draft = None if draft is None else with_still_motion(draft, channels)
+        draft = None if draft is None else append_zero_motion(draft, channels)
         return self.dit(latent, levels, camera_rays(batch.cameras), text, mask, draft)
 
     @torch.no_grad()

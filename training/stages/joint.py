@@ -16,7 +16,7 @@ from torch import Tensor
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.generator import GeneratorStage, NoisyVideo
+from diff4splat.training.stages.generator import NoisyVideo, VideoDiffusionStage
 from diff4splat.training.stages.measures import reconstruction_measures
 from diff4splat.training.stages.panels import reconstruction_panel
 from diff4splat.training.stages.reconstruction import DynamicStage
@@ -28,7 +28,7 @@ DEEPEST = 0.8
 """Above this level the clip is forgotten, and its pictures no longer judge fairly."""
 
 
-class JointStage(GeneratorStage, DynamicStage):
+class JointStage(VideoDiffusionStage, DynamicStage):
     """Both halves in one step."""
 
     parts = ("vae", "text_encoder", "dit", "ldrm", "deformation")

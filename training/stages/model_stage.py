@@ -15,10 +15,10 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import plucker_map
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.features.protocol import PerceptualFeatures
-from diff4splat.models.config import ModelConfig
-from diff4splat.models.detail.sight import Sight
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import Networks
-from diff4splat.models.pretrained import Model
+from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import StageRecipe
 from diff4splat.training.stage import Batch, SampleKey, Stage
@@ -73,7 +73,7 @@ class ModelStage(Stage):
         return self.vae.encode(network_video(batch)).mean
 
     @torch.no_grad()
-    def sight(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> Sight | None:
+    def sight(self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]) -> PosedVideo | None:
         """What the detail decoder sees: decoded pictures behind the first one, which is true.
 
         None where the model has no such decoder. Recipes may show the true pictures instead of
@@ -83,10 +83,10 @@ class ModelStage(Stage):
             return None
         truth = unit_rgb(batch.video).movedim(-1, 1)
         if self.plan.recipe.true_pictures:
-            return Sight(rgb=truth, cameras=batch.cameras)
+            return PosedVideo(rgb=truth, cameras=batch.cameras)
         decoded = (self.vae.decode(latent).float() + 1) / 2
         rgb = torch.cat([truth[:, :, :1], decoded[:, :, 1:].clamp(0, 1)], 2)
-        return Sight(rgb=rgb, cameras=batch.cameras)
+        return PosedVideo(rgb=rgb, cameras=batch.cameras)
 
     def draw(self, batch: Batch, purpose: str) -> list[torch.Generator]:
         """One generator per sample, the same on any number of processes."""

@@ -12,26 +12,26 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.reconstruction import Canonical, reconstruct, reconstruct_detailed
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.base_scene import PLANE_DEPTH, UNSEEN, plane_base
-from diff4splat.models.config import ModelConfig
-from diff4splat.models.config_parts import TIME_STRIDE
-from diff4splat.models.deformation_heads import (
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.models.deformation.keyframes import (
     DeformationState,
     DeformationUnits,
     deformation_state,
     raw_scales,
 )
-from diff4splat.models.detail.sight import Sight
-from diff4splat.models.detail.stabilise import key_depth
-from diff4splat.models.maps import ReconstructionMaps
-from diff4splat.models.picture import Picture
-from diff4splat.models.reconstruction import Canonical, reconstruct, reconstruct_detailed
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH, UNSEEN, plane_base
+from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
+from diff4splat.models.ldrm.refinement.motion_features import key_depth
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
-from diff4splat.report.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians, concatenate
 from diff4splat.training.batches.clip_batch import ClipBatch
 
@@ -51,7 +51,7 @@ class Rendered:
 
 
 def canonical_scenes(
-    maps: ReconstructionMaps, batch: ClipBatch, model: ModelConfig, sight: Sight | None = None
+    maps: RawGaussianMaps, batch: ClipBatch, model: ModelConfig, sight: PosedVideo | None = None
 ) -> list[Canonical]:
     """One set of Gaussians per sample, around its first input picture, or around its ``sight``."""
     scenes = []
@@ -62,7 +62,8 @@ def canonical_scenes(
                 reconstruct_detailed(own, sight.sample(index), model.activation, RunLog())
             )
             continue
-        base = plane_base(first_picture(batch, index), batch.cameras[index], model.ldrm.grid_stride)
+        picture = first_picture(batch, index)
+        base = plane_base(picture.rgb, picture.camera, batch.cameras[index], model.ldrm.grid_stride)
         scenes.append(reconstruct(own, base, model.activation))
     return scenes
 
@@ -109,7 +110,7 @@ def track_offsets(
     return torch.stack(rows).float().mT * PLANE_DEPTH
 
 
-def with_depth(rendered: Rendered, maps: ReconstructionMaps, model: ModelConfig) -> Rendered:
+def with_depth(rendered: Rendered, maps: RawGaussianMaps, model: ModelConfig) -> Rendered:
     """The same with the depth that the maps themselves claim."""
     if not model.detail.used:
         return rendered
@@ -151,9 +152,9 @@ def _stack(pairs: list[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
     return torch.stack(rgb), torch.stack(depth)
 
 
-def first_picture(batch: ClipBatch, index: int) -> Picture:
+def first_picture(batch: ClipBatch, index: int) -> InputImage:
     """What one sample starts from."""
-    return Picture(
+    return InputImage(
         rgb=unit_rgb(batch.video[index, 0]), camera=batch.cameras[index][0], focal_source="clip"
     )
 

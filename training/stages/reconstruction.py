@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.maps import ReconstructionMaps
+from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.measures import reconstruction_measures
@@ -99,7 +99,7 @@ class DynamicStage(StaticStage):
             rendered = moving_pictures(scenes, deformations, batch, self.plan.model)
             return with_depth(rendered, maps, self.plan.model)
 
-    def deformations(self, maps: ReconstructionMaps, batch: ClipBatch) -> list[Tensor]:
+    def deformations(self, maps: RawGaussianMaps, batch: ClipBatch) -> list[Tensor]:
         """Raw maps (b, 10, …) at every target time."""
         return list(self.deformation.at_times(maps.tokens, batch.target_time.unbind(1)))
 

@@ -16,14 +16,14 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.detail.stabilise import key_depth
+from diff4splat.generation.color_matching import InputGrid, matched_colors
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.reconstruction import Canonical, states_from_offsets
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.factory import Networks
-from diff4splat.models.input_colors import InputGrid, matched_colors
-from diff4splat.models.maps import ReconstructionMaps
-from diff4splat.models.picture import Picture
-from diff4splat.models.reconstruction import Canonical, told_states
-from diff4splat.models.settings import GenerationSettings
-from diff4splat.models.video_motion import moved_offsets, pixel_ways
+from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
+from diff4splat.models.ldrm.refinement.motion_features import key_depth
+from diff4splat.models.motion_unet.motion_field import masked_offsets, upsample_to_pixels
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stages.model_stage import StagePlan, network_rays
@@ -38,7 +38,7 @@ from diff4splat.training.stages.prediction import (
 from diff4splat.training.stages.reconstruction import DynamicStage
 
 
-class ToldStage(DynamicStage):
+class ImageTo4dStage(DynamicStage):
     """LDRM from first pictures, judged at any time; where things go is known.
 
     Their depth stays as stage ``depth`` has taught it, from far more pictures.
@@ -64,22 +64,24 @@ class ToldStage(DynamicStage):
             return with_depth(self.told_pictures(scenes, maps, batch), maps, self.plan.model)
 
     def told_pictures(
-        self, scenes: list[Canonical], maps: ReconstructionMaps, batch: ClipBatch
+        self, scenes: list[Canonical], maps: RawGaussianMaps, batch: ClipBatch
     ) -> Rendered:
         """Every target shows its own moment of the scene, moved by the motion of the batch."""
         depth = key_depth(maps.gaussians[:, -1], self.plan.model.activation)[:, 0]
         moved = []
         for index, scene in enumerate(scenes):
             picture = first_picture(batch, index)
-            told = moved_offsets(pixel_ways(batch.field[index]), batch.moving[index], depth[index])
-            states = told_states(scene, told, batch.target_time[index].tolist())
+            told = masked_offsets(
+                upsample_to_pixels(batch.field[index]), batch.moving[index], depth[index]
+            )
+            states = states_from_offsets(scene, told, batch.target_time[index].tolist())
             shown = matched(scene, picture)
             moved.append([deformed(shown, state) for state in states])
         rgb, depths = target_pictures(moved, batch)
         return Rendered(rgb=rgb, depth=depths, offsets=None)
 
 
-def matched(scene: Canonical, picture: Picture) -> Gaussians:
+def matched(scene: Canonical, picture: InputImage) -> Gaussians:
     """The Gaussians at rest with the colours that generation would give them."""
     grid = InputGrid(picture=picture, stride=1, cells=scene.every_cell)
     own = scene.gaussians

@@ -4,7 +4,7 @@ import math
 from contextlib import closing
 from functools import partial
 
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 from diff4splat.training.recipe import StageRecipe
 from diff4splat.training.stage import Stage
 from diff4splat.training.trainer.distributed import open_processes

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from diff4splat.errors import ConfigError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 from diff4splat.training.recipe import TrainerSettings
 
 Outcome = Literal["finished", "signalled", "step_limit", "time_limit"]

@@ -12,13 +12,13 @@ import numpy as np
 import torch
 
 from diff4splat import jit
-from diff4splat.data.clip import ClipNote
+from diff4splat.data.clip import ClipMetadata
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
 from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.world import Light, Mesh, Sky, Texture, World, WorldObject
 from diff4splat.geometry.camera import Camera, pinhole
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 
 def prepare_drawing(phases: Phases) -> None:
@@ -64,7 +64,7 @@ def warm(advance: Callable[[str], None] = lambda name: None) -> float:
 def _tiny_world() -> World:
     """A triangle that stands still for two frames, under a sky."""
     return World(
-        note=ClipNote(identifier="warm", source="warm", license="CC0-1.0", metric="exact"),
+        note=ClipMetadata(identifier="warm", source="warm", license="CC0-1.0", metric="exact"),
         times_s=np.array([0.0, 1.0]),
         objects=(_triangle(),),
         light=Light(

@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from typing import Any, get_args
 
-from diff4splat.data.clip import ClipNote, Metric, ObjectNote
+from diff4splat.data.clip import ClipMetadata, Metric, ObjectNote
 from diff4splat.data.entry import ClipEntry, entry_from_json, entry_to_json
 from diff4splat.data.json_fields import VERSION, dumps, loads, take, take_count, take_objects
 from diff4splat.errors import FileFormatError
@@ -11,7 +11,7 @@ from diff4splat.errors import FileFormatError
 _FORMAT = "diff4splat-clip"
 
 
-def encode_note(note: ClipNote, entry: ClipEntry) -> bytes:
+def encode_note(note: ClipMetadata, entry: ClipEntry) -> bytes:
     """JSON whose bytes depend on nothing but the values."""
     said = asdict(note)
     document = {"format": _FORMAT, "version": VERSION, **entry_to_json(entry)}
@@ -19,7 +19,7 @@ def encode_note(note: ClipNote, entry: ClipEntry) -> bytes:
     return dumps(document).encode()
 
 
-def decode_note(content: bytes, entry: ClipEntry) -> ClipNote:
+def decode_note(content: bytes, entry: ClipEntry) -> ClipMetadata:
     """The note of the clip that ``entry`` describes.
 
     Raises:
@@ -31,7 +31,7 @@ def decode_note(content: bytes, entry: ClipEntry) -> ClipNote:
             f"expected the clip of the manifest, {entry_to_json(entry)}, got other values; "
             "manifest and shard are of different sets, copy both again"
         )
-    return ClipNote(
+    return ClipMetadata(
         identifier=entry.identifier,
         source=take(document, "source", str),
         license=entry.license,

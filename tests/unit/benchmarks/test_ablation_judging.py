@@ -7,9 +7,9 @@ from clip_shards import exact_clip
 
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
+from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.factory import create_networks
-from diff4splat.models.sizes import size_by_name
-from diff4splat.training.evaluation.protocol_json import load_protocol
 
 
 class Counted:

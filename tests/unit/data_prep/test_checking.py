@@ -13,7 +13,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.checking import check_folder, tolerances_for
 from diff4splat.errors import ConfigError, FileFormatError, InputError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 
 class Counting(Phases):

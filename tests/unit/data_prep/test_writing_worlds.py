@@ -17,7 +17,7 @@ from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.data_prep.writing import WorldJob, write_worlds
 from diff4splat.errors import ConfigError, FileFormatError, OutputError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 RECIPE = WorldRecipe(seed=3, frames=5, size_px=(32, 32), views=2, still_share=0.3)
 DRAW = DrawSettings(tracks=16)

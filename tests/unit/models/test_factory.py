@@ -5,9 +5,9 @@ import pytest
 import torch
 from torch import nn
 
+from diff4splat.models.config.sizes import SIZES, paper_size, size_by_name, small_size
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import Networks, create_networks, parameter_counts
-from diff4splat.models.sizes import SIZES, paper_size, size_by_name, small_size
-from diff4splat.models.sizes import test_size as tiny_size
 
 
 def weights(part: nn.Module) -> torch.Tensor:

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
-from diff4splat.models.sizes import test_size as tiny_size
 
 LOCK = Path(__file__).parents[2] / "contract" / "state_dict_keys.json"
 REGENERATE = "python tests/unit/models/test_state_dict_keys.py"

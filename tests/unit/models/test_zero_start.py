@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
-from diff4splat.models.sizes import test_size as tiny_size
 
 STEPS = 8
 

@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
-from diff4splat.models.config import VaeConfig
-from diff4splat.models.video_vae import VideoVae
+from diff4splat.models.config.model import VaeConfig
+from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.training.linear_start import BlockMoments, set_principal_components
 
 CONFIG = VaeConfig(latent_channels=5, widths=(2, 3, 4), pixel_patch=1, linear_code=True)

@@ -12,9 +12,9 @@ from clip_shards import reading, write_shards
 from safetensors.torch import load_file
 
 from diff4splat.errors import CheckpointError, ConfigError, InputError
+from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.models.factory import create_networks
-from diff4splat.models.pipeline import Diff4SplatPipeline
-from diff4splat.models.pretrained import load_model
+from diff4splat.models.hub.pretrained import load_model
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latent_statistics import read_statistics
 from diff4splat.training.prerequisites import last_checkpoint
@@ -119,13 +119,13 @@ def test_only_what_a_stage_trains_is_in_its_checkpoints(course: Run) -> None:
 
 
 def test_the_model_folder_loads_and_makes_a_scene(course: Run) -> None:
+    from diff4splat.generation.input_image import InputImage
+    from diff4splat.generation.settings import GenerationSettings
     from diff4splat.geometry.camera import pinhole
-    from diff4splat.models.picture import Picture
-    from diff4splat.models.settings import GenerationSettings
 
     pipeline = Diff4SplatPipeline.from_pretrained(course.folder / MODEL_FOLDER)
     side = course.recipe.model.size_px[0]
-    picture = Picture(
+    picture = InputImage(
         rgb=torch.rand(*course.recipe.model.size_px, 3),
         camera=pinhole(float(side), course.recipe.model.size_px),
         focal_source="test",

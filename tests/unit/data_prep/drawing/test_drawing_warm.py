@@ -15,7 +15,7 @@ from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.data_prep.writing import WorldJob, write_worlds
 from diff4splat.errors import OutputError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 
 TINY = WorldRecipe(frames=2, views=1, size_px=(16, 16))
 

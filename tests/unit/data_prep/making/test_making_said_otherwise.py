@@ -13,7 +13,7 @@ from diff4splat.data_prep.synthetic.captions.grammar import (
     parse_caption,
 )
 from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
-from diff4splat.data_prep.synthetic.captions.variety import (
+from diff4splat.data_prep.synthetic.captions.paraphrase import (
     PLAIN,
     REWORDED,
     SHORT,

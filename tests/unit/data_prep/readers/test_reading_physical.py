@@ -17,10 +17,10 @@ from diff4splat.errors import ConfigError, FileFormatError, InputError
 from diff4splat.geometry.lenses.build import fisheye_camera
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
+from diff4splat.outputs.camera_dataset.writer import DatasetJob, write_camera_dataset
 from diff4splat.paths.physical_path import PhysicalPath, filmed
+from diff4splat.progress.run_log import RunLog
 from diff4splat.render.physical.settings import PhotoSettings
-from diff4splat.report.camera_dataset.writer import DatasetJob, write_camera_dataset
-from diff4splat.report.run_log import RunLog
 
 FRAMES = 3
 

@@ -8,7 +8,7 @@ from oracles_clips import make_clip
 
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import project
-from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.scale import normalized, rescaled
 
 

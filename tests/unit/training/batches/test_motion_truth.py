@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import torch
 
-from diff4splat.data.clip import Clip, ClipNote, Tracks, View
+from diff4splat.data.clip import Clip, ClipMetadata, Tracks, View
 from diff4splat.geometry.camera import pinhole
-from diff4splat.models.video_motion import UNIT
+from diff4splat.models.motion_unet.motion_field import UNIT
 from diff4splat.training.batches.augment import mirrored
 from diff4splat.training.batches.motion_truth import (
     cell_means,
@@ -41,7 +41,7 @@ def square(way: tuple[float, float, float]) -> Clip:
         instances=torch.tensor([2, 2, 1], dtype=torch.uint8),
         found_at=torch.zeros(3, 2, dtype=torch.long),
     )
-    note = ClipNote(identifier="square", source="test", license="CC0-1.0")
+    note = ClipMetadata(identifier="square", source="test", license="CC0-1.0")
     return Clip(note=note, times_s=torch.arange(FRAMES) / 8, views=(view,), tracks=tracks)
 
 

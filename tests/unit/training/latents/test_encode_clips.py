@@ -14,10 +14,10 @@ from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
-from diff4splat.models.config import ModelConfig
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
-from diff4splat.models.pretrained import Model
-from diff4splat.report.phases import Phases
+from diff4splat.models.hub.pretrained import Model
+from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.latents import encode
 from diff4splat.training.latents.encode import EncodingJob, encode_clips

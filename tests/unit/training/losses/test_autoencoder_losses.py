@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diff4splat.errors import ShapeError
-from diff4splat.models.video_vae import LOG_VARIANCE_RANGE
+from diff4splat.models.video_vae.vae import LOG_VARIANCE_RANGE
 from diff4splat.training.losses.autoencoder import (
     CHARBONNIER_WIDTH,
     charbonnier,

@@ -8,7 +8,7 @@ from depth_stages import MODEL, depth_recipe, with_sky
 from stage_fixtures import make_batch, make_stage, shake_heads
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.base_scene import PLANE_DEPTH
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.recipe import Recipe
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.depth import SKY_DEPTH, depth_pictures

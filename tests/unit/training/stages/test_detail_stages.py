@@ -7,8 +7,8 @@ import torch
 from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.config import DetailConfig, ModelConfig
-from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.models.config.model import DetailConfig, ModelConfig
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.recipe import StageRecipe
 from diff4splat.training.stage import TOTAL
 

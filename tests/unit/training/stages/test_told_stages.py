@@ -7,8 +7,8 @@ import torch
 from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.config import DetailConfig, ModelConfig
-from diff4splat.models.sizes import test_size as tiny_size
+from diff4splat.models.config.model import DetailConfig, ModelConfig
+from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.render.api import render
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe import Recipe, StageRecipe

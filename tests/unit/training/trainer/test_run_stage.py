@@ -12,7 +12,7 @@ import torch
 from toy_training import Toy, ToySamples, ToyStage, toy_run, weights
 
 from diff4splat.errors import CheckpointError, ConfigError, DivergenceError, InputError, ShapeError
-from diff4splat.report.phases import Phases
+from diff4splat.progress.phases import Phases
 from diff4splat.training.recipe import OptimizerSettings
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.trainer.run import run_stage

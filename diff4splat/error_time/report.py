@@ -1,0 +1,59 @@
+"""``diff4splat report error-time``: sweep knobs, write JSON, a table and one plot per knob."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from diff4splat.error_time.error_plot import save_error_time_plot
+from diff4splat.error_time.knobs import KnobRegistry
+from diff4splat.error_time.known_knobs import register_known_knobs
+from diff4splat.error_time.sweep import SweepResult, steps_of, sweep
+from diff4splat.error_time.tables import this_machine, to_markdown, write_tables
+from diff4splat.io.figures import require_matplotlib
+from diff4splat.progress.phases import Phases
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorTimeReport:
+    """What was measured, and the files that hold it."""
+
+    results: tuple[SweepResult, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def table(self) -> str:
+        """Everything as Markdown."""
+        return to_markdown(self.results, this_machine())
+
+
+def run(
+    out: Path,
+    names: Sequence[str] = (),
+    repeats: int = 3,
+    phases: Phases | None = None,
+    registry: KnobRegistry | None = None,
+) -> ErrorTimeReport:
+    """Measure the named knobs, or all, and write everything into the folder ``out``.
+
+    ``registry`` defaults to the knobs of this package.
+
+    Raises:
+        ConfigError: an unknown knob, or ``repeats`` below 1.
+        MissingExtraError: matplotlib is not installed; found before anything is measured.
+        OutputError: ``out`` cannot be written.
+    """
+    phases = Phases() if phases is None else phases
+    if registry is None:
+        registry = KnobRegistry()
+        register_known_knobs(registry)
+    knobs = registry.knobs(tuple(names))
+    require_matplotlib()
+    results = []
+    for knob in knobs:
+        with phases.phase(knob.name, steps_of(knob, repeats)) as advance:
+            results.append(sweep(knob, repeats, advance))
+    files = list(write_tables(out, results))
+    for result in results:
+        files.append(out / f"error-time-{result.knob.name}.png")
+        save_error_time_plot(result, files[-1])
+    return ErrorTimeReport(results=tuple(results), files=tuple(files))

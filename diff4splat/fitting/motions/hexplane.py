@@ -1,0 +1,74 @@
+"""A HexPlane field as numbers to be learned; its planes span what moves."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.fitting.parameter_table import ParameterTable
+from diff4splat.fitting.settings import Rates, Weights
+from diff4splat.scene.motion.hexplane.decoder import DecoderSize, make_decoder
+from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
+from diff4splat.scene.motion.hexplane.planes import HexPlaneSize, make_planes
+from diff4splat.scene.motion.hexplane.regularisers import penalties
+
+
+class HexPlaneField:
+    """Planes and decoder; nothing per Gaussian."""
+
+    def __init__(
+        self,
+        size: tuple[HexPlaneSize, DecoderSize],
+        bounds: Float[Tensor, "2 3"],
+        time_range_s: tuple[float, float],
+        seed: int,
+    ) -> None:
+        generator = torch.Generator().manual_seed(seed)
+        planes = make_planes(size[0], bounds, time_range_s, generator)
+        decoder = make_decoder(planes.feature_count, size[1], generator)
+        self._start = HexPlaneMotion(
+            planes=planes, decoder=decoder, moving_index=torch.zeros(0, dtype=torch.long)
+        )
+        self._names = tuple(self._start.tensors())
+
+    def columns(self, count: int) -> Mapping[str, Tensor]:
+        """None."""
+        del count
+        return {}
+
+    def shared(self) -> Mapping[str, Tensor]:
+        """Planes and layers, as ``HexPlaneMotion`` names them."""
+        return self._start.tensors()
+
+    def motion(
+        self, table: ParameterTable, moving_index: Int[Tensor, " m"], degree: int
+    ) -> HexPlaneMotion:
+        """The field as it is now."""
+        del degree
+        field = self._start.with_tensors({name: table[name] for name in self._names})
+        return replace(field, moving_index=moving_index)
+
+    def rates(self, rates: Rates, extent: float, progress: float) -> Mapping[str, float]:
+        """Planes learn faster than layers; the layer that tells offsets in extents."""
+        planes, decoder = rates.planes.at(progress), rates.decoder.at(progress)
+        found = {n: planes if n.startswith("planes") else decoder for n in self._names}
+        offsets = {n: decoder * extent for n in self._names if n.startswith("position.1")}
+        return found | offsets
+
+    def penalty(self, table: ParameterTable, weights: Weights) -> Tensor | None:
+        """Smooth planes, and time planes near 1."""
+        planes = self._start.with_tensors({name: table[name] for name in self._names}).planes
+        terms = penalties(planes)
+        return (
+            weights.smooth_space * terms.space
+            + weights.smooth_time * terms.time
+            + weights.time_planes * terms.static
+        )
+
+    def split_in_time(
+        self, rows: Mapping[str, Tensor], chosen: Tensor, generator: torch.Generator
+    ) -> None:
+        """None: time is not a column."""
+        del rows, chosen, generator

@@ -1,0 +1,168 @@
+"""What a fit leaves: scene file, video, a comparison with held-out frames, and a card.
+
+Axes: ``t`` frames, ``h w`` pixels.
+"""
+
+import json
+import math
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat import __version__
+from diff4splat.data.capture.capture import Capture
+from diff4splat.fitting.comparison import comparison
+from diff4splat.fitting.evaluator import FrameQuality, Judge, mean_psnr_db
+from diff4splat.fitting.fit import FitResult
+from diff4splat.fitting.pictures import FrameStore
+from diff4splat.fitting.settings import FitSettings
+from diff4splat.io.atomic import atomic_folder, write_text
+from diff4splat.io.images import write_png
+from diff4splat.io.optics_json import optics_json
+from diff4splat.io.scene_file import save_scene
+from diff4splat.outputs.card import LIBRARIES, scene_facts
+from diff4splat.outputs.scene_folder import write_view
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.progress.phases import peak_memory_bytes
+from diff4splat.progress.run_log import RunLog
+from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.scene.scene import Provenance, Scene
+
+RESULT_FILES = ("scene.safetensors", "video.mp4", "comparison.png", "card.json")
+SHOWN = 4
+"""Held-out frames in the comparison."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitReport:
+    """A fit and what it was made of."""
+
+    result: FitResult
+    capture: Capture
+    settings: FitSettings
+    inputs: dict[str, object]
+    """Of the command, for the card."""
+
+
+def scene_of(report: FitReport) -> Scene:
+    """The scene, along the way of the first training camera."""
+    result, capture = report.result, report.capture
+    return Scene(
+        gaussians=result.gaussians,
+        motion=result.motion,
+        path=shown_path(capture),
+        provenance=Provenance(
+            generator=f"diff4splat {__version__} fit --motion {report.settings.motion}",
+            model=f"{capture.source}: {capture.name}",
+            seed=report.settings.seed,
+            license=capture.license,
+        ),
+    )
+
+
+def shown_path(capture: Capture) -> CameraPath:
+    """All frames of the first training camera by time; of every camera where it has only one."""
+    learnt = ~capture.held_out
+    first = capture.camera_index[learnt][0]
+    own = (learnt & (capture.camera_index == first)).nonzero().flatten()
+    if len(own) < 2:
+        own = learnt.nonzero().flatten()
+    own = own[capture.times_s[own].argsort(stable=True)]
+    times_s, last = [], -math.inf
+    for index in own.tolist():
+        time_s = float(capture.times_s[index])
+        if time_s > last:
+            times_s.append((index, time_s))
+            last = time_s
+    kept = torch.tensor([index for index, _ in times_s])
+    cameras = capture.cameras[kept]
+    if capture.optics is not None:
+        # A path is of pinholes: as fine as the lens in the middle of the picture.
+        step = radians_per_pixel(cameras[0], capture.optics)
+        cameras = replace(cameras, focal_px=torch.full_like(cameras.focal_px, 1 / step))
+    return CameraPath(cameras=cameras, times_s=capture.times_s[kept])
+
+
+def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
+    """Write all files, or none; they replace those of an earlier call.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    scene = scene_of(report)
+    with atomic_folder(folder, RESULT_FILES) as staging:
+        save_scene(scene, staging / "scene.safetensors")
+        write_view(scene, scene.path, staging / "video.mp4", None, log)
+        write_png(_comparison(report, scene), staging / "comparison.png")
+        write_text(staging / "card.json", _card(report, scene, log))
+    return scene
+
+
+def _comparison(report: FitReport, scene: Scene) -> Float[Tensor, "h w 3"]:
+    qualities = report.result.held_out or report.result.training
+    at = torch.linspace(0, len(qualities) - 1, min(SHOWN, len(qualities))).round().long()
+    chosen = [qualities[i] for i in at.tolist()]
+    judge = Judge(sight=report.result.sight, store=FrameStore(report.capture))
+    truths = [judge.store.read(quality.frame).rgb for quality in chosen]
+    made = [judge.picture(scene, report.result.cameras, q.frame)[0] for q in chosen]
+    labels = [f"camera {q.camera}, {q.time_s:.2f} s: {q.psnr_db:.1f} dB" for q in chosen]
+    return comparison(truths, made, labels)
+
+
+def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
+    result, capture = report.result, report.capture
+    card = {
+        "diff4splat": __version__,
+        "inputs": report.inputs,
+        "capture": {
+            "name": capture.name,
+            "format": capture.source,
+            "split": str(result.split),
+            "split_reason": capture.split_reason,
+            "notes": list(capture.notes),
+            "license": capture.license,
+        },
+        "held_out": quality_facts(result.held_out),
+        "training": quality_facts(result.training),
+        "cameras_learned": result.learned,
+        "optics": None if result.cameras is None else optics_json(result.cameras.optics),
+        "finished": result.finished,
+        "settings": asdict(report.settings),
+        "provenance": asdict(scene.provenance),
+        "scene": scene_facts(scene),
+        "seconds": {name: round(value, 3) for name, value in log.phases.seconds.items()},
+        "seconds_fitting": round(result.seconds, 3),
+        "peak_memory_bytes": peak_memory_bytes(),
+        "left_out": [*result.omissions.to_json(), *log.omissions.to_json()],
+        "versions": {name: version(name) for name in LIBRARIES},
+        "machine": {
+            "python": platform.python_version(),
+            "system": f"{platform.system()} {platform.machine()}",
+            "threads": torch.get_num_threads(),
+        },
+    }
+    return json.dumps(card, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def quality_facts(qualities: Sequence[FrameQuality]) -> dict[str, object] | None:
+    """Means over frames, and per camera; None without frames."""
+    if not qualities:
+        return None
+    cameras = sorted({quality.camera for quality in qualities})
+    structures = [quality.ssim for quality in qualities if quality.ssim is not None]
+    return {
+        "frames": len(qualities),
+        "psnr_db": round(mean_psnr_db(qualities), 3),
+        "worst_psnr_db": round(min(quality.psnr_db for quality in qualities), 3),
+        "ssim": round(sum(structures) / len(structures), 4) if structures else None,
+        "psnr_db_per_camera": {
+            str(camera): round(mean_psnr_db([q for q in qualities if q.camera == camera]), 3)
+            for camera in cameras
+        },
+    }

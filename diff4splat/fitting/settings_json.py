@@ -1,0 +1,44 @@
+"""Settings of a fit changed by ``key=value``, with dotted keys such as ``density.budget``."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from diff4splat.errors import ConfigError
+from diff4splat.fitting.settings import FitSettings
+from diff4splat.training.typed_json import TypedReader
+
+
+def changed(settings: FitSettings, changes: Sequence[str]) -> FitSettings:
+    """Other settings; values are JSON, or plain words.
+
+    Raises:
+        ConfigError: no "=", an unknown key, or a value of the wrong kind.
+    """
+    data = json.loads(json.dumps(asdict(settings)))
+    for change in changes:
+        key, equals, text = change.partition("=")
+        if not equals:
+            raise ConfigError(f"--set: expected key=value, got {change!r}")
+        *outer, last = key.strip().split(".")
+        place = data
+        for name in outer:
+            place = _inner(place, name, key)
+        place[last] = _parsed(text.strip())
+    return TypedReader(refusal=ConfigError).read(FitSettings, data, "settings")
+
+
+def _inner(place: dict[str, Any], name: str, key: str) -> dict[str, Any]:
+    inner = place.get(name)
+    if not isinstance(inner, dict):
+        groups = ", ".join(name for name, value in place.items() if isinstance(value, dict))
+        raise ConfigError(f"--set {key}: expected a group such as {groups or 'none'}, got {name!r}")
+    return inner
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text

@@ -1,0 +1,1 @@
+"""One image, a camera path and optional text to a scene."""

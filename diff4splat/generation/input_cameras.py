@@ -1,0 +1,67 @@
+"""Camera paths as the model sees them: a fixed number of cameras spread over the asked path.
+
+The path that generates a scene and the path it is shown along are different things: the first has
+as many cameras as the model was made for, the second as many frames as the video.
+"""
+
+from dataclasses import replace
+
+import torch
+
+from diff4splat.generation.input_image import InputImage
+from diff4splat.geometry.camera import Camera
+from diff4splat.geometry.rays import relative_to_first
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.paths.build import build_path
+from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.picture_size import resized
+from diff4splat.paths.settings import PathFrame, PathSettings
+from diff4splat.paths.spline import resample
+
+DEFAULT_FRAMES, DEFAULT_FPS = 49, 24.0
+
+
+def path_frame(camera: Camera) -> PathFrame:
+    """What presets are sized to before there is a scene: the plane that carries the photograph."""
+    return PathFrame(camera=camera, near_depth=PLANE_DEPTH, focus_depth=PLANE_DEPTH)
+
+
+def to_camera_path(path: CameraPath | str, camera: Camera) -> CameraPath:
+    """Presets in the picture's view, or cameras at its size that start at the identity and 0 s."""
+    if isinstance(path, str):
+        settings = PathSettings(frames=DEFAULT_FRAMES, fps=DEFAULT_FPS)
+        return build_path(path, path_frame(camera), settings)
+    fitting = resized(require_usable(path, "camera path"), camera.size_px)
+    started = CameraPath(
+        cameras=relative_to_first(fitting.cameras), times_s=fitting.times_s - fitting.times_s[0]
+    )
+    return started.to(camera.focal_px.dtype)
+
+
+def reconcile_intrinsics(picture: InputImage, path: CameraPath) -> tuple[InputImage, CameraPath]:
+    """The first camera of the path took the photograph, so both must have one lens.
+
+    A photograph whose lens is known keeps it, and the path keeps its zoom relative to its first
+    camera; otherwise the photograph takes over the lens that the path names.
+    """
+    cameras, first = path.cameras, path.cameras[0]
+    if torch.allclose(first.focal_px, picture.camera.focal_px) and torch.allclose(
+        first.center_px, picture.camera.center_px
+    ):
+        return picture, path
+    if not picture.focal_known:
+        lens = replace(picture.camera, focal_px=first.focal_px, center_px=first.center_px)
+        return replace(picture, camera=lens, focal_known=True, focal_source="camera path"), path
+    matched = replace(
+        cameras,
+        focal_px=cameras.focal_px * (picture.camera.focal_px / first.focal_px),
+        center_px=cameras.center_px + (picture.camera.center_px - first.center_px),
+    )
+    return picture, replace(path, cameras=matched)
+
+
+def resample_to_model_frames(path: CameraPath, frames: int) -> CameraPath:
+    """``frames`` cameras spread evenly over ``path``, in the same span of time."""
+    duration_s = float(path.times_s[-1] - path.times_s[0])
+    fps = (frames - 1) / duration_s if duration_s > 0 and frames > 1 else DEFAULT_FPS
+    return resample(path, frames, fps)

@@ -1,0 +1,177 @@
+"""The photograph as the model sees it: size, crop and focal length.
+
+Axes: ``h w 3`` RGB in [0, 1]. The picture keeps the photograph's shape: both sides become multiples
+of 16 within a pixel budget, and at most a few columns or rows are cropped. Focal lengths follow
+scale and crop, so the geometry stays that of the photograph.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.errors import ConfigError, InputError
+from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, pinhole
+from diff4splat.io.images import read_photo
+
+SIDE_MULTIPLE = 16
+"""Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""
+MAX_SIDE_PX = 1024
+"""Seventeen frames of more pixels do not fit into 8 GiB."""
+DEFAULT_FOCAL_35MM = 30.0
+"""What phones see with their main lens, when nothing is known."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FocalChoice:
+    """A focal length in pixels of the whole photograph, and where it came from."""
+
+    focal_px: float
+    source: str
+    known: bool = True
+    """False for a guess that better knowledge may replace."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputImage:
+    """The photograph at the model's size, with the camera that took it at the origin."""
+
+    rgb: Float[Tensor, "h w 3"]
+    camera: Camera
+    focal_source: str
+    focal_known: bool = True
+    """False for a default lens; a camera path that names one then decides."""
+    notes: tuple[str, ...] = ()
+    """What was done to the photograph, in words."""
+
+    def to(self, device: torch.device) -> "Picture":
+        """Move pixels and camera."""
+        return replace(self, rgb=self.rgb.to(device), camera=self.camera.to(device))
+
+
+def downsample(picture: InputImage, factor: int) -> InputImage:
+    """The picture with ``factor``² pixels averaged into one; its sides are multiples of that."""
+    if factor == 1:
+        return picture
+    rgb = torch.nn.functional.avg_pool2d(picture.rgb.movedim(-1, 0)[None], factor)[0]
+    height, width = picture.camera.size_px
+    camera = picture.camera.resized((height // factor, width // factor))
+    return replace(picture, rgb=rgb.movedim(0, -1), camera=camera)
+
+
+def load_image(
+    file: Path,
+    side_px: int,
+    fov_deg: float | None = None,
+    convert: bool = False,
+    multiple_px: int = SIDE_MULTIPLE,
+) -> InputImage:
+    """A photograph's file at the model's size; ``convert`` accepts grey, alpha, 16 bits and so on.
+
+    Raises:
+        InputError: the file cannot be used as a photograph.
+        ConfigError: the field of view or the size is out of range.
+    """
+    photo = read_photo(file, convert)
+    size_px = (photo.rgb.shape[0], photo.rgb.shape[1])
+    focal = choose_focal(size_px, fov_deg, photo.focal_35mm)
+    return replace(prepare_image(photo.rgb, focal, side_px, multiple_px), notes=photo.notes)
+
+
+def choose_focal(
+    size_px: tuple[int, int], fov_deg: float | None, focal_35mm: float | None
+) -> FocalChoice:
+    """The focal length of a photograph of (height, width): asked for, from EXIF, or a default.
+
+    ``fov_deg`` is the horizontal field of view of the whole photograph.
+
+    Raises:
+        ConfigError: the field of view is not between 1 and 170 degrees.
+    """
+    if fov_deg is not None:
+        if not (math.isfinite(fov_deg) and 1 <= fov_deg <= 170):
+            raise ConfigError(f"--fov: expected 1 to 170 degrees, got {fov_deg:g}")
+        return FocalChoice(
+            focal_px=focal_from_fov(fov_deg, size_px[1]), source=f"--fov {fov_deg:g} degrees"
+        )
+    if focal_35mm is not None:
+        return FocalChoice(
+            focal_px=focal_from_35mm(focal_35mm, size_px),
+            source=f"EXIF, {focal_35mm:g} mm (35 mm equivalent)",
+        )
+    return FocalChoice(
+        focal_px=focal_from_35mm(DEFAULT_FOCAL_35MM, size_px),
+        source=f"default, {DEFAULT_FOCAL_35MM:g} mm (35 mm equivalent); --fov overrides",
+        known=False,
+    )
+
+
+def model_size(
+    photo_size_px: tuple[int, int], side_px: int, multiple_px: int = SIDE_MULTIPLE
+) -> tuple[int, int]:
+    """(height, width) near the photograph's shape, with at most ``side_px``² pixels.
+
+    Raises:
+        ConfigError: the side is too small for one patch or too large to be meant.
+        InputError: the photograph is too long and thin to fit.
+    """
+    if not multiple_px <= side_px <= MAX_SIDE_PX:
+        raise ConfigError(
+            f"--resolution: expected {multiple_px} to {MAX_SIDE_PX} pixels, got {side_px}"
+        )
+    aspect = photo_size_px[1] / photo_size_px[0]
+    rows = range(multiple_px, side_px * side_px // multiple_px + 1, multiple_px)
+    columns = [(math.floor(h * aspect / multiple_px), h) for h in rows]
+    sizes = [(h, (count + more) * multiple_px) for count, h in columns for more in (0, 1)]
+    fitting = [size for size in sizes if 0 < size[0] * size[1] <= side_px**2]
+    best = max(fitting, key=lambda size: _size_score(size, aspect), default=None)
+    if best is None or not 0.5 < best[1] / best[0] / aspect < 2:
+        raise InputError(
+            f"image: expected a shape that fits into {side_px}×{side_px} pixels, got "
+            f"{photo_size_px[1]}×{photo_size_px[0]}; crop it or raise --resolution"
+        )
+    return best
+
+
+def _size_score(size_px: tuple[int, int], aspect: float) -> float:
+    """More pixels are better; each per cent that has to be cropped outweighs four of them."""
+    height, width = size_px
+    return math.log(height * width) - 4 * abs(math.log(width / height / aspect))
+
+
+def prepare_image(
+    rgb: Float[Tensor, "height width 3"],
+    focal: FocalChoice,
+    side_px: int,
+    multiple_px: int = SIDE_MULTIPLE,
+) -> InputImage:
+    """Crop the centre to the model's shape and resize it."""
+    photo_size = (rgb.shape[0], rgb.shape[1])
+    size = model_size(photo_size, side_px, multiple_px)
+    scale = min(photo_size[0] / size[0], photo_size[1] / size[1])
+    crop = (min(photo_size[0], round(size[0] * scale)), min(photo_size[1], round(size[1] * scale)))
+    top, left = (photo_size[0] - crop[0]) // 2, (photo_size[1] - crop[1]) // 2
+    camera = pinhole(focal.focal_px, photo_size).cropped((top, left), crop).resized(size)
+    window = rgb[top : top + crop[0], left : left + crop[1]]
+    return InputImage(
+        rgb=_resize(window, size),
+        camera=camera,
+        focal_source=focal.source,
+        focal_known=focal.known,
+    )
+
+
+def _resize(
+    rgb: Float[Tensor, "height width 3"], size_px: tuple[int, int]
+) -> Float[Tensor, "h w 3"]:
+    if rgb.shape[:2] == size_px:
+        return rgb.clone()
+    # Averaging over the area keeps a downscaled photograph free of aliasing.
+    shrinks = rgb.shape[0] >= size_px[0]
+    method = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
+    resized = cv2.resize(rgb.contiguous().numpy(), size_px[::-1], interpolation=method)
+    return torch.from_numpy(resized).clamp(0, 1)

@@ -1,0 +1,1 @@
+"""What a run writes for people: scene folders, cards, sheets, camera data sets."""

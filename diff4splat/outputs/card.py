@@ -1,0 +1,96 @@
+"""``card.json``: everything needed to make a scene again, what it cost and what was left out."""
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat import __version__
+from diff4splat.io.atomic import write_text
+from diff4splat.metrics.image import psnr
+from diff4splat.progress.phases import peak_memory_bytes
+from diff4splat.progress.run_log import RunLog
+from diff4splat.scene.scene import Scene
+
+LIBRARIES = ("torch", "numpy", "safetensors", "opencv-contrib-python-headless", "OpenEXR", "pillow")
+BEST_PSNR_DB = 200.0
+"""Identical pictures have an infinite PSNR, which JSON cannot hold."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """A scene, the photograph it came from, and how well its first view shows it."""
+
+    scene: Scene
+    photo: Float[Tensor, "h w 3"]
+    first_view_psnr_db: float
+
+    @classmethod
+    def of(
+        cls, scene: Scene, photo: Float[Tensor, "h w 3"], first_view: Float[Tensor, "h w 3"]
+    ) -> "Result":
+        """Compare the first frame of the path with the photograph."""
+        measured = min(float(psnr(first_view, photo)), BEST_PSNR_DB)
+        return cls(scene=scene, photo=photo, first_view_psnr_db=round(measured, 2))
+
+
+def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str, str], ...]:
+    """The few facts that belong beside the picture."""
+    scene, path = result.scene, result.scene.path
+    height, width = path.cameras.size_px
+    seconds = float(path.times_s[-1] - path.times_s[0])
+    moving = len(scene.motion.moving_index)
+    prompt = (("Prompt", scene.provenance.prompt),) if scene.provenance.prompt else ()
+    return (
+        ("Camera", f"{camera}, {len(path)} frames, {seconds:.2g} s"),
+        *prompt,
+        ("Lens", focal_source),
+        ("Picture", f"{width} by {height} px"),
+        ("Gaussians", f"{len(scene.gaussians):,}, {moving:,} of them moving"),
+        ("First view", f"{result.first_view_psnr_db:.1f} dB against the photograph"),
+    )
+
+
+def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: RunLog) -> None:
+    """Write the card whole or not at all."""
+    seconds = log.phases.seconds
+    card = {
+        "diff4splat": __version__,
+        "untrained": result.scene.provenance.untrained,
+        "inputs": inputs,
+        "provenance": asdict(result.scene.provenance),
+        "scene": scene_facts(result.scene),
+        "first_view_psnr_db": result.first_view_psnr_db,
+        "seconds": {name: round(value, 3) for name, value in seconds.items()},
+        "seconds_total": round(math.fsum(seconds.values()), 3),
+        "peak_memory_bytes": peak_memory_bytes(),
+        "left_out": log.omissions.to_json(),
+        "versions": {name: version(name) for name in LIBRARIES},
+        "machine": {
+            "python": platform.python_version(),
+            "system": f"{platform.system()} {platform.machine()}",
+            "threads": torch.get_num_threads(),
+        },
+    }
+    write_text(file, json.dumps(card, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def scene_facts(scene: Scene) -> dict[str, object]:
+    """Counts and sizes."""
+    height, width = scene.path.cameras.size_px
+    return {
+        "gaussians": len(scene.gaussians),
+        "moving_gaussians": len(scene.motion.moving_index),
+        "motion": type(scene.motion).__name__,
+        "time_range_s": scene.motion.time_range_s,
+        "frames": len(scene.path),
+        "picture_px": [width, height],
+        "harmonic_degree": scene.gaussians.degree,
+    }

@@ -1,0 +1,60 @@
+"""One file that shows a scene through a physical camera: .mp4, .png or .exr.
+
+Axes: ``t`` frames, ``h w`` pixels.
+"""
+
+import json
+from pathlib import Path
+
+import torch
+
+from diff4splat.errors import ConfigError
+from diff4splat.io.exr import write_depth_exr
+from diff4splat.io.images import write_png
+from diff4splat.io.optics_json import optics_json
+from diff4splat.io.video import write_video
+from diff4splat.outputs.photographs import Taken, geometry_kind, photographs
+from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, frames_per_second
+from diff4splat.paths.physical_path import PhysicalPath
+from diff4splat.progress.run_log import RunLog
+from diff4splat.render.physical.settings import PhotoSettings
+from diff4splat.scene.scene import Scene
+
+
+def write_physical_view(
+    scene: Scene, filmed: PhysicalPath, file: Path, settings: PhotoSettings, log: RunLog
+) -> Taken:
+    """Take every frame into one file whose suffix says what it holds; returns what they needed.
+
+    Raises:
+        ConfigError: another suffix.
+        OutputError: the file cannot be written.
+    """
+    suffix = require_view_suffix(file)
+    kind, taken = geometry_kind(filmed), Taken()
+    wanted = (kind,) if suffix == ".exr" else ("rgb",)
+    with log.phases.phase("render", len(filmed)) as advance:
+        frames = photographs(scene, filmed, wanted, settings, advance, taken)
+        if suffix == ".mp4":
+            write_video((frame.rgb for frame in frames), file, frames_per_second(filmed.path))
+        elif suffix == ".png":
+            write_png(next(frames).rgb, file)
+        else:
+            values = torch.stack([getattr(frame, kind) for frame in frames])
+            optics = json.dumps(optics_json(filmed.optics))
+            write_depth_exr(values, filmed.path, file, quantity=kind, optics=optics)
+    return taken
+
+
+def require_view_suffix(file: Path) -> str:
+    """The suffix of ``file`` when something can be written under it.
+
+    Raises:
+        ConfigError: it is another.
+    """
+    suffix = file.suffix.lower()
+    if suffix not in VIEW_SUFFIXES:
+        raise ConfigError(
+            f"--out: expected a name ending in {', '.join(VIEW_SUFFIXES)}, got {file}"
+        )
+    return suffix

@@ -1,0 +1,1 @@
+"""Progress, seconds per phase, and what a run skipped."""

@@ -1,0 +1,55 @@
+"""What a run left out because this scene does not need it, what that saved and what it cost.
+
+Goes into ``card.json`` beside the scene, in the order in which things were left out.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+
+from diff4splat.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkippedWork:
+    """One thing that was not computed, loaded or stored."""
+
+    what: str
+    why: str
+    saved: str
+    """In words with a unit: ``1,234 parameters``, ``12 network calls``."""
+    error: float = 0.0
+    """What leaving it out changed in the result; 0 means nothing."""
+
+    def __post_init__(self) -> None:
+        if not (self.what and self.why and self.saved):
+            raise ConfigError(
+                "SkippedWork: expected what, why and saved in words, got an empty one"
+            )
+        if not (math.isfinite(self.error) and self.error >= 0):
+            raise ConfigError(f"SkippedWork.error: expected 0 or above, got {self.error}")
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.why}; saved {self.saved}; error {self.error:.3g}"
+
+
+@dataclass(slots=True)
+class Omissions:
+    """Collects omissions while a command runs."""
+
+    _records: list[SkippedWork] = field(default_factory=list)
+
+    def add(self, omission: SkippedWork) -> None:
+        """Append; the same record twice counts once, so that loops may report freely."""
+        if omission not in self._records:
+            self._records.append(omission)
+
+    def __iter__(self) -> Iterator[SkippedWork]:
+        return iter(self._records)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def to_json(self) -> list[dict[str, str | float]]:
+        """Plain values for ``card.json``."""
+        return [asdict(record) for record in self._records]

@@ -1,0 +1,97 @@
+"""The sizes of a model: ``test`` for tests, ``small`` for two CPU cores, ``paper`` as published."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from diff4splat.errors import ConfigError
+from diff4splat.models.config.model import (
+    ActivationConfig,
+    DeformationConfig,
+    DetailConfig,
+    DitConfig,
+    LdrmConfig,
+    ModelConfig,
+    TextConfig,
+    VaeConfig,
+)
+
+
+def test_size() -> ModelConfig:
+    """Runs in milliseconds with random weights; never trained."""
+    return ModelConfig(
+        name="test",
+        frames=5,
+        size_px=(32, 32),
+        vae=VaeConfig(latent_channels=4, widths=(4, 6, 8), pixel_patch=2),
+        text=TextConfig(width=16, blocks=1, heads=2, feedforward_width=32),
+        dit=DitConfig(
+            width=24, blocks=2, heads=2, feedforward_width=48, frequency_width=16, camera_width=8
+        ),
+        ldrm=LdrmConfig(width=24, heads=2, feedforward_width=48, blocks=2, embed_channels=8),
+        deformation=DeformationConfig(width=16, level_widths=(8, 6, 4), octaves=4),
+        activation=ActivationConfig(),
+    )
+
+
+test_size.__test__ = False
+"""pytest must not take the factory for a test."""
+
+
+def small_size() -> ModelConfig:
+    """Under 20 million weights: runs on two CPU cores in seconds, and can be trained there."""
+    return ModelConfig(
+        name="small",
+        frames=9,
+        size_px=(64, 64),
+        vae=VaeConfig(latent_channels=128, widths=(32, 64, 96), pixel_patch=2, linear_code=True),
+        text=TextConfig(width=128, blocks=3, heads=4, feedforward_width=256),
+        dit=DitConfig(
+            width=256,
+            blocks=8,
+            heads=4,
+            feedforward_width=768,
+            camera_width=64,
+            predicts="clean",
+            draft=True,
+            motion=True,
+            motion_width=64,
+            motion_outline=32,
+            pooled_text=True,
+        ),
+        ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
+        deformation=DeformationConfig(width=64, blocks=3, octaves=3, noise_px=4.0),
+        activation=ActivationConfig(),
+        detail=DetailConfig(width=48, picture_width=32),
+    )
+
+
+def paper_size() -> ModelConfig:
+    """The published numbers where there are any; for the meta device and for clusters."""
+    return ModelConfig(
+        name="paper",
+        frames=49,
+        size_px=(512, 512),
+        vae=VaeConfig(latent_channels=32, widths=(96, 192, 384, 384), blocks=2),
+        text=TextConfig(width=4096, blocks=24, heads=64, feedforward_width=10240),
+        dit=DitConfig(width=4096, blocks=32, heads=32, feedforward_width=16384, camera_width=1024),
+        ldrm=LdrmConfig(width=1024, heads=16, feedforward_width=4096),
+        deformation=DeformationConfig(width=512, blocks=4, level_widths=(192, 96, 48)),
+        activation=ActivationConfig(),
+    )
+
+
+SIZES: Mapping[str, Callable[[], ModelConfig]] = MappingProxyType(
+    {"test": test_size, "small": small_size, "paper": paper_size}
+)
+"""Every size by name."""
+
+
+def size_by_name(name: str) -> ModelConfig:
+    """The configuration of a named size.
+
+    Raises:
+        ConfigError: there is no such size.
+    """
+    if name not in SIZES:
+        raise ConfigError(f"network size: expected {', '.join(SIZES)}, got {name!r}")
+    return SIZES[name]()

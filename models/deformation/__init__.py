@@ -1,0 +1,1 @@
+"""Query-time deformation of canonical Gaussians."""

@@ -1,0 +1,75 @@
+"""SHA256SUMS of a model folder: one line ``digest  name`` per file, as ``sha256sum -c`` reads it.
+
+A folder with such a list is checked whenever it is read; one without is taken as it is. The list
+holds the configuration, the provenance and the weights. The model card is not in it: words may be
+corrected without new weights.
+"""
+
+import hashlib
+import re
+from collections.abc import Collection
+from pathlib import Path
+
+from diff4splat.errors import FileFormatError
+from diff4splat.io.atomic import write_text
+from diff4splat.models.factory import PARTS
+from diff4splat.models.hub.provenance import PROVENANCE_FILE
+from diff4splat.models.hub.weights import CONFIG_FILE, part_file
+
+SUMS_FILE = "SHA256SUMS"
+_LINE = re.compile(r"([0-9a-f]{64})  (\S+)")
+
+
+def listed_files(folder: Path) -> list[Path]:
+    """The files of a model folder that a list has to name."""
+    files = [folder / CONFIG_FILE, folder / PROVENANCE_FILE]
+    files += [part_file(folder, part) for part in PARTS]
+    return [file for file in files if file.is_file()]
+
+
+def write_sums(folder: Path) -> None:
+    """List what lies in the folder."""
+    lines = [f"{file_sha256(file)}  {file.name}\n" for file in listed_files(folder)]
+    write_text(folder / SUMS_FILE, "".join(lines))
+
+
+def require_whole(folder: Path, advice: str, names: Collection[str] | None = None) -> None:
+    """Every file is the one that the list names; ``advice`` says how to get the folder again.
+
+    With ``names`` only those files are looked at.
+
+    Raises:
+        FileFormatError: a file is damaged, missing, or not in the list.
+    """
+    sums = _read_sums(folder / SUMS_FILE, advice)
+    present = {file.name for file in listed_files(folder)}
+    for name in sorted(present | sums.keys() if names is None else names):
+        if name not in sums:
+            raise FileFormatError(
+                f"{folder / name}: expected a file that {SUMS_FILE} names, got another; {advice}"
+            )
+        got = file_sha256(folder / name) if name in present else "no file"
+        if got != sums[name]:
+            raise FileFormatError(
+                f"{folder / name}: expected SHA-256 {sums[name][:16]}…, got {got[:16]}; "
+                f"the file is damaged, {advice}"
+            )
+
+
+def file_sha256(file: Path) -> str:
+    """Digest of one file, in hexadecimal."""
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+def _read_sums(file: Path, advice: str) -> dict[str, str]:
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(
+            f"{file}: expected a list of checksums, got none that can be read; {advice}"
+        ) from error
+    found = [_LINE.fullmatch(line) for line in lines]
+    if not found or None in found:
+        raise FileFormatError(f"{file}: expected lines 'digest  name', got others; {advice}")
+    return {match[2]: match[1] for match in found}

@@ -1,0 +1,56 @@
+"""What a model folder or a size says about its weights; files are checked, no network is built."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.sizes import size_by_name
+from diff4splat.models.factory import PARTS
+from diff4splat.models.hub.pretrained import checked_folder
+from diff4splat.models.hub.provenance import ModelProvenance, read_provenance
+from diff4splat.models.hub.weights import load_config, part_file, weights_sha256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelInfo:
+    """For people to read."""
+
+    config: ModelConfig
+    provenance: ModelProvenance
+    states: Mapping[str, str]
+    """Per part: trained, untrained (weights that nobody finished), or random (no weights)."""
+    place: str
+    """The folder, or that there is none."""
+    weights_sha256: str
+
+
+def model_info(name_or_folder: str | Path) -> ModelInfo:
+    """Facts of what ``load_model`` would load.
+
+    Raises:
+        ConfigError, CheckpointError, FileFormatError: as ``load_model``.
+    """
+    folder = checked_folder(name_or_folder)
+    if folder is None:
+        return ModelInfo(
+            config=size_by_name(str(name_or_folder)),
+            provenance=ModelProvenance(),
+            states=dict.fromkeys(PARTS, "random"),
+            place="none: random weights",
+            weights_sha256="none",
+        )
+    provenance = read_provenance(folder)
+    return ModelInfo(
+        config=load_config(folder),
+        provenance=provenance,
+        states={part: _state(folder, part, provenance) for part in PARTS},
+        place=str(folder),
+        weights_sha256=weights_sha256(folder),
+    )
+
+
+def _state(folder: Path, part: str, provenance: ModelProvenance) -> str:
+    if not part_file(folder, part).is_file():
+        return "random" if part in provenance.may_lack else "missing"
+    return "trained" if part in provenance.trained else "untrained"

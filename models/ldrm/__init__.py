@@ -1,0 +1,1 @@
+"""Latent Dynamic Reconstruction Model."""

@@ -1,0 +1,75 @@
+"""What the reconstruction sees beside latents: the decoded pictures and the cameras behind them.
+
+Axes: ``b`` batch, ``f`` video frames, ``k`` key frames, ``c`` channels, ``h w`` pixels. Key frames
+are the last of every pack of four, 0, 4, 8, …: each latent frame has one, and only they carry
+Gaussians (``DetailConfig``), since those between show the same surfaces again.
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from diff4splat.errors import ShapeError
+from diff4splat.geometry.camera import Camera
+from diff4splat.models.config.networks import TIME_STRIDE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PosedVideo:
+    """Decoded video with one camera per frame."""
+
+    rgb: Float[Tensor, "b 3 f h w"]
+    """In [0, 1]; the first frame is the photograph itself where there is one."""
+    cameras: Camera
+    """Batch shape (b, f), of the pictures' size; the first of each is the identity."""
+
+    def __post_init__(self) -> None:
+        batch, _, *video = self.rgb.shape
+        want, got = (batch, *video), (*self.cameras.batch_shape, *self.cameras.size_px)
+        if tuple(want) != tuple(got):
+            raise ShapeError(
+                f"Sight.cameras: expected batch, frames and size {want}, got {got}; "
+                "give every picture its camera"
+            )
+
+    def sample(self, index: int) -> "Sight":
+        """One batch element, as a batch of one."""
+        own = slice(index, index + 1)
+        return PosedVideo(rgb=self.rgb[own], cameras=self.cameras[own])
+
+    @property
+    def keys(self) -> Int[Tensor, " k"]:
+        """Frame numbers of the key frames."""
+        return torch.arange(0, self.rgb.shape[2], TIME_STRIDE, device=self.rgb.device)
+
+    @property
+    def key_rgb(self) -> Float[Tensor, "b k 3 h w"]:
+        """Pictures of the key frames."""
+        return self.rgb[:, :, ::TIME_STRIDE].transpose(1, 2)
+
+    @property
+    def key_cameras(self) -> Camera:
+        """Cameras of the key frames, batch shape (b, k)."""
+        return camera_frames(self.cameras, self.keys)
+
+
+def camera_frames(cameras: Camera, frames: Int[Tensor, " m"]) -> Camera:
+    """Some frames of cameras of batch shape (b, f)."""
+    return replace(
+        cameras,
+        focal_px=cameras.focal_px[:, frames],
+        center_px=cameras.center_px[:, frames],
+        world_from_camera=cameras.world_from_camera[:, frames],
+    )
+
+
+def flat_cameras(cameras: Camera) -> Camera:
+    """Cameras of batch shape (b, m) as one row of b m."""
+    return replace(
+        cameras,
+        focal_px=cameras.focal_px.flatten(0, 1),
+        center_px=cameras.center_px.flatten(0, 1),
+        world_from_camera=cameras.world_from_camera.flatten(0, 1),
+    )

@@ -1,0 +1,1 @@
+"""Depth of one image: the depth prior."""

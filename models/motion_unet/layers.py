@@ -1,0 +1,93 @@
+"""Layers of the motion branch: convolutions under a condition, shared means, a look at the words.
+
+Axes: ``n`` = b t maps (the latent frames of a sample one after another), ``c`` channels, ``h w``
+cells, ``e`` width of a condition or of a text token. Everything a block adds on account of
+conditions, words and other frames is zero at first.
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.attention import Attention
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.blocks.modulation import ZeroModulation
+from diff4splat.models.blocks.norm import ChannelRmsNorm
+from diff4splat.models.motion_unet.text_tokens import TextTokens
+
+MODULATIONS = 2
+"""A scale and a shift."""
+
+
+class ModulatedConvBlock(nn.Module):
+    """x + conv(silu(norm(conv(silu(norm(x)))) · (1 + scale) + shift)) (FiLM, arXiv 1709.07871)."""
+
+    def __init__(self, channels: int, condition_width: int) -> None:
+        super().__init__()
+        self.norm_1, self.norm_2 = ChannelRmsNorm(channels), ChannelRmsNorm(channels)
+        self.conv_1 = nn.Conv2d(channels, channels, 3, padding=1)
+        self.conv_2 = nn.Conv2d(channels, channels, 3, padding=1)
+        self.modulation = ZeroModulation(condition_width, channels, MODULATIONS)
+
+    def forward(
+        self, features: Float[Tensor, "n c h w"], condition: Float[Tensor, "n e"]
+    ) -> Float[Tensor, "n c h w"]:
+        """Same size."""
+        scale, shift = self.modulation(condition)[..., None, None].unbind(1)
+        hidden = self.conv_1(torch.nn.functional.silu(self.norm_1(features)))
+        steered = self.norm_2(hidden) * (1 + scale) + shift
+        return features + self.conv_2(torch.nn.functional.silu(steered))
+
+
+class TemporalMeanMixing(nn.Module):
+    """x + linear(mean of x over the frames of its sample)."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.project = zero_(nn.Conv2d(channels, channels, 1))
+
+    def forward(self, features: Float[Tensor, "n c h w"], samples: int) -> Float[Tensor, "n c h w"]:
+        """``samples`` is b; every one has n / b frames."""
+        frames = features.unflatten(0, (samples, -1))
+        return (frames + self.project(frames.mean(1))[:, None]).flatten(0, 1)
+
+
+class TextCrossAttention(nn.Module):
+    """x + attention(norm(x), words): every cell asks what is said about it."""
+
+    def __init__(self, channels: int, heads: int, text_width: int) -> None:
+        super().__init__()
+        self.norm = ChannelRmsNorm(channels)
+        self.attention = Attention(channels, heads, text_width)
+        zero_(self.attention.to_output)
+
+    def forward(
+        self, features: Float[Tensor, "n c h w"], words: TextTokens
+    ) -> Float[Tensor, "n c h w"]:
+        """Nothing is added where nothing is told."""
+        told = words.told.to(features)[:, None, None]
+        by_frame = self.norm(features).unflatten(0, (len(told), -1)).movedim(2, -1)
+        asked = self.attention(by_frame.flatten(1, 3), words.states, mask=words.readable) * told
+        answer = asked.unflatten(1, by_frame.shape[1:4])
+        return features + answer.movedim(-1, 2).flatten(0, 1)
+
+
+class UNetLevel(nn.Module):
+    """What happens at one resolution on the way down: see around, see other frames, read."""
+
+    def __init__(self, channels: int, condition_width: int, heads: int, text_width: int) -> None:
+        super().__init__()
+        self.block = ModulatedConvBlock(channels, condition_width)
+        self.frame_mean = TemporalMeanMixing(channels)
+        self.read = TextCrossAttention(channels, heads, text_width)
+
+    def forward(
+        self,
+        features: Float[Tensor, "n c h w"],
+        condition: Float[Tensor, "n e"],
+        samples: int,
+        words: TextTokens | None,
+    ) -> Float[Tensor, "n c h w"]:
+        """Without ``words`` nothing is read."""
+        features = self.frame_mean(self.block(features, condition), samples)
+        return features if words is None else self.read(features, words)

@@ -1,0 +1,40 @@
+"""The branch's own reading of the words: blocks behind the text encoder, which stays as it is.
+
+Axes: ``b`` batch, ``s`` text tokens, ``e`` their width. The encoder learnt what the video model
+asks of a text, which way things go; the branch also asks which thing is meant.
+"""
+
+import math
+
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.config.networks import TextConfig
+from diff4splat.models.motion_unet.text_tokens import TextTokens
+from diff4splat.models.text_encoder.encoder import TextBlock, distance_buckets
+
+BLOCKS = 2
+
+
+class TextAdapter(nn.Module):
+    """States of the words, seen again; the states themselves when fresh."""
+
+    def __init__(self, config: TextConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.distance_bias = nn.Embedding(config.buckets, config.heads)
+        self.blocks = nn.ModuleList([TextBlock(config) for _ in range(BLOCKS)])
+        for block in self.blocks:
+            zero_(block.to_output)
+            zero_(block.contract)
+
+    def forward(self, words: TextTokens) -> Float[Tensor, "b s e"]:
+        """States of real tokens; those of padding are zero."""
+        states = words.states
+        buckets = distance_buckets(states.shape[1], self.config, states.device)
+        bias = self.distance_bias(buckets).permute(2, 0, 1)[None]
+        bias = bias.masked_fill(~words.readable[:, None, None], -math.inf)
+        for block in self.blocks:
+            states = block(states, bias)
+        return states * words.mask[..., None]

@@ -1,0 +1,182 @@
+"""Latent video diffusion transformer: predicts the velocity noise − clean (layout of Wan 2.1).
+
+Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and columns, ``f hh ww``
+video frames and pixels, ``d`` width, ``s`` text tokens. Noise level 0 is data and 1 is noise,
+given per latent frame: an image condition overwrites latent frame 0 with the clean latent and
+gives it level 0.
+
+    latent ─ patch 1×2×2 ─ linear ─┐
+    draft ── patch 1×2×2 ─ linear ─┤
+    camera ─ adapter ──────────────┴ + ─ blocks ─ norm, modulate ─ linear (zero at first) ─ velocity
+    level ── sinusoid, MLP ─ modulation ───┘ │
+    text ─── MLP ─ cross-attention ──────────┘
+
+``c`` includes the channels of a motion, where the model makes one (``video_motion``). Where a
+``motion_branch`` tells motion, it is asked on its own (``motion_sampling``), and not here.
+
+Where it predicts clean latents, the last linear layer answers what to add to the draft (to 0, where
+there is none), and the velocity follows from that: a fresh model leads any noise to the draft.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from diff4splat.errors import ShapeError
+from diff4splat.flow.path import velocity_from_clean
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.blocks.modulation import ZeroModulation, modulate
+from diff4splat.models.blocks.norm import EPSILON
+from diff4splat.models.blocks.patches import patchify, unpatchify
+from diff4splat.models.blocks.rope import rope_tables
+from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.networks import TOKEN_PATCH
+from diff4splat.models.motion_unet.unet import MotionUNet
+from diff4splat.models.video_dit.camera_adapter import CameraAdapter
+from diff4splat.models.video_dit.dit_block import MODULATIONS, DitBlock
+
+PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DitConditions:
+    """What stays the same over all noise levels of one generation; None is not computed at all."""
+
+    camera: Float[Tensor, "b t h2 w2 d"] | None = None
+    text: Float[Tensor, "b s d"] | None = None
+    text_mask: Bool[Tensor, "b s"] | None = None
+    """True where a text token is real; None when all are."""
+    pooled_text: Float[Tensor, "b d"] | None = None
+    """Added to the embedding of the level."""
+    draft: Float[Tensor, "b c t h w"] | None = None
+    """Latent of a draft of the video."""
+    draft_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
+
+
+class TextProjection(nn.Module):
+    """Text states to the model's width: linear, tanh-GELU, linear."""
+
+    def __init__(self, text_width: int, width: int) -> None:
+        super().__init__()
+        self.expand = nn.Linear(text_width, width)
+        self.contract = nn.Linear(width, width)
+
+    def forward(self, text: Float[Tensor, "b s e"]) -> Float[Tensor, "b s d"]:
+        """Project every token on its own."""
+        return self.contract(torch.nn.functional.gelu(self.expand(text), approximate="tanh"))
+
+
+class VideoDiT(nn.Module):
+    """Velocity of a noisy latent under camera, text and image conditions."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        dit, channels = config.dit, config.vae.latent_channels + config.motion_channels
+        self.config = dit
+        self.motion_channels = config.motion_channels
+        self.patch_embedding = nn.Linear(channels * TOKEN_PATCH**2, dit.width)
+        if dit.draft:
+            self.draft_embedding = zero_(nn.Linear(channels * TOKEN_PATCH**2, dit.width))
+        self.camera_adapter = CameraAdapter(dit.width, dit.camera_width, config.vae.space_stride)
+        self.text_projection = TextProjection(config.text.width, dit.width)
+        if dit.pooled_text:
+            self.pooled_text = zero_(nn.Linear(dit.width, dit.width))
+        self.level_mlp = EmbeddingMlp(dit.frequency_width, dit.width)
+        self.level_modulation = ZeroModulation(dit.width, dit.width, MODULATIONS)
+        self.blocks = nn.ModuleList([DitBlock(dit) for _ in range(dit.blocks)])
+        self.norm_out = nn.LayerNorm(dit.width, eps=EPSILON, elementwise_affine=False)
+        self.modulation_out = nn.Parameter(torch.zeros(2, dit.width))
+        self.head = zero_(nn.Linear(dit.width, channels * TOKEN_PATCH**2))
+        self.motion_branch = None
+        if dit.motion_width:
+            self.motion_branch = MotionUNet(
+                dit.motion_width, dit.heads, config.text, outline_width=dit.motion_outline
+            )
+
+    def forward(
+        self,
+        latent: Float[Tensor, "b c t h w"],
+        level: Float[Tensor, "b t"],
+        camera: Float[Tensor, "b 6 f hh ww"] | None = None,
+        text: Float[Tensor, "b s e"] | None = None,
+        text_mask: Bool[Tensor, "b s"] | None = None,
+        draft: Float[Tensor, "b c t h w"] | None = None,
+    ) -> Float[Tensor, "b c t h w"]:
+        """Velocity in one call: ``prepare``, then ``velocity``."""
+        return self.velocity(latent, level, self.prepare(camera, text, text_mask, draft))
+
+    def prepare(
+        self,
+        camera: Float[Tensor, "b 6 f hh ww"] | None = None,
+        text: Float[Tensor, "b s e"] | None = None,
+        text_mask: Bool[Tensor, "b s"] | None = None,
+        draft: Float[Tensor, "b c t h w"] | None = None,
+    ) -> DitConditions:
+        """Embed the conditions once for all steps of a sampler.
+
+        Raises:
+            ShapeError: a draft is missing that the model sees, or given to one that sees none.
+        """
+        if self.config.draft != (draft is not None):
+            want, got = ("one", "none") if self.config.draft else ("none", "one")
+            raise ShapeError(f"draft: expected {want}, got {got}; DitConfig.draft decides")
+        seen = None if draft is None else self.draft_embedding(patchify(draft, PATCH))
+        states = None if text is None else self.text_projection(text)
+        return DitConditions(
+            camera=None if camera is None else self.camera_adapter(camera),
+            text=states,
+            text_mask=text_mask,
+            pooled_text=None if states is None else self._pooled(states, text_mask),
+            draft=draft,
+            draft_tokens=seen,
+        )
+
+    def _pooled(
+        self, states: Float[Tensor, "b s d"], mask: Bool[Tensor, "b s"] | None
+    ) -> Float[Tensor, "b d"] | None:
+        """From the mean over real tokens."""
+        if not self.config.pooled_text:
+            return None
+        if mask is None:
+            return self.pooled_text(states.mean(1))
+        real = mask[..., None].to(states)
+        return self.pooled_text((states * real).sum(1) / real.sum(1).clamp_min(1))
+
+    def velocity(
+        self,
+        latent: Float[Tensor, "b c t h w"],
+        level: Float[Tensor, "b t"],
+        conditions: DitConditions,
+    ) -> Float[Tensor, "b c t h w"]:
+        """Velocity at a noise level per latent frame."""
+        tokens = self.patch_embedding(patchify(latent, PATCH))
+        if conditions.camera is not None:
+            tokens = tokens + conditions.camera
+        if conditions.draft_tokens is not None:
+            tokens = tokens + conditions.draft_tokens
+        rows, columns = tokens.shape[2:4]
+        rope = rope_tables(
+            tuple(tokens.shape[1:4]), self.config.width // self.config.heads, tokens.device
+        )
+        embedding = self.level_mlp(level_embedding(level, self.config.frequency_width))
+        if conditions.pooled_text is not None:
+            embedding = embedding + conditions.pooled_text[:, None]
+        modulation = self.level_modulation(embedding)
+        tokens = tokens.flatten(2, 3)
+        for block in self.blocks:
+            tokens = block(tokens, modulation, rope, conditions.text, conditions.text_mask)
+        shift, scale = (embedding[..., None, :] + self.modulation_out)[..., None, :].unbind(2)
+        patches = self.head(modulate(self.norm_out(tokens), shift, scale))
+        answer = unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
+        return self._as_velocity(answer, latent, level, conditions.draft)
+
+    def _as_velocity(
+        self, answer: Tensor, latent: Tensor, level: Tensor, draft: Tensor | None
+    ) -> Float[Tensor, "b c t h w"]:
+        if self.config.predicts == "velocity":
+            return answer
+        clean = answer if draft is None else draft + answer
+        return velocity_from_clean(latent, clean, level[:, None, :, None, None].to(latent))

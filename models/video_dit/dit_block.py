@@ -1,0 +1,59 @@
+"""Block of the video model: self-attention, cross-attention to text, feed-forward (Wan 2.1).
+
+Axes: ``b`` batch, ``t`` latent frames, ``m`` tokens of a frame, ``d`` width, ``s`` text tokens.
+The six modulation vectors (shift, scale, gate for attention and for feed-forward) are one shared
+projection of the noise level plus a table of the block's own (PixArt-α, arXiv 2310.00426).
+"""
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.attention import Attention
+from diff4splat.models.blocks.feedforward import FeedForward
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.blocks.modulation import modulate
+from diff4splat.models.blocks.norm import EPSILON
+from diff4splat.models.blocks.rope import RopeTables
+from diff4splat.models.config.networks import DitConfig
+
+MODULATIONS = 6
+
+
+class DitBlock(nn.Module):
+    """The identity when fresh: its gates and the cross-attention's output start at zero."""
+
+    def __init__(self, config: DitConfig) -> None:
+        super().__init__()
+        width = config.width
+        self.attention_norm = nn.LayerNorm(width, eps=EPSILON, elementwise_affine=False)
+        self.attention = Attention(width, config.heads)
+        self.text_norm = nn.LayerNorm(width, eps=EPSILON)
+        self.text_attention = Attention(width, config.heads)
+        self.feedforward_norm = nn.LayerNorm(width, eps=EPSILON, elementwise_affine=False)
+        self.feedforward = FeedForward(width, config.feedforward_width)
+        self.modulation = nn.Parameter(torch.zeros(MODULATIONS, width))
+        zero_(self.text_attention.to_output)
+
+    def forward(
+        self,
+        tokens: Float[Tensor, "b t m d"],
+        modulation: Float[Tensor, "b t 6 d"],
+        rope: RopeTables,
+        text: Float[Tensor, "b s d"] | None,
+        text_mask: Bool[Tensor, "b s"] | None,
+    ) -> Float[Tensor, "b t m d"]:
+        """Without ``text`` the cross-attention is not computed at all."""
+        shift, scale, gate, ff_shift, ff_scale, ff_gate = (modulation + self.modulation)[
+            ..., None, :
+        ].unbind(2)
+        frames = tokens.shape[1]
+        quiet = modulate(self.attention_norm(tokens), shift, scale).flatten(1, 2)
+        tokens = tokens + gate * self.attention(quiet, rope=rope).unflatten(1, (frames, -1))
+        if text is not None:
+            asked = self.text_norm(tokens).flatten(1, 2)
+            tokens = tokens + self.text_attention(asked, context=text, mask=text_mask).unflatten(
+                1, (frames, -1)
+            )
+        quiet = modulate(self.feedforward_norm(tokens), ff_shift, ff_scale)
+        return tokens + ff_gate * self.feedforward(quiet)

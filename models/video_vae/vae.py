@@ -1,0 +1,123 @@
+"""Causal 3D video autoencoder, 4×8×8 (layout of Wan 2.1): video to latents and back.
+
+Axes: ``b`` batch, ``c`` latent channels, ``f`` = 1 + 4 k video frames, ``t h w`` latent frames,
+rows and columns. Video is ``b c t h w`` in [−1, 1]. Everybody outside sees *standardised* latents,
+(raw − mean_c) / std_c with the statistics of the training set; until they are set, mean is 0, std
+is 1.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.errors import ShapeError
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.config.networks import TIME_STRIDE, VaeConfig
+from diff4splat.models.video_vae.decoder import VaeDecoder
+from diff4splat.models.video_vae.encoder import VaeEncoder
+from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
+
+LOG_VARIANCE_RANGE = (-30.0, 20.0)
+"""Clamp that keeps exp() finite in float32 and half precision losses (Stable Diffusion)."""
+FIRST_LOG_VARIANCE = -6.0
+"""Of latents around a linear code of variance 1: noise that costs no more than the code itself."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentDistribution:
+    """Diagonal Gaussian over standardised latents."""
+
+    mean: Float[Tensor, "b c t h w"]
+    log_variance: Float[Tensor, "b c t h w"]
+
+    def sample(self, noise: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b c t h w"]:
+        """Mean plus std times noise, with standard normal ``noise``."""
+        return self.mean + (0.5 * self.log_variance).exp() * noise
+
+
+class VideoVae(nn.Module):
+    """Encoder, decoder and the statistics of their latents."""
+
+    def __init__(self, config: VaeConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.encoder = VaeEncoder(config)
+        self.decoder = VaeDecoder(config)
+        self.code = _linear_code(config, self.encoder, self.decoder)
+        self.register_buffer("latent_mean", torch.zeros(config.latent_channels))
+        self.register_buffer("latent_std", torch.ones(config.latent_channels))
+
+    def encode(self, video: Float[Tensor, "b 3 f hh ww"]) -> LatentDistribution:
+        """Standardised latents of a video, or of a picture when f = 1.
+
+        Raises:
+            ShapeError: f is not 1 + 4 k, or a side is not a multiple of ``space_stride``.
+        """
+        self._require_shape(video)
+        mean, log_variance = self.encoder(video).chunk(2, 1)
+        if self.code is not None:
+            mean = mean + self.code.encode(video)
+        shift, std = self._statistics()
+        return LatentDistribution(
+            mean=(mean - shift) / std,
+            log_variance=log_variance.clamp(*LOG_VARIANCE_RANGE) - 2 * std.log(),
+        )
+
+    def decode(self, latent: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b 3 f hh ww"]:
+        """Video of 1 + 4 (t − 1) frames in one pass; not clamped to [−1, 1]."""
+        frames, _ = self.decode_chunk(latent, self.initial_caches(latent))
+        return frames[:, :, TIME_STRIDE - 1 :]
+
+    def decode_chunk(
+        self, latent: Float[Tensor, "b c t h w"], caches: tuple[Tensor, ...]
+    ) -> tuple[Float[Tensor, "b 3 f hh ww"], tuple[Tensor, ...]]:
+        """Four frames per latent frame; drop the first three of the whole video.
+
+        A pure function: chunks in a row give the frames that one pass gives.
+        """
+        shift, std = self._statistics()
+        raw = latent * std + shift
+        video, caches = self.decoder(raw, caches)
+        return (video if self.code is None else video + self.code.decode(raw)), caches
+
+    def initial_caches(self, latent: Float[Tensor, "b c t h w"]) -> tuple[Tensor, ...]:
+        """The caches to begin a video of this latent's size with."""
+        return self.decoder.initial_caches(latent)
+
+    def set_statistics(self, mean: Float[Tensor, " c"], std: Float[Tensor, " c"]) -> None:
+        """Standardise from now on, by statistics of latents encoded with mean 0 and std 1."""
+        if not bool((torch.isfinite(std) & (std > 0) & torch.isfinite(mean)).all()):
+            raise ShapeError(
+                "latent statistics: expected finite means and deviations above 0; measure again"
+            )
+        self.latent_mean.copy_(mean)
+        self.latent_std.copy_(std)
+
+    def _statistics(self) -> tuple[Float[Tensor, "c 1 1 1"], Float[Tensor, "c 1 1 1"]]:
+        return self.latent_mean[:, None, None, None], self.latent_std[:, None, None, None]
+
+    def _require_shape(self, video: Tensor) -> None:
+        frames, height, width = video.shape[2:]
+        if frames % TIME_STRIDE != 1:
+            nearest = 1 + TIME_STRIDE * (frames // TIME_STRIDE)
+            raise ShapeError(f"video frames: expected 1 + 4 k, got {frames}; use {nearest}")
+        stride = self.config.space_stride
+        if height % stride or width % stride:
+            raise ShapeError(
+                f"video size: expected sides that are multiples of {stride} px, "
+                f"got {height} by {width}; crop or pad"
+            )
+
+
+def _linear_code(config: VaeConfig, encoder: VaeEncoder, decoder: VaeDecoder) -> PcaShortcut | None:
+    """The code, if asked for; convolutions then start as no correction at all."""
+    if not config.linear_code:
+        return None
+    zero_(encoder.conv_out)
+    zero_(decoder.conv_out)
+    torch.nn.init.constant_(
+        encoder.conv_out.conv.bias[config.latent_channels :], FIRST_LOG_VARIANCE
+    )
+    return PcaShortcut(config)

@@ -1,0 +1,37 @@
+"""How much of a picture hangs on each channel of a linear code."""
+
+from dataclasses import replace
+
+import torch
+
+from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
+
+CONFIG = replace(tiny_size().vae, linear_code=True)
+
+
+def test_energy_is_what_a_step_along_the_channel_changes() -> None:
+    code = PcaShortcut(CONFIG)
+    energy, latent = code.energy(), torch.randn(1, 4, 2, 3, 5)
+    assert energy.shape == (4,) and not energy.requires_grad
+    for channel in range(4):
+        step = torch.zeros_like(latent)
+        step[:, channel, 1, 2, 3] = 1.0
+        change = (code.decode(latent + step) - code.decode(latent)).square().sum()
+        torch.testing.assert_close(change.detach(), energy[channel], rtol=1e-4, atol=1e-6)
+
+
+def test_of_components_it_is_their_variance() -> None:
+    code, std = PcaShortcut(CONFIG), torch.tensor([3.0, 2.0, 1.0, 0.5])
+    values = code.to_latent.in_features
+    components = torch.linalg.qr(torch.randn(values, 4)).Q.mT
+    code.set_components(torch.randn(values), components, std)
+    torch.testing.assert_close(code.energy(), std.square())
+
+
+def test_the_mean_of_pictures_does_not_count() -> None:
+    code = PcaShortcut(CONFIG)
+    before = code.energy()
+    with torch.no_grad():
+        code.to_block.bias.add_(7.0)
+    assert torch.equal(code.energy(), before)

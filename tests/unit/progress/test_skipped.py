@@ -1,0 +1,55 @@
+import json
+import math
+
+import pytest
+
+from diff4splat.errors import ConfigError
+from diff4splat.progress.skipped import Omissions, SkippedWork
+
+TEXT = SkippedWork(what="text encoder", why="no prompt given", saved="12,345 parameters")
+MOTION = SkippedWork(what="deformation", why="nothing moves", saved="49 evaluations", error=2.5e-4)
+
+
+def test_reads_as_one_line() -> None:
+    assert str(TEXT) == "text encoder: no prompt given; saved 12,345 parameters; error 0"
+    assert str(MOTION) == "deformation: nothing moves; saved 49 evaluations; error 0.00025"
+
+
+def test_keeps_the_order_and_counts_repeats_once() -> None:
+    omissions = Omissions()
+    for record in (MOTION, TEXT, MOTION):
+        omissions.add(record)
+    assert list(omissions) == [MOTION, TEXT]
+    assert len(omissions) == 2
+
+
+def test_survives_json() -> None:
+    omissions = Omissions()
+    omissions.add(MOTION)
+    assert json.loads(json.dumps(omissions.to_json())) == [
+        {
+            "what": "deformation",
+            "why": "nothing moves",
+            "saved": "49 evaluations",
+            "error": 2.5e-4,
+        }
+    ]
+    assert Omissions().to_json() == []
+
+
+def test_collections_are_independent() -> None:
+    Omissions().add(TEXT)
+    assert len(Omissions()) == 0
+
+
+@pytest.mark.parametrize("error", [-1.0, math.nan, math.inf])
+def test_refuses_an_error_that_is_none(error: float) -> None:
+    with pytest.raises(ConfigError, match="error: expected 0 or above"):
+        SkippedWork(what="a", why="b", saved="c", error=error)
+
+
+@pytest.mark.parametrize("field", ["what", "why", "saved"])
+def test_refuses_to_say_nothing(field: str) -> None:
+    words = {"what": "a", "why": "b", "saved": "c", field: ""}
+    with pytest.raises(ConfigError, match="expected what, why and saved in words"):
+        SkippedWork(**words)
