@@ -1,7 +1,7 @@
 """The one place where networks are put together.
 
-Every part starts from its own random stream, so weights depend on the configuration, the seed and
-the part alone: not on the caller's random state, nor on whether the text encoder is built.
+Every part starts from its own random stream. Its weights depend on the configuration, the seed and
+the part alone: not on the caller's random state, nor on which other parts are built.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -15,6 +15,8 @@ from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.ldrm.ldrm import Ldrm
+from diff4splat.models.monocular_depth.network import MonocularDepthNet
+from diff4splat.models.motion_unet.unet import MotionUNet
 from diff4splat.models.text_encoder.encoder import TextEncoder
 from diff4splat.models.video_dit.dit import VideoDiT
 from diff4splat.models.video_vae.vae import VideoVae
@@ -22,14 +24,15 @@ from diff4splat.models.video_vae.vae import VideoVae
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Networks:
-    """All networks of one model."""
+    """The networks of one model; None for parts that are not built, or that the model lacks."""
 
-    vae: VideoVae
-    text_encoder: TextEncoder | None
-    """None when there is no prompt."""
-    dit: VideoDiT
-    ldrm: Ldrm
-    deformation: DeformationNetwork | RefinedDeformation
+    vae: VideoVae | None = None
+    text_encoder: TextEncoder | None = None
+    dit: VideoDiT | None = None
+    ldrm: Ldrm | None = None
+    deformation: DeformationNetwork | RefinedDeformation | None = None
+    monocular_depth: MonocularDepthNet | None = None
+    motion_unet: MotionUNet | None = None
 
     def parts(self) -> list[tuple[str, nn.Module]]:
         """(name, network) of the parts that exist."""
@@ -47,44 +50,52 @@ PARTS = tuple(field.name for field in fields(Networks))
 """Names of the networks, in the order of their random streams."""
 
 
+def model_parts(config: ModelConfig) -> tuple[str, ...]:
+    """The parts that a model of this configuration has."""
+    absent = set()
+    if not config.monocular_depth.used:
+        absent.add("monocular_depth")
+    if not config.motion_unet.used:
+        absent.add("motion_unet")
+    return tuple(part for part in PARTS if part not in absent)
+
+
 def create_networks(
     config: ModelConfig,
     device: torch.device | str | None = None,
     *,
-    with_text: bool = True,
+    parts: Collection[str] | None = None,
     seed: int = 0,
-    needed: Collection[str] | None = None,
 ) -> Networks:
     """Networks with random weights that are the same for the same arguments.
 
-    On the meta device nothing is allocated; elsewhere weights are drawn on the CPU and then moved.
-    Where ``needed`` names parts, all others stay on the meta device: shapes without weights.
+    Only ``parts`` are built, or all that the model has. On the meta device nothing is allocated;
+    elsewhere weights are drawn on the CPU and then moved.
     """
     target = torch.device("cpu" if device is None else device)
+    builders = _builders(config)
+    wanted = [part for part in model_parts(config) if parts is None or part in parts]
+    return Networks(**{part: _build(part, builders[part], target, seed) for part in wanted})
 
-    def build(part: str, make: Callable[[], nn.Module]) -> nn.Module:
-        wanted = needed is None or part in needed
-        return _build(part, make, target if wanted else torch.device("meta"), seed)
 
-    return Networks(
-        vae=build("vae", lambda: VideoVae(config.vae)),
-        text_encoder=build("text_encoder", lambda: TextEncoder(config.text)) if with_text else None,
-        dit=build("dit", lambda: VideoDiT(config)),
-        ldrm=build("ldrm", lambda: Ldrm(config)),
-        deformation=build("deformation", lambda: _deformation(config)),
-    )
+def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
+    motion = config.motion_unet
+    return {
+        "vae": lambda: VideoVae(config.vae),
+        "text_encoder": lambda: TextEncoder(config.text),
+        "dit": lambda: VideoDiT(config),
+        "ldrm": lambda: Ldrm(config),
+        "deformation": lambda: _deformation(config),
+        "monocular_depth": lambda: MonocularDepthNet(config.monocular_depth.channels),
+        "motion_unet": lambda: MotionUNet(
+            motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
+        ),
+    }
 
 
 def _deformation(config: ModelConfig) -> DeformationNetwork | RefinedDeformation:
-    """On tokens (paper), or on the detail decoder's features where there is one."""
-    return (RefinedDeformation if config.detail.used else DeformationNetwork)(config)
-
-
-def create_text_encoder(
-    config: ModelConfig, device: torch.device | str = "cpu", seed: int = 0
-) -> TextEncoder:
-    """The text encoder that ``create_networks`` builds, alone."""
-    return _build("text_encoder", lambda: TextEncoder(config.text), torch.device(device), seed)
+    """From tokens (paper), or from the features of the refinement decoder where there is one."""
+    return (RefinedDeformation if config.refinement.used else DeformationNetwork)(config)
 
 
 def _build(part: str, make: Callable[[], nn.Module], target: torch.device, seed: int) -> nn.Module:

@@ -40,15 +40,19 @@ class Generate:
     """Side of a square with as many pixels as the picture will have; if left out, the model's."""
     fov: float | None = None
     """Horizontal field of view in degrees; if left out, from EXIF, else a 30 mm lens."""
+    fill: Literal["none", "video"] | None = None
+    """What shows where the image hides: extended layers (none), or what the video model generates
+    (video). If left out, the model decides; small: none."""
+    still: bool = False
+    """Nothing moves, whatever the prompt says."""
     steps: int | None = None
-    """Steps of the sampler; if left out, 1 where a branch tells motion, and 8 for a video."""
+    """Steps of the sampler. If left out, 1 for motion, 8 for video."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
     """How the flow is integrated; `diff4splat report error-time` compares them."""
     shift: float | None = None
-    """Above 1 spends more steps on noisy levels; if left out, 16 for motion, and 1 for a video."""
+    """Above 1 spends more steps on noisy levels. If left out, 16 for motion, 1 for video."""
     guidance: float | None = None
-    """How strongly to follow the prompt, 1 switches guidance off; if left out, 1 where a branch
-    tells motion, and 5 for a video."""
+    """Classifier-free guidance weight, 1 is off. If left out, 1 for motion, 5 for video."""
     min_opacity: float = 0.005
     """Fainter Gaussians are dropped."""
     skip_depth: bool = False
@@ -79,8 +83,7 @@ class Generate:
         for warning in summarize(path, PLANE_DEPTH).warnings:
             note(f"camera path: {warning}")
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
-            with log.phases.phase("load model"):
-                pipeline = Diff4SplatPipeline.from_pretrained(self.model)
+            pipeline = Diff4SplatPipeline.from_pretrained(self.model)
             scene = pipeline(picture, path, self.prompt, seed=self.seed, settings=settings, log=log)
             prepare_renderer(scene.gaussians, log.phases)
             if dropped := left_out(scene, float(scene.path.times_s[0])):
@@ -102,7 +105,7 @@ class Generate:
             MotionSettings,
             require_seed,
         )
-        from diff4splat.models.hub.pretrained import find_config
+        from diff4splat.models.hub.folders import find_config
         from diff4splat.models.text_encoder.prompt import require_prompt
 
         require_seed(self.seed)
@@ -114,6 +117,8 @@ class Generate:
         given = {name: value for name, value in given.items() if value is not None}
         return GenerationSettings(
             sampler=self.sampler,
+            fill=self.fill,
+            still=self.still,
             min_opacity=self.min_opacity,
             motion=MotionSettings(**given),
             **given,
@@ -121,11 +126,10 @@ class Generate:
 
     def picture(self) -> "Picture":
         """The photograph at the model's size."""
+        from diff4splat.generation.image_size import find_image_size
         from diff4splat.generation.input_image import load_image
-        from diff4splat.models.hub.pretrained import find_multiple_px, find_side_px
 
-        side_px = find_side_px(self.model) if self.resolution is None else self.resolution
-        multiple_px = find_multiple_px(self.model, side_px)
+        side_px, multiple_px = find_image_size(self.model, self.resolution, self.fill)
         return load_image(self.image, side_px, self.fov, self.convert, multiple_px)
 
     def inputs(

@@ -1,51 +1,63 @@
-"""A draft of the video: the reconstruction's guess from one picture, seen along the path (ours).
+"""The layered image seen along the path: what the video model is conditioned on (ADR 16, 26).
 
-Axes: ``c t h w`` latents, ``f hh ww`` video frames and pixels. Depth that one picture lets guess
-already says where most of it will be seen; the video model corrects what that gets wrong, fills in
-what was hidden and moves what the text says (rendered conditions as in ViewCrafter, arXiv
-2409.02048; docs/adr/0016). The draft stands still.
+Axes: ``f`` frames, ``h w`` pixels of the copy that the networks see, ``n`` Gaussians. All layers
+are rendered, with the motion of the motion prior. A pixel is valid where the image's own layers
+cover it; elsewhere the extended layers show a guess that the video model is to replace.
 """
 
+from dataclasses import dataclass
+
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.latents_to_gaussians import VideoLatent, canonical_scene
-from diff4splat.geometry.camera import Camera
-from diff4splat.models.hub.pretrained import Model
-from diff4splat.progress.run_log import RunLog
+from diff4splat.generation.layered_image.gaussians import image_gaussians
+from diff4splat.generation.layered_image.types import LayeredImage
+from diff4splat.models.hub.model import Model
+from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
-from diff4splat.scene.gaussians import Gaussians
+from diff4splat.render.settings import RenderSettings
 
-FAINTEST = 0.0
-"""Nothing is pruned: fresh heads leave later frames below any threshold."""
+MIN_COVERAGE = 0.5
+"""Opacity of the image's own layers from which a pixel is valid."""
+UNDILATED = RenderSettings(dilation_px2=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderedImage:
+    """A layered image along a path."""
+
+    rgb: Float[Tensor, "f h w 3"]
+    """In [0, 1]; the first frame is the image itself."""
+    valid: Bool[Tensor, "f h w"]
+    """Whether the image shows what the pixel sees; all true in the first frame."""
+    depth: Float[Tensor, "f h w"]
+    """z of the image's own layers; 0 where they cover nothing."""
 
 
 @torch.no_grad()
-def render_condition_latent(
-    model: Model, picture: InputImage, cameras: Camera
-) -> Float[Tensor, "1 c t h w"]:
-    """Standardised latent of the draft; ``cameras`` (f,) are the path's, relative to the first."""
-    return model.networks.vae.encode(render_condition_video(model, picture, cameras) * 2 - 1).mean
+def render_layered_image(image: LayeredImage, path: CameraPath) -> RenderedImage:
+    """Every camera of ``path`` at its time; the first one took the image."""
+    scene = image_gaussians(image, path.times_s)
+    first = image.layers[0]
+    rgb, valid = [first.rgb.float()], [first.mask]
+    depth = [first.depth.float()]
+    for index in range(1, len(path)):
+        state = scene.motion.state_at(scene.gaussians, float(path.times_s[index]))
+        camera = path.cameras[index]
+        rgb.append(render(state, camera, settings=UNDILATED).rgb.clamp(0, 1))
+        shown = state.select(slice(image.shown_count))
+        seen = render(shown, camera, outputs=("alpha", "depth"), settings=UNDILATED)
+        valid.append(seen.alpha > MIN_COVERAGE)
+        depth.append(seen.depth)
+    return RenderedImage(rgb=torch.stack(rgb), valid=torch.stack(valid), depth=torch.stack(depth))
 
 
 @torch.no_grad()
-def render_condition_video(
-    model: Model, picture: InputImage, cameras: Camera
-) -> Float[Tensor, "1 3 f hh ww"]:
-    """RGB in [0, 1]; the first frame is the picture itself."""
-    first = picture.rgb.movedim(-1, 0)[None, :, None].float()
-    if len(cameras) == 1:
-        return first
-    gaussians = input_gaussians(model, picture, cameras[:1])
-    later = render(gaussians, cameras[1:], outputs=("rgb",)).rgb
-    return torch.cat([first, later.movedim(-1, 0)[None].clamp(0, 1)], 2)
-
-
-def input_gaussians(model: Model, picture: InputImage, cameras: Camera) -> Gaussians:
-    """What the reconstruction sees in a video of one frame."""
-    image = picture.rgb.movedim(-1, 0)[None, :, None].float() * 2 - 1
-    latent = model.networks.vae.encode(image).mean
-    video = VideoLatent(latent=latent, picture=picture, cameras=cameras)
-    return canonical_scene(model, video, FAINTEST, RunLog()).gaussians
+def encode_condition(model: Model, rendered: RenderedImage) -> RenderCondition:
+    """The condition as the video model takes it."""
+    video = rendered.rgb.movedim(-1, 0)[None] * 2 - 1
+    return RenderCondition(
+        latent=model.networks.vae.encode(video).mean, validity=rendered.valid[None, None].to(video)
+    )

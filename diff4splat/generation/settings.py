@@ -1,12 +1,12 @@
 """What a user may choose about one generation; everything else is in the model's configuration."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, UNGUIDED, Guidance
 from diff4splat.flow.levels import Schedule, make_levels, require_levels
 from diff4splat.flow.samplers import find_sampler
+from diff4splat.models.config.model import Fill
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
@@ -16,23 +16,22 @@ ENOUGH_STEPS = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSettings:
-    """Sampling of a motion branch; defaults as measured in docs/results/generation.md."""
+    """Sampling of the motion prior; defaults as measured in docs/results/generation.md."""
 
     steps: int = 1
-    """One gives the mean of what the words allow; more draw one of the futures."""
+    """One gives the mean of what the prompt allows; more draw a sample per seed."""
     shift: float = 16.0
-    """As in its training: where things are is learnt at noisy levels."""
+    """As in its training: where objects are is learnt at noisy levels."""
     guidance: Guidance = UNGUIDED
-    moves_above: float = 0.3
-    """A pixel moves if it is more likely than this to move at all, or among the likeliest where
-    none is (docs/adr/0022)."""
+    threshold: float = 0.3
+    """A pixel moves if it is more probable than this, or among the most probable (ADR 22)."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
             raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
         require_levels(self.levels)
-        if not 0 <= self.moves_above <= 1:
-            raise ConfigError(f"moves_above: expected 0 to 1, got {self.moves_above:g}")
+        if not 0 <= self.threshold <= 1:
+            raise ConfigError(f"motion threshold: expected 0 to 1, got {self.threshold:g}")
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -42,7 +41,10 @@ class MotionSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GenerationSettings:
-    """Sampling, guidance and what to leave out of the scene."""
+    """Sampling, guidance, what fills hidden regions, and what to leave out of the scene.
+
+    ``steps``, ``sampler``, ``schedule``, ``shift`` and ``guidance`` are those of the video model.
+    """
 
     steps: int = 8
     sampler: str = "multistep2"
@@ -52,30 +54,36 @@ class GenerationSettings:
     """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
     guidance: Guidance = DEFAULT_GUIDANCE
     """Used only when there is a prompt."""
-    pictures: Literal["first", "sampled"] = "first"
-    """What is reconstructed where the video model corrects a draft and tells motion: the picture,
-    moved as told, or the sampled video as well (docs/adr/0018)."""
     motion: MotionSettings = MotionSettings()
-    """The same for a motion branch, where the model has one."""
+    """The same for the motion prior."""
+    fill: Fill | None = None
+    """What shows where the image hides: extended layers (none), or the video model; None takes the
+    model's default."""
+    still: bool = False
+    """Nothing moves, whatever the prompt says."""
     min_opacity: float = MIN_OPACITY
-    still_px: float = 0.05
-    """Gaussians that never move by more than this many pixels of the input view stand still."""
-    color_steps: int = 12
-    """Corrections of the input pixels' colours against the rendered input view; 0 switches off."""
+    static_threshold_px: float = 0.05
+    """Gaussians that never move by more than this many pixels of the input view are static."""
+    color_matching_steps: int = 12
+    """Corrections of the image's colours against the rendered input view; 0 switches off."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
             raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
-        if self.pictures not in ("first", "sampled"):
-            raise ConfigError(f"pictures: expected first or sampled, got {self.pictures!r}")
+        if self.fill not in (None, "none", "video"):
+            raise ConfigError(f"--fill: expected none or video, got {self.fill!r}")
         find_sampler(self.sampler)
         require_levels(self.levels)
-        if not 0 <= self.color_steps <= 100:
-            raise ConfigError(f"color_steps: expected 0 to 100, got {self.color_steps}")
+        if not 0 <= self.color_matching_steps <= 100:
+            raise ConfigError(
+                f"color_matching_steps: expected 0 to 100, got {self.color_matching_steps}"
+            )
         if not 0 <= self.min_opacity <= 1:
             raise ConfigError(f"--min-opacity: expected 0 to 1, got {self.min_opacity:g}")
-        if not 0 <= self.still_px < 100:
-            raise ConfigError(f"still_px: expected 0 to 100 pixels, got {self.still_px:g}")
+        if not 0 <= self.static_threshold_px < 100:
+            raise ConfigError(
+                f"static_threshold_px: expected 0 to 100, got {self.static_threshold_px:g}"
+            )
 
     @property
     def levels(self) -> tuple[float, ...]:

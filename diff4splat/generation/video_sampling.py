@@ -15,8 +15,8 @@ from torch import Tensor
 from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.models.motion_unet.motion_field import append_zero_motion
 from diff4splat.models.video_dit.dit import DitConditions, VideoDiT
+from diff4splat.models.video_dit.render_condition import RenderCondition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,17 +27,15 @@ class Conditions:
     plucker: Float[Tensor, "b 6 f height width"]
     text: Float[Tensor, "b s d"] | None
     """None without a prompt: then neither the text encoder nor the guidance pass exists."""
-    draft: Float[Tensor, "b c t h w"] | None = None
-    """For a model that sees one."""
+    render: RenderCondition | None = None
+    """For a model that takes one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SampledVideo:
-    """Clean video latents and what they cost."""
+class VideoSample:
+    """Clean video latents and the network calls they took."""
 
     latent: Float[Tensor, "b c t h w"]
-    motion: Float[Tensor, "b m t h w"]
-    """Where what the first frame shows goes to (``video_motion``); no channels without one."""
     calls: CallCount
 
 
@@ -47,36 +45,25 @@ def sample_video(
     settings: GenerationSettings,
     seed: int,
     advance: Callable[[], None] | None = None,
-) -> SampledVideo:
+) -> VideoSample:
     """Video latents for ``conditions``; one seed gives one video.
 
     Raises:
         ConfigError: an unknown sampler or schedule.
     """
-    calls, channels = CallCount(), conditions.image_latent.shape[1]
-    conditions = _with_motion(conditions, dit.motion_channels)
-    made = integrate(
+    calls = CallCount()
+    latent = integrate(
         find_sampler(settings.sampler),
         _velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
         settings.levels,
         advance,
     )
-    return SampledVideo(latent=made[:, :channels], motion=made[:, channels:], calls=calls)
-
-
-def _with_motion(conditions: Conditions, channels: int) -> Conditions:
-    """The first frame has gone nowhere yet, and a draft stands still."""
-    draft = conditions.draft
-    return replace(
-        conditions,
-        image_latent=append_zero_motion(conditions.image_latent, channels),
-        draft=None if draft is None else append_zero_motion(draft, channels),
-    )
+    return VideoSample(latent=latent, calls=calls)
 
 
 def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w"]:
-    """Seeded noise behind the clean first frame; drawn on the CPU, so every device starts alike."""
+    """Seeded noise after the clean first frame; drawn on the CPU, so every device starts alike."""
     image = conditions.image_latent
     frames = (conditions.plucker.shape[2] - 1) // 4
     generator = torch.Generator().manual_seed(seed)
@@ -88,7 +75,7 @@ def _velocity(
     dit: VideoDiT, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
     # Cameras and text are embedded once: they are the same at every level.
-    embedded = dit.prepare(conditions.plucker, conditions.text, draft=conditions.draft)
+    embedded = dit.prepare(conditions.plucker, conditions.text, condition=conditions.render)
     unconditional = _branch(dit, replace(embedded, text=None, pooled_text=None))
     if conditions.text is None:
         return guided(None, unconditional, UNGUIDED, calls)
@@ -99,7 +86,7 @@ def _branch(dit: VideoDiT, embedded: DitConditions) -> VelocityFn:
     def call(state: Tensor, level: float) -> Tensor:
         levels = state.new_full((state.shape[0], state.shape[2]), level)
         levels[:, 0] = 0
-        answer = dit.velocity(state, levels, embedded)
-        return torch.cat([torch.zeros_like(answer[:, :, :1]), answer[:, :, 1:]], 2)
+        velocity = dit.velocity(state, levels, embedded)
+        return torch.cat([torch.zeros_like(velocity[:, :, :1]), velocity[:, :, 1:]], 2)
 
     return call

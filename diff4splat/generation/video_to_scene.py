@@ -9,14 +9,16 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.errors import ShapeError
+from diff4splat.generation.canonical_scene import prune_cells
+from diff4splat.generation.deformation_motion import deform
 from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.latents_to_gaussians import VideoLatent, canonical_scene
-from diff4splat.generation.reconstruction import deform
+from diff4splat.generation.plan import RECONSTRUCTION_PARTS
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.static_pruning import prune_static_tracks, static_threshold_px
+from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
+from diff4splat.generation.video_to_gaussians import VideoLatent, video_gaussians
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.deformation.keyframes import DeformationUnits
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model, model_device, with_parts
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
@@ -31,10 +33,10 @@ def scene_from_video(
     settings: GenerationSettings | None = None,
     log: RunLog | None = None,
 ) -> Scene:
-    """The scene that LDRM and the deformation network see in a true video.
+    """The scene that LDRM and the deformation network reconstruct from a true video.
 
     ``video`` is RGB in [0, 1]; ``path`` holds one camera per frame, lengths in model units. Colours
-    are not matched to the first frame afterwards: what the networks say is what is judged.
+    are not matched to the first frame: evaluation is of what the networks predict.
 
     Raises:
         ShapeError: another number of cameras than frames.
@@ -43,33 +45,43 @@ def scene_from_video(
     settings, log = settings or GenerationSettings(), log or RunLog()
     _require_cameras(video, path)
     model.config.latent_grid(len(video), path.cameras.size_px)
-    cameras = relative_to_first(path.cameras.to(torch.float32)).to(model.device)
-    shown = video.to(model.device).float()
+    model = with_parts(model, RECONSTRUCTION_PARTS)
+    seen = _encode(model, video, path)
     with log.phases.phase("reconstruct"):
-        seen = VideoLatent(
-            latent=model.networks.vae.encode(shown.movedim(-1, 0)[None] * 2 - 1).mean,
-            picture=InputImage(rgb=shown[0], camera=cameras[0], focal_source="video"),
-            cameras=cameras,
-        )
-        canonical = canonical_scene(model, seen, settings.min_opacity, log)
+        canonical = video_gaussians(model, seen, log)
+        canonical = prune_cells(canonical, settings.min_opacity, log)
     units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.config.activation)
-    times_s = path.times_s.float().to(model.device)
+    times_s = path.times_s.float().to(seen.latent.device)
+    motion = deform(model.networks.deformation, canonical, times_s, units, log)
+    camera = seen.cameras[0]
+    threshold_px = deformation_threshold_px(model.config, camera, settings.static_threshold_px)
+    motion = prune_static_tracks(canonical.gaussians, motion, camera, threshold_px, log)
     scene = Scene(
         gaussians=canonical.gaussians,
-        motion=deform(model.networks.deformation, canonical, times_s, units, log),
+        motion=motion,
         path=path.to(torch.float32),
         provenance=_provenance(model),
     )
-    still_px = static_threshold_px(model.config, cameras[0], settings.still_px)
-    return prune_static_tracks(scene, cameras[0], still_px, log).to(torch.device("cpu"))
+    return scene.to(torch.device("cpu"))
+
+
+def _encode(model: Model, video: Float[Tensor, "f h w 3"], path: CameraPath) -> VideoLatent:
+    device = model_device(model)
+    cameras = relative_to_first(path.cameras.to(torch.float32)).to(device)
+    rgb = video.to(device).float()
+    return VideoLatent(
+        latent=model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean,
+        first_frame=InputImage(rgb=rgb[0], camera=cameras[0], focal_source="video"),
+        cameras=cameras,
+    )
 
 
 def _provenance(model: Model) -> Provenance:
     return Provenance(
         generator=f"diff4splat {__version__} reconstruction",
         model=model.config.name,
-        weights_sha256=model.weights_sha256,
-        untrained=not model.reconstructs,
+        weights_sha256=model.weights_sha256(RECONSTRUCTION_PARTS),
+        untrained=not model.trained.issuperset(RECONSTRUCTION_PARTS),
     )
 
 

@@ -13,6 +13,6 @@ class RunLog:
     phases: Phases = field(default_factory=Phases)
     omissions: Omissions = field(default_factory=Omissions)
 
-    def left_out(self, what: str, why: str, saved: str, error: float = 0.0) -> None:
+    def left_out(self, what: str, why: str, saved: str, error: float | None = 0.0) -> None:
         """Record one thing that this run did not need."""
         self.omissions.add(SkippedWork(what=what, why=why, saved=saved, error=error))

@@ -18,19 +18,20 @@ class SkippedWork:
     why: str
     saved: str
     """In words with a unit: ``1,234 parameters``, ``12 network calls``."""
-    error: float = 0.0
-    """What leaving it out changed in the result; 0 means nothing."""
+    error: float | None = 0.0
+    """What skipping it changed in the result: 0 is nothing, None is not measured."""
 
     def __post_init__(self) -> None:
         if not (self.what and self.why and self.saved):
             raise ConfigError(
                 "SkippedWork: expected what, why and saved in words, got an empty one"
             )
-        if not (math.isfinite(self.error) and self.error >= 0):
+        if self.error is not None and not (math.isfinite(self.error) and self.error >= 0):
             raise ConfigError(f"SkippedWork.error: expected 0 or above, got {self.error}")
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.why}; saved {self.saved}; error {self.error:.3g}"
+        error = "not measured" if self.error is None else f"{self.error:.3g}"
+        return f"{self.what}: {self.why}; saved {self.saved}; error {error}"
 
 
 @dataclass(slots=True)
@@ -50,6 +51,6 @@ class Omissions:
     def __len__(self) -> int:
         return len(self._records)
 
-    def to_json(self) -> list[dict[str, str | float]]:
+    def to_json(self) -> list[dict[str, str | float | None]]:
         """Plain values for ``card.json``."""
         return [asdict(record) for record in self._records]

@@ -5,35 +5,42 @@ The JSON form lists every field, so that a stored model never changes when a def
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields, is_dataclass
-from typing import TypeVar
+from typing import Any, Literal, TypeVar
 
 from diff4splat.errors import ConfigError, InputError
+from diff4splat.models.config.checks import require, require_counts
+from diff4splat.models.config.legacy import upgrade_config
 from diff4splat.models.config.networks import (
-    DETAIL_TOKEN_PX,
-    MOTION_CELL_PX,
+    REFINEMENT_TOKEN_PX,
     TIME_STRIDE,
     TOKEN_PATCH,
     ActivationConfig,
     DeformationConfig,
-    DetailConfig,
     DitConfig,
     LdrmConfig,
+    RefinementConfig,
     TextConfig,
     VaeConfig,
-    require,
-    require_counts,
 )
+from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
 
 Config = TypeVar("Config")
+Fill = Literal["none", "video"]
+"""What shows where the image hides: extended layers, or the video model's Gaussians."""
+VERSION = 2
+"""Of the JSON form; version 1 had no such key."""
 
 __all__ = [
     "ActivationConfig",
     "DeformationConfig",
-    "DetailConfig",
     "DitConfig",
     "LdrmConfig",
     "ModelConfig",
+    "MonocularDepthConfig",
+    "MotionUNetConfig",
+    "RefinementConfig",
     "TextConfig",
     "VaeConfig",
 ]
@@ -55,7 +62,12 @@ class ModelConfig:
     ldrm: LdrmConfig
     deformation: DeformationConfig
     activation: ActivationConfig
-    detail: DetailConfig = field(default_factory=DetailConfig)
+    refinement: RefinementConfig = field(default_factory=RefinementConfig)
+    monocular_depth: MonocularDepthConfig = field(default_factory=MonocularDepthConfig)
+    motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
+    default_fill: Fill = "video"
+    """What generation fills hidden regions with unless asked otherwise; the paper's is the video
+    model. ``none`` where that model still makes the image worse."""
 
     def __post_init__(self) -> None:
         named = isinstance(self.name, str) and self.name != ""
@@ -68,31 +80,29 @@ class ModelConfig:
             self.latent_grid(self.frames, self.size_px)
         except InputError as error:
             raise ConfigError(f"ModelConfig {error}") from error
-        sight = self.detail.used or self.ldrm.reads == "latents"
-        require(sight, "LdrmConfig.reads", "latents where there is no detail decoder", "frames")
-        whole = not self.detail.used or self.ldrm.grid_stride == 1
-        require(whole, "LdrmConfig.grid_stride", "1 with a detail decoder", self.ldrm.grid_stride)
-        fits = not self.detail.used or self.token_px == DETAIL_TOKEN_PX
-        expected = f"tokens of {DETAIL_TOKEN_PX} px with a detail decoder"
-        require(fits, "ModelConfig.vae", expected, self.token_px)
-        fits = not self.dit.motion or self.vae.space_stride % MOTION_CELL_PX == 0
-        expected = f"latent pixels of a multiple of {MOTION_CELL_PX} px for a motion"
-        require(fits, "ModelConfig.vae", expected, self.vae.space_stride)
+        known = self.default_fill in ("none", "video")
+        require(known, "ModelConfig.default_fill", "none or video", self.default_fill)
+        self._require_fitting_refinement()
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)
+
+    def _require_fitting_refinement(self) -> None:
+        """A refinement decoder sees frames and has one size of token."""
+        used = self.refinement.used
+        sees = used or self.ldrm.input == "latents"
+        require(sees, "LdrmConfig.input", "latents without a refinement decoder", "frames")
+        whole = not used or self.ldrm.grid_stride == 1
+        expected = "1 with a refinement decoder"
+        require(whole, "LdrmConfig.grid_stride", expected, self.ldrm.grid_stride)
+        fits = not used or self.token_px == REFINEMENT_TOKEN_PX
+        expected = f"tokens of {REFINEMENT_TOKEN_PX} px with a refinement decoder"
+        require(fits, "ModelConfig.vae", expected, self.token_px)
 
     @property
     def token_px(self) -> int:
         """Pixels per token side; picture sides must be multiples of it."""
         return self.vae.space_stride * TOKEN_PATCH
-
-    @property
-    def motion_channels(self) -> int:
-        """Channels that the video model makes beside those of the latent."""
-        if not self.dit.motion:
-            return 0
-        return 3 * (self.vae.space_stride // MOTION_CELL_PX) ** 2
 
     def latent_grid(self, frames: int, size_px: tuple[int, int]) -> tuple[int, int, int]:
         """(frames, height, width) of the latent of a video.
@@ -115,11 +125,11 @@ class ModelConfig:
 
     def to_json(self) -> str:
         """Every field, sorted, as indented JSON."""
-        return json.dumps(asdict(self), indent=2, sort_keys=True) + "\n"
+        return json.dumps({"version": VERSION} | asdict(self), indent=2, sort_keys=True) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> "ModelConfig":
-        """The configuration that ``to_json`` wrote.
+        """The configuration that ``to_json`` wrote, in this release or an earlier one.
 
         Raises:
             ConfigError: no JSON, an unknown or missing key, or a value out of range.
@@ -128,11 +138,25 @@ class ModelConfig:
             data = json.loads(text)
         except (json.JSONDecodeError, RecursionError) as error:
             raise ConfigError(f"model configuration: expected JSON, got {error}") from error
-        return _build(cls, data, "model configuration")
+        return _build(cls, _current(data), "model configuration")
 
     def fingerprint(self) -> str:
         """Twelve hexadecimal digits that change whenever any field does."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()[:12]
+
+
+def _current(data: Any) -> Any:
+    """The fields of this version; anything that is no object is refused later."""
+    if not isinstance(data, Mapping):
+        return data
+    version = data.get("version", 1)
+    if version not in (1, VERSION) or isinstance(version, bool):
+        raise ConfigError(
+            f"model configuration: expected version 1 or {VERSION}, got {version!r}; "
+            "a newer diff4splat may read it"
+        )
+    own = {key: value for key, value in data.items() if key != "version"}
+    return upgrade_config(own) if version == 1 else own
 
 
 def _build(kind: type[Config], data: object, where: str) -> Config:

@@ -8,49 +8,25 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from diff4splat.errors import ConfigError
+from diff4splat.models.config.checks import (
+    require,
+    require_counts,
+    require_heads,
+    require_optional_width,
+)
 
 TIME_STRIDE = 4
 """Video frames per latent frame after the first (paper); fixed, files depend on it."""
 TOKEN_PATCH = 2
 """Latent pixels per token side, in the video model and in LDRM (paper)."""
-DETAIL_TOKEN_PX = 16
-"""Pixels per token side that the detail decoder's three resolutions lead down to."""
+REFINEMENT_TOKEN_PX = 16
+"""Pixels per token side that the refinement decoder's three resolutions lead down to."""
 MOTION_CELL_PX = 4
-"""Pixels per cell side of the motion that a video model makes beside latents."""
+"""Pixels per cell side of the motion U-Net's displacement field."""
 GAUSSIAN_SPLIT = (3, 3, 4, 1, 1)
 """RGB, scale, quaternion, opacity, ray distance: K_g = 12 as in Wonderland, not in the paper."""
 DEFORMATION_SPLIT = (3, 4, 3)
 """Offset, rotation, scale offset: K_d = 10 (paper)."""
-
-
-def require(holds: bool, what: str, expected: str, got: object) -> None:
-    """Raise a ConfigError in the usual words unless ``holds``."""
-    if not holds:
-        raise ConfigError(f"{what}: expected {expected}, got {got!r}")
-
-
-def require_counts(config: object, *names: str) -> None:
-    """Every named field must be a whole number of at least 1."""
-    for name in names:
-        value = getattr(config, name)
-        whole = isinstance(value, int) and not isinstance(value, bool)
-        require(
-            whole and value >= 1,
-            f"{type(config).__name__}.{name}",
-            "a whole number of at least 1",
-            value,
-        )
-
-
-def require_heads(config: "TextConfig | DitConfig | LdrmConfig", smallest: int) -> None:
-    """The width must split into heads of an even width of at least ``smallest``."""
-    what = f"{type(config).__name__}.heads"
-    require(
-        config.width % config.heads == 0, what, f"a divisor of width {config.width}", config.heads
-    )
-    head = config.width // config.heads
-    require(head % 2 == 0 and head >= smallest, what, f"even heads of at least {smallest}", head)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,13 +41,13 @@ class VaeConfig:
     """Pixels per side folded into channels before the first convolution (2 in Wan 2.2)."""
     blocks: int = 1
     """Residual blocks per resolution (2 in Wan 2.1)."""
-    linear_code: bool = False
-    """Convolutions correct a linear code instead of doing all (ours; docs/adr/0014)."""
+    pca_shortcut: bool = False
+    """Convolutions correct a linear (PCA) autoencoder instead of doing all (ours; ADR 14)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "latent_channels", "pixel_patch", "blocks")
-        known = isinstance(self.linear_code, bool)
-        require(known, "VaeConfig.linear_code", "true or false", self.linear_code)
+        known = isinstance(self.pca_shortcut, bool)
+        require(known, "VaeConfig.pca_shortcut", "true or false", self.pca_shortcut)
         enough = isinstance(self.widths, tuple) and len(self.widths) >= 3
         require(
             enough, "VaeConfig.widths", "at least 3 widths, for two halvings of time", self.widths
@@ -84,8 +60,8 @@ class VaeConfig:
                 width,
             )
         most = 3 * TIME_STRIDE * self.space_stride**2
-        fits = not self.linear_code or self.latent_channels <= most
-        expected = f"at most the {most} values of a block with a linear code"
+        fits = not self.pca_shortcut or self.latent_channels <= most
+        expected = f"at most the {most} values of a block with a PCA shortcut"
         require(fits, "VaeConfig.latent_channels", expected, self.latent_channels)
 
     @property
@@ -105,18 +81,20 @@ class TextConfig:
     feedforward_width: int
     max_bytes: int = 512
     """Longest prompt in UTF-8 bytes; inferred from Wan's 512 text tokens."""
-    buckets: int = 32
+    relative_position_buckets: int = 32
     """Relative-position buckets (T5)."""
     max_distance: int = 128
     """Distance in bytes from which all positions share a bucket (T5)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "width", "blocks", "heads", "feedforward_width", "max_bytes")
-        require_counts(self, "buckets", "max_distance")
+        require_counts(self, "relative_position_buckets", "max_distance")
         require_heads(self, smallest=2)
-        require(self.buckets % 4 == 0, "TextConfig.buckets", "a multiple of 4", self.buckets)
-        far = self.buckets // 4 < self.max_distance
-        require(far, "TextConfig.max_distance", f"above {self.buckets // 4}", self.max_distance)
+        buckets = self.relative_position_buckets
+        fits = buckets % 4 == 0
+        require(fits, "TextConfig.relative_position_buckets", "a multiple of 4", buckets)
+        far = buckets // 4 < self.max_distance
+        require(far, "TextConfig.max_distance", f"above {buckets // 4}", self.max_distance)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,44 +113,24 @@ class DitConfig:
     """Width of the sinusoid of the noise level (Wan)."""
     camera_width: int = 64
     """Hidden width of the camera adapter (inferred; AC3D finds a narrow one enough)."""
-    predicts: Literal["velocity", "clean"] = "velocity"
+    prediction_type: Literal["velocity", "clean"] = "velocity"
     """Velocity (paper), or the clean latent that it leads to: where a token holds more numbers than
     the width, noise does not fit through and data do (JiT, arXiv 2511.13720)."""
-    draft: bool = False
-    """Also sees a draft of the video, and corrects it if it predicts clean latents (ours;
-    docs/adr/0016)."""
-
+    render_condition: bool = False
+    """Also sees the layered image rendered along the path, with a mask of valid pixels, and
+    corrects it if it predicts clean latents (ours; as GEN3C and ViewCrafter; ADR 16, 26)."""
     pooled_text: bool = False
     """The mean of the text states also modulates every block, as the noise level does (Stable
-    Diffusion 3, arXiv 2403.03206): what a text means for all tokens need not pass attention."""
-    motion: bool = False
-    """Also makes, beside the latent, where what the first frame shows goes to (ours;
-    docs/adr/0018)."""
-    motion_width: int = 0
-    """Width of a branch that tells that motion instead, from the pixels of the first picture (ours;
-    docs/adr/0022); 0 is none."""
-    motion_outline: int = 0
-    """Width of what that branch sees the edges of things with (ours; docs/adr/0025); 0 is none."""
+    Diffusion 3, arXiv 2403.03206)."""
 
     def __post_init__(self) -> None:
         require_counts(
             self, "width", "blocks", "heads", "feedforward_width", "frequency_width", "camera_width"
         )
         require_heads(self, smallest=6)
-        whole = isinstance(self.motion_width, int) and not isinstance(self.motion_width, bool)
-        fits = whole and self.motion_width >= 0 and self.motion_width % (2 * self.heads) == 0
-        multiple = f"0 or a multiple of {2 * self.heads}, twice the heads"
-        require(fits, "DitConfig.motion_width", multiple, self.motion_width)
-        told = self.motion or not self.motion_width
-        require(told, "DitConfig.motion", "true where a branch tells it", self.motion)
-        width = self.motion_outline
-        whole = isinstance(width, int) and not isinstance(width, bool) and width >= 0
-        require(whole, "DitConfig.motion_outline", "a whole number of at least 0", width)
-        told = bool(self.motion_width) or not width
-        require(told, "DitConfig.motion_outline", "0 without a branch that it belongs to", width)
-        known = self.predicts in ("velocity", "clean")
-        require(known, "DitConfig.predicts", "velocity or clean", self.predicts)
-        for name in ("draft", "motion", "pooled_text"):
+        known = self.prediction_type in ("velocity", "clean")
+        require(known, "DitConfig.prediction_type", "velocity or clean", self.prediction_type)
+        for name in ("render_condition", "pooled_text"):
             value = getattr(self, name)
             require(isinstance(value, bool), f"DitConfig.{name}", "true or false", value)
         require(
@@ -199,8 +157,8 @@ class LdrmConfig:
     """Latent channels are first projected to 64 (paper)."""
     grid_stride: Literal[1, 2] = 1
     """1: a Gaussian per pixel (paper); 2: one per 2 by 2 pixels (Wonderland, high resolution)."""
-    reads: Literal["latents", "frames"] = "latents"
-    """Latents (paper), or the pictures themselves: for comparison only."""
+    input: Literal["latents", "frames"] = "latents"
+    """Latents (paper), or the video frames themselves: for comparison only."""
 
     def __post_init__(self) -> None:
         require_counts(
@@ -208,46 +166,42 @@ class LdrmConfig:
         )
         require_heads(self, smallest=6)
         require(self.grid_stride in (1, 2), "LdrmConfig.grid_stride", "1 or 2", self.grid_stride)
-        known = self.reads in ("latents", "frames")
-        require(known, "LdrmConfig.reads", "latents or frames", self.reads)
+        known = self.input in ("latents", "frames")
+        require(known, "LdrmConfig.input", "latents or frames", self.input)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DetailConfig:
-    """Decoder with pictures beside tokens (ours, docs/adr/0015); a width of 0 leaves it out."""
+class RefinementConfig:
+    """LDRM's convolutional decoder, which sees frames beside tokens (ours, ADR 15)."""
 
-    width: int = 0
-    """Channels at a quarter of the resolution; two thirds more at each of two coarser ones."""
+    channels: int = 0
+    """At a quarter of the resolution, two thirds more at each of two coarser ones; 0: none."""
     match_channels: int = 16
     """Features that are compared between frames."""
-    depths: int = 24
-    """Depths at which they are compared; 0 leaves the comparison out."""
-    range: tuple[float, float] = (1.0, 60.0)
-    """Nearest and farthest compared depth, in units of which the plane stands at 4."""
-    surroundings: int = 16
-    """Cells of a quarter resolution that continue the first picture beyond its borders, a multiple
-    of 4: part of the layer is seen four times coarser; 0 leaves the layer out."""
-    picture_width: int = 0
-    """Channels at half the resolution of the decoder's network for the depth of a picture without a
-    video (ours, docs/adr/0023); 0 leaves it out."""
+    cost_volume_depths: int = 24
+    """Depths at which they are compared; 0 leaves the cost volume out."""
+    depth_range: tuple[float, float] = (1.0, 60.0)
+    """Nearest and farthest compared depth, in units of which the plane lies at 4."""
+    border_cells: int = 16
+    """Cells of 4 px by which the layer behind the first frame extends beyond its border, a
+    multiple of 4; 0 leaves the layer out."""
 
     def __post_init__(self) -> None:
         require_counts(self, "match_channels")
-        for name in ("width", "depths", "surroundings", "picture_width"):
-            value = getattr(self, name)
-            whole = isinstance(value, int) and not isinstance(value, bool) and value >= 0
-            require(whole, f"DetailConfig.{name}", "a whole number of at least 0", value)
-        coarse = self.surroundings % 4 == 0
-        require(coarse, "DetailConfig.surroundings", "a multiple of 4", self.surroundings)
-        pair = isinstance(self.range, tuple) and len(self.range) == 2
-        pair = pair and all(isinstance(depth, int | float) for depth in self.range)
-        ordered = pair and 0 < self.range[0] < self.range[1] < math.inf
-        require(ordered, "DetailConfig.range", "two rising depths above 0", self.range)
+        for name in ("channels", "cost_volume_depths", "border_cells"):
+            require_optional_width(self, name)
+        coarse = self.border_cells % 4 == 0
+        require(coarse, "RefinementConfig.border_cells", "a multiple of 4", self.border_cells)
+        pair = isinstance(self.depth_range, tuple) and len(self.depth_range) == 2
+        pair = pair and all(isinstance(depth, int | float) for depth in self.depth_range)
+        ordered = pair and 0 < self.depth_range[0] < self.depth_range[1] < math.inf
+        expected = "two rising depths above 0"
+        require(ordered, "RefinementConfig.depth_range", expected, self.depth_range)
 
     @property
     def used(self) -> bool:
         """Whether there is such a decoder."""
-        return self.width > 0
+        return self.channels > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,16 +214,17 @@ class DeformationConfig:
     """Time-conditioned residual blocks."""
     level_widths: tuple[int, int, int] = (48, 24, 12)
     """Channels of the features at 1/2, 1/4 and 1/8 of the token side."""
-    octaves: int = 10
+    time_frequencies: int = 10
     """Frequencies 2^0 … 2^9 of the time embedding (MoVieS)."""
-    noise_px: float = 0.0
-    """How far trained weights move what stands still, in pixels of the model's own size: Gaussians
-    that are said to move less are taken to stand (ours, measured)."""
+    static_threshold_px: float = 0.0
+    """How far trained weights move what is static, in pixels of the model's own size: Gaussians
+    that the network moves by less are static (ours, measured)."""
 
     def __post_init__(self) -> None:
-        require_counts(self, "width", "blocks", "octaves")
-        small = 0 <= self.noise_px < math.inf
-        require(small, "DeformationConfig.noise_px", "a number from 0 on", self.noise_px)
+        require_counts(self, "width", "blocks", "time_frequencies")
+        threshold = self.static_threshold_px
+        small = 0 <= threshold < math.inf
+        require(small, "DeformationConfig.static_threshold_px", "a number from 0 on", threshold)
         three = isinstance(self.level_widths, tuple) and len(self.level_widths) == 3
         require(three, "DeformationConfig.level_widths", "three widths", self.level_widths)
         for width in self.level_widths:

@@ -7,10 +7,12 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import (
     ActivationConfig,
     DeformationConfig,
-    DetailConfig,
     DitConfig,
     LdrmConfig,
     ModelConfig,
+    MonocularDepthConfig,
+    MotionUNetConfig,
+    RefinementConfig,
     TextConfig,
     VaeConfig,
 )
@@ -28,7 +30,7 @@ def test_size() -> ModelConfig:
             width=24, blocks=2, heads=2, feedforward_width=48, frequency_width=16, camera_width=8
         ),
         ldrm=LdrmConfig(width=24, heads=2, feedforward_width=48, blocks=2, embed_channels=8),
-        deformation=DeformationConfig(width=16, level_widths=(8, 6, 4), octaves=4),
+        deformation=DeformationConfig(width=16, level_widths=(8, 6, 4), time_frequencies=4),
         activation=ActivationConfig(),
     )
 
@@ -43,7 +45,7 @@ def small_size() -> ModelConfig:
         name="small",
         frames=9,
         size_px=(64, 64),
-        vae=VaeConfig(latent_channels=128, widths=(32, 64, 96), pixel_patch=2, linear_code=True),
+        vae=VaeConfig(latent_channels=128, widths=(32, 64, 96), pixel_patch=2, pca_shortcut=True),
         text=TextConfig(width=128, blocks=3, heads=4, feedforward_width=256),
         dit=DitConfig(
             width=256,
@@ -51,17 +53,19 @@ def small_size() -> ModelConfig:
             heads=4,
             feedforward_width=768,
             camera_width=64,
-            predicts="clean",
-            draft=True,
-            motion=True,
-            motion_width=64,
-            motion_outline=32,
+            prediction_type="clean",
+            render_condition=True,
             pooled_text=True,
         ),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
-        deformation=DeformationConfig(width=64, blocks=3, octaves=3, noise_px=4.0),
+        deformation=DeformationConfig(
+            width=64, blocks=3, time_frequencies=3, static_threshold_px=4.0
+        ),
         activation=ActivationConfig(),
-        detail=DetailConfig(width=48, picture_width=32),
+        refinement=RefinementConfig(channels=48),
+        monocular_depth=MonocularDepthConfig(channels=32),
+        motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32),
+        default_fill="none",
     )
 
 

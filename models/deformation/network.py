@@ -72,10 +72,10 @@ class DeformationNetwork(nn.Module):
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         own = config.deformation
-        self.octaves = own.octaves
+        self.time_frequencies = own.time_frequencies
         self.last_scale = config.token_px // 2 ** len(own.level_widths) // config.ldrm.grid_stride
         self.token_projection = nn.Linear(config.ldrm.width, own.width)
-        self.time_mlp = EmbeddingMlp(4 * own.octaves, own.width)
+        self.time_mlp = EmbeddingMlp(4 * own.time_frequencies, own.width)
         self.blocks = nn.ModuleList([TimeBlock(own.width) for _ in range(own.blocks)])
         widths = (own.width, *own.level_widths)
         self.levels = nn.ModuleList(
@@ -118,8 +118,10 @@ class DeformationNetwork(nn.Module):
         frames = tokens.shape[2]
         latent_frame = torch.arange(frames, dtype=torch.float32, device=tokens.device)
         own_time = latent_frame / max(frames - 1, 1)
-        query = octave_embedding(time, self.octaves)[:, None].expand(-1, frames, -1)
-        own = octave_embedding(own_time, self.octaves)[None].expand(tokens.shape[0], -1, -1)
+        query = octave_embedding(time, self.time_frequencies)[:, None].expand(-1, frames, -1)
+        own = octave_embedding(own_time, self.time_frequencies)[None].expand(
+            tokens.shape[0], -1, -1
+        )
         condition = self.time_mlp(torch.cat([query, own], -1))
         features = self.token_projection(tokens.movedim(1, -1))
         for block in self.blocks:

@@ -61,13 +61,13 @@ class RefinedDeformation(nn.Module):
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         own = config.deformation
-        self.octaves = own.octaves
-        seen = widths(config.detail.width)[0]
+        self.time_frequencies = own.time_frequencies
+        seen = widths(config.refinement.channels)[0]
         # Features grow along their skips; cues would drown in them.
         self.norm_in = ChannelRmsNorm(seen)
-        self.enter = nn.Conv2d(seen + CUES, own.width, 3, padding=1)
-        self.enter_now = nn.Conv2d(SLOT_CUES, own.width, 3, padding=1)
-        self.time_mlp = EmbeddingMlp(4 * own.octaves, own.width)
+        self.input_conv = nn.Conv2d(seen + CUES, own.width, 3, padding=1)
+        self.input_motion = nn.Conv2d(SLOT_CUES, own.width, 3, padding=1)
+        self.time_mlp = EmbeddingMlp(4 * own.time_frequencies, own.width)
         self.blocks = nn.ModuleList(
             [TimeConvBlock(own.width, own.width) for _ in range(own.blocks)]
         )
@@ -84,28 +84,28 @@ class RefinedDeformation(nn.Module):
         self, tokens: Float[Tensor, "b d k h w"], time: Float[Tensor, " b"]
     ) -> Float[Tensor, "b 10 k h4 w4"]:
         """Channels offset 3, rotation 4, scale offset 3; zero means "does not move"."""
-        return self._at(self._entered(tokens), tokens, time)
+        return self._at(self._input_features(tokens), tokens, time)
 
     def at_times(
         self, tokens: Float[Tensor, "b d k h w"], times: Iterable[Float[Tensor, " b"]]
     ) -> Iterator[Float[Tensor, "b 10 k h4 w4"]]:
         """The same at one time after the other; what does not depend on time is computed once."""
-        entered = self._entered(tokens)
+        input_features = self._input_features(tokens)
         for time in times:
-            yield self._at(entered, tokens, time)
+            yield self._at(input_features, tokens, time)
 
-    def _entered(self, tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n c h w"]:
+    def _input_features(self, tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n c h w"]:
         seen, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
-        return self.enter(torch.cat([self.norm_in(seen), cues], 1))
+        return self.input_conv(torch.cat([self.norm_in(seen), cues], 1))
 
     def _at(
-        self, entered: Float[Tensor, "n c h w"], tokens: Tensor, time: Float[Tensor, " b"]
+        self, input_features: Float[Tensor, "n c h w"], tokens: Tensor, time: Float[Tensor, " b"]
     ) -> Float[Tensor, "b 10 k h4 w4"]:
         batch, _, keys = tokens.shape[:3]
         own = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
         elapsed, condition = time[:, None] - own, self._condition(time, own)
         now = _seen_at(tokens, elapsed)
-        features = entered + self.enter_now(now)
+        features = input_features + self.input_motion(now)
         for block in self.blocks:
             features = block(features, condition)
         features = torch.nn.functional.silu(self.norm(features))
@@ -119,8 +119,8 @@ class RefinedDeformation(nn.Module):
     def _condition(
         self, time: Float[Tensor, " b"], own: Float[Tensor, " k"]
     ) -> Float[Tensor, "n e"]:
-        query = octave_embedding(time, self.octaves)[:, None].expand(-1, len(own), -1)
-        source = octave_embedding(own, self.octaves)[None].expand(len(time), -1, -1)
+        query = octave_embedding(time, self.time_frequencies)[:, None].expand(-1, len(own), -1)
+        source = octave_embedding(own, self.time_frequencies)[None].expand(len(time), -1, -1)
         return self.time_mlp(torch.cat([query, source], -1)).flatten(0, 1)
 
 

@@ -18,9 +18,15 @@ from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.io.atomic import atomic_folder
 from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.checksums import SUMS_FILE, write_sums
-from diff4splat.models.hub.pretrained import Model, with_text_encoder
+from diff4splat.models.hub.model import Model, with_parts
 from diff4splat.models.hub.provenance import PROVENANCE_FILE, ModelProvenance, write_provenance
-from diff4splat.models.hub.weights import CONFIG_FILE, part_file, save_networks, weights_sha256
+from diff4splat.models.hub.weights import (
+    CONFIG_FILE,
+    has_weights,
+    part_file,
+    save_networks,
+    weights_sha256,
+)
 
 PACKED_TYPE = torch.float16
 LARGEST = torch.finfo(PACKED_TYPE).max
@@ -51,7 +57,7 @@ def export_model(
     """
     chosen = frozenset(model.trained if parts is None else parts)
     _require_weights(model, chosen)
-    complete = with_text_encoder(model) if "text_encoder" in chosen else model
+    complete = with_parts(model, chosen)
     named = [(name, part) for name, part in complete.networks.parts() if name in chosen]
     for name, part in named:
         require_half_precision(part, name)
@@ -86,7 +92,7 @@ def _require_weights(model: Model, chosen: Collection[str]) -> None:
             "finish a stage of training, or name the parts"
         )
     for name in sorted(chosen):
-        held = model.folder is not None and part_file(model.folder, name).is_file()
+        held = model.folder is not None and has_weights(model.folder, name)
         if name not in PARTS or not held:
             known = ", ".join(PARTS)
             raise ConfigError(

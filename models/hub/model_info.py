@@ -6,10 +6,10 @@ from pathlib import Path
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import size_by_name
-from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.pretrained import checked_folder
+from diff4splat.models.factory import model_parts
+from diff4splat.models.hub.folders import checked_folder
 from diff4splat.models.hub.provenance import ModelProvenance, read_provenance
-from diff4splat.models.hub.weights import load_config, part_file, weights_sha256
+from diff4splat.models.hub.weights import has_weights, load_config, weights_sha256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,24 +33,25 @@ def model_info(name_or_folder: str | Path) -> ModelInfo:
     """
     folder = checked_folder(name_or_folder)
     if folder is None:
+        config = size_by_name(str(name_or_folder))
         return ModelInfo(
-            config=size_by_name(str(name_or_folder)),
+            config=config,
             provenance=ModelProvenance(),
-            states=dict.fromkeys(PARTS, "random"),
+            states=dict.fromkeys(model_parts(config), "random"),
             place="none: random weights",
             weights_sha256="none",
         )
-    provenance = read_provenance(folder)
+    config, provenance = load_config(folder), read_provenance(folder)
     return ModelInfo(
-        config=load_config(folder),
+        config=config,
         provenance=provenance,
-        states={part: _state(folder, part, provenance) for part in PARTS},
+        states={part: _state(folder, part, provenance) for part in model_parts(config)},
         place=str(folder),
         weights_sha256=weights_sha256(folder),
     )
 
 
 def _state(folder: Path, part: str, provenance: ModelProvenance) -> str:
-    if not part_file(folder, part).is_file():
+    if not has_weights(folder, part):
         return "random" if part in provenance.may_lack else "missing"
     return "trained" if part in provenance.trained else "untrained"

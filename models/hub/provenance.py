@@ -11,13 +11,15 @@ parts allows a folder without the others: elsewhere a part without a file is a b
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from diff4splat.errors import CheckpointError
 from diff4splat.io.atomic import write_text
 from diff4splat.models.factory import PARTS
+from diff4splat.models.hub.legacy import SOURCES
+from diff4splat.models.hub.weights import is_version_1
 
 PROVENANCE_FILE = "provenance.json"
 FORMAT, VERSION = "diff4splat-model", 2
@@ -49,7 +51,7 @@ def read_provenance(folder: Path) -> ModelProvenance:
     if not file.is_file():
         return ModelProvenance()
     try:
-        return _parse(json.loads(file.read_text(encoding="utf-8")), file)
+        found = _parse(json.loads(file.read_text(encoding="utf-8")), file)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         if isinstance(error, CheckpointError):
             raise
@@ -57,6 +59,7 @@ def read_provenance(folder: Path) -> ModelProvenance:
             f"{file}: expected a JSON object with 'trained', or 'untrained' in version 1, "
             "got something else; fetch the model again"
         ) from error
+    return _with_priors(found) if is_version_1(folder) else found
 
 
 def write_provenance(provenance: ModelProvenance, folder: Path) -> None:
@@ -70,6 +73,13 @@ def write_provenance(provenance: ModelProvenance, folder: Path) -> None:
     }
     text = json.dumps(record, indent=2, ensure_ascii=False)
     write_text(folder / PROVENANCE_FILE, text + "\n")
+
+
+def _with_priors(provenance: ModelProvenance) -> ModelProvenance:
+    """Version 1 trained the priors with the part whose file held them."""
+    priors = {part for part, (file, _) in SOURCES.items() if file in provenance.trained}
+    trained = provenance.trained | priors
+    return replace(provenance, trained=trained, may_lack=provenance.may_lack - priors)
 
 
 def _parse(record: Mapping[str, Any], file: Path) -> ModelProvenance:

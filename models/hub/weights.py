@@ -1,14 +1,15 @@
 """Networks on disk: one ``.safetensors`` per part beside ``config.json``; never pickle.
 
-    config.json  {vae,text_encoder,dit,ldrm,deformation}.safetensors
+    config.json  {vae,text_encoder,dit,ldrm,deformation,monocular_depth,motion_unet}.safetensors
 
 Reading is strict: every key and every shape must be the one the configuration asks for. Weights
-may be stored in half precision; they are read into float32. Whether a part may be absent is for
-provenance.py to say.
+may be stored in half precision; they are read into float32. Folders of version 1 are read too
+(``legacy.py``). Whether a part may be absent is for provenance.py to say.
 """
 
 import hashlib
-from collections.abc import Collection
+import json
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import torch
@@ -19,8 +20,8 @@ from torch import Tensor, nn
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.atomic import atomic_path, write_text
 from diff4splat.models.config.model import ModelConfig
-from diff4splat.models.factory import PARTS, Networks, create_networks, create_text_encoder
-from diff4splat.models.text_encoder.encoder import TextEncoder
+from diff4splat.models.factory import PARTS, Networks, create_networks, model_parts
+from diff4splat.models.hub.legacy import legacy_file, upgrade_tensors
 
 CONFIG_FILE = "config.json"
 SHOWN = 3
@@ -54,68 +55,85 @@ def save_networks(
 
 
 def load_networks(
-    folder: Path, with_text: bool = True, may_lack: Collection[str] = ()
-) -> tuple[ModelConfig, Networks]:
-    """The configuration and its networks, on the CPU in float32.
+    folder: Path,
+    config: ModelConfig,
+    parts: Collection[str] | None = None,
+    may_lack: Collection[str] = (),
+) -> Networks:
+    """The named parts of a model folder, or all, on the CPU in float32.
 
     Parts in ``may_lack`` that have no file get the random weights of ``create_networks``.
 
     Raises:
         CheckpointError: a file is absent, or keys or shapes do not belong to the configuration.
         FileFormatError: a file is damaged.
-        ConfigError: the configuration is not valid.
     """
-    config = load_config(folder)
-    drawn = {name for name in may_lack if not part_file(folder, name).is_file()}
-    networks = create_networks(config, with_text=with_text, needed=drawn)
-    for name, part in networks.parts():
-        if name not in drawn:
-            _fill(part, _read(part_file(folder, name)), name)
-    return config, networks
-
-
-def load_text_encoder(folder: Path, config: ModelConfig) -> TextEncoder:
-    """The text encoder of a model folder, alone.
-
-    Raises:
-        CheckpointError, FileFormatError: as ``load_networks``.
-    """
-    encoder = create_text_encoder(config, "meta")
-    _fill(encoder, _read(part_file(folder, "text_encoder")), "text_encoder")
-    return encoder
+    wanted = [part for part in model_parts(config) if parts is None or part in parts]
+    drawn = {part for part in wanted if part in may_lack and not has_weights(folder, part)}
+    stored = create_networks(config, "meta", parts=set(wanted) - drawn)
+    for name, part in stored.parts():
+        _fill(part, _read_part(folder, name, config), name)
+    random = create_networks(config, parts=drawn)
+    return Networks(**dict(stored.parts()), **dict(random.parts()))
 
 
 def load_config(folder: Path) -> ModelConfig:
     """The configuration alone."""
+    return ModelConfig.from_json(_config_text(folder))
+
+
+def weights_sha256(folder: Path, parts: Iterable[str] = PARTS) -> str:
+    """SHA-256 over the weight files of ``parts`` that exist, in a fixed order, names included."""
+    digest = hashlib.sha256()
+    for path in sorted({weight_file(folder, part) for part in parts}):
+        if path.is_file():
+            with path.open("rb") as file:
+                found = hashlib.file_digest(file, "sha256").hexdigest()
+            digest.update(f"{path.stem}:{found}\n".encode())
+    return digest.hexdigest()
+
+
+def part_file(folder: Path, name: str) -> Path:
+    """Where a part's weights are written."""
+    return folder / f"{name}.safetensors"
+
+
+def weight_file(folder: Path, part: str) -> Path:
+    """Where a part's weights are read from; version 1 kept the priors in other files."""
+    return part_file(folder, legacy_file(part) if is_version_1(folder) else part)
+
+
+def has_weights(folder: Path, part: str) -> bool:
+    """Whether the folder holds a part's weights."""
+    return weight_file(folder, part).is_file()
+
+
+def is_version_1(folder: Path) -> bool:
+    """Whether the folder has the layout of version 1; without a configuration it has not."""
+    try:
+        data = json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(data, dict) and data.get("version", 1) == 1
+
+
+def _config_text(folder: Path) -> str:
     path = folder / CONFIG_FILE
     if not path.is_file():
         raise CheckpointError(
             f"{folder}: expected a model folder with {CONFIG_FILE}, got none; check the path"
         )
     try:
-        return ModelConfig.from_json(path.read_text(encoding="utf-8"))
+        return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise FileFormatError(
             f"{path}: expected JSON in UTF-8, got other bytes; fetch the model again"
         ) from error
 
 
-def weights_sha256(folder: Path) -> str:
-    """SHA-256 over the weight files that exist, names included, in a fixed order."""
-    digest = hashlib.sha256()
-    for name in PARTS:
-        path = part_file(folder, name)
-        if path.is_file():
-            with path.open("rb") as file:
-                digest.update(
-                    f"{name}:{hashlib.file_digest(file, 'sha256').hexdigest()}\n".encode()
-                )
-    return digest.hexdigest()
-
-
-def part_file(folder: Path, name: str) -> Path:
-    """Where a part's weights lie."""
-    return folder / f"{name}.safetensors"
+def _read_part(folder: Path, part: str, config: ModelConfig) -> dict[str, Tensor]:
+    tensors = _read(weight_file(folder, part))
+    return upgrade_tensors(part, tensors, config) if is_version_1(folder) else tensors
 
 
 def _read(path: Path) -> dict[str, Tensor]:

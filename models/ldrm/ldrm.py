@@ -8,11 +8,11 @@ length:
     rays ─── patch 4×16×16 ─ linear ─ norm ─────────┴─ concatenate ─ linear ─ blocks ─ norm ─ tokens
     tokens ─ transposed convolution 4×16×16 (zero at first), drop 3 frames ─ 12 channels per pixel
 
-The zero layer makes a fresh model answer exactly 0, which the heads read as "the base scene".
-With a detail decoder (``detail/``) the last line is another:
+The zero layer makes a fresh model output exactly 0, which the heads read as "the base scene".
+With refinement (``refinement/``) the last line differs:
 
-    tokens, decoded pictures, cameras ─ decoder ─┬─ 12 channels per pixel of the key frames
-                                                 └─ 12 channels per cell around the first picture
+    tokens, decoded frames, cameras ─ decoder ─┬─ 12 channels per pixel of the key frames
+                                               └─ 12 channels per cell of the border layer
 """
 
 import torch
@@ -41,7 +41,7 @@ class Ldrm(nn.Module):
         ldrm = config.ldrm
         self.config = ldrm
         self.token_px = config.token_px
-        if ldrm.reads == "latents":
+        if ldrm.input == "latents":
             self.latent_embedding = nn.Linear(config.vae.latent_channels, ldrm.embed_channels)
             self.latent_tokens = nn.Linear(ldrm.embed_channels * TOKEN_PATCH**2, ldrm.width)
         else:
@@ -57,41 +57,41 @@ class Ldrm(nn.Module):
             ]
         )
         self.norm_out = nn.LayerNorm(ldrm.width, eps=EPSILON)
-        self.detail = RefinementBranch(config) if config.detail.used else None
-        if self.detail is None:
+        self.refinement = RefinementBranch(config) if config.refinement.used else None
+        if self.refinement is None:
             self.to_gaussians = _to_pixels(ldrm, self.token_px // ldrm.grid_stride)
 
     def forward(
         self,
         latent: Float[Tensor, "b c t h w"],
         camera: Float[Tensor, "b 6 f hh ww"],
-        sight: PosedVideo | None = None,
+        posed_video: PosedVideo | None = None,
         *,
         moving: bool = True,
     ) -> RawGaussianMaps:
         """Raw maps; ``camera`` is the Plücker map of the video frames relative to the first camera.
 
-        ``sight`` is looked at by the detail decoder only. Where nothing is to be ``moving``, pixels
-        are not followed either, and the deformation network cannot be asked.
+        Only refinement uses the ``posed_video``. If nothing is ``moving``, optical flow is not
+        computed, and the deformation network cannot be run on the tokens.
 
         Raises:
-            ShapeError: latent and rays do not belong to the same video, or a sight is missing.
+            ShapeError: latent and rays belong to different videos, or the posed video is missing.
         """
-        tokens = self._tokens(latent, camera, sight)
-        if self.detail is not None:
-            return self.detail(tokens, _require_sight(sight), moving=moving)
+        tokens = self._tokens(latent, camera, posed_video)
+        if self.refinement is not None:
+            return self.refinement(tokens, _require_frames(posed_video), moving=moving)
         # Latent i holds frames 4 i − 3 … 4 i: three of the first pack lie before the video.
         gaussians = self.to_gaussians(tokens)[:, :, TIME_STRIDE - 1 :]
         return RawGaussianMaps(gaussians=gaussians.to(latent.dtype), tokens=tokens.to(latent.dtype))
 
     def _tokens(
-        self, latent: Tensor, camera: Tensor, sight: PosedVideo | None
+        self, latent: Tensor, camera: Tensor, posed_video: PosedVideo | None
     ) -> Float[Tensor, "b d t h2 w2"]:
         """Normalised tokens after all blocks."""
-        if self.config.reads == "latents":
+        if self.config.input == "latents":
             content = self._latent_tokens(latent)
         else:
-            content = self._frame_tokens(_require_sight(sight))
+            content = self._frame_tokens(_require_frames(posed_video))
         tokens = self._merge_tokens(content, self._pose_tokens(camera))
         grid = tuple(tokens.shape[1:4])
         rope = rope_tables(grid, self.config.width // self.config.heads, tokens.device)
@@ -106,9 +106,9 @@ class Ldrm(nn.Module):
             self.latent_tokens(patchify(embedded, (1, TOKEN_PATCH, TOKEN_PATCH)))
         )
 
-    def _frame_tokens(self, sight: PosedVideo) -> Float[Tensor, "b t h2 w2 d"]:
+    def _frame_tokens(self, posed_video: PosedVideo) -> Float[Tensor, "b t h2 w2 d"]:
         patch = (TIME_STRIDE, self.token_px, self.token_px)
-        packs = patchify(fill_first_pack(sight.rgb * 2 - 1), patch)
+        packs = patchify(fill_first_pack(posed_video.rgb * 2 - 1), patch)
         return self.latent_norm(self.frame_tokens(packs))
 
     def _pose_tokens(self, camera: Float[Tensor, "b 6 f hh ww"]) -> Float[Tensor, "b t h2 w2 d"]:
@@ -132,10 +132,10 @@ def _to_pixels(config: LdrmConfig, side_px: int) -> nn.ConvTranspose3d:
     return zero_(layer)
 
 
-def _require_sight(sight: PosedVideo | None) -> PosedVideo:
-    if sight is None:
+def _require_frames(posed_video: PosedVideo | None) -> PosedVideo:
+    if posed_video is None:
         raise ShapeError(
             "LDRM: expected decoded pictures with their cameras for the detail decoder, got none; "
-            "hand over a Sight"
+            "hand over a PosedVideo"
         )
-    return sight
+    return posed_video

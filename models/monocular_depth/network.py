@@ -31,28 +31,28 @@ class MonocularDepthNet(nn.Module):
         super().__init__()
         channels = [width * share for share in GROWTH]
         steps = list(pairwise(channels))
-        self.enter = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
-        self.down = nn.ModuleList([ConvBlock(count) for count in channels])
-        self.shrink = nn.ModuleList(
+        self.input_conv = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
+        self.down_blocks = nn.ModuleList([ConvBlock(count) for count in channels])
+        self.downsample = nn.ModuleList(
             [nn.Conv2d(fine, coarse, 2, stride=2) for fine, coarse in steps]
         )
-        self.grow = nn.ModuleList([nn.Conv2d(coarse, 4 * fine, 1) for fine, coarse in steps])
-        self.mixed = ConvBlock(channels[-1])
-        self.up = nn.ModuleList([ConvBlock(count) for count in channels[:-1]])
+        self.upsample = nn.ModuleList([nn.Conv2d(coarse, 4 * fine, 1) for fine, coarse in steps])
+        self.mid = ConvBlock(channels[-1])
+        self.up_blocks = nn.ModuleList([ConvBlock(count) for count in channels[:-1]])
         self.head = zero_(nn.Conv2d(width, FOLDED_PX**2, 3, padding=1))
 
     def forward(self, picture: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 1 h w"]:
         """``picture`` is RGB in [0, 1], its sides multiples of 16."""
         seen = torch.cat([picture * 2 - 1, pixel_coordinates(picture)], 1)
-        features = self.enter(torch.nn.functional.pixel_unshuffle(seen, FOLDED_PX))
+        features = self.input_conv(torch.nn.functional.pixel_unshuffle(seen, FOLDED_PX))
         passed = []
-        for block, shrink in zip(self.down, self.shrink, strict=False):
+        for block, shrink in zip(self.down_blocks, self.downsample, strict=False):
             passed.append(block(features))
             features = shrink(passed[-1])
-        features = self.mixed(self.down[-1](features))
-        for level in reversed(range(len(self.up))):
-            larger = torch.nn.functional.pixel_shuffle(self.grow[level](features), 2)
-            features = self.up[level](passed[level] + larger)
+        features = self.mid(self.down_blocks[-1](features))
+        for level in reversed(range(len(self.up_blocks))):
+            larger = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
+            features = self.up_blocks[level](passed[level] + larger)
         return torch.nn.functional.pixel_shuffle(self.head(features), FOLDED_PX)
 
 

@@ -79,7 +79,7 @@ class UNetLevel(nn.Module):
         super().__init__()
         self.block = ModulatedConvBlock(channels, condition_width)
         self.frame_mean = TemporalMeanMixing(channels)
-        self.read = TextCrossAttention(channels, heads, text_width)
+        self.text_attention = TextCrossAttention(channels, heads, text_width)
 
     def forward(
         self,
@@ -90,4 +90,4 @@ class UNetLevel(nn.Module):
     ) -> Float[Tensor, "n c h w"]:
         """Without ``words`` nothing is read."""
         features = self.frame_mean(self.block(features, condition), samples)
-        return features if words is None else self.read(features, words)
+        return features if words is None else self.text_attention(features, words)

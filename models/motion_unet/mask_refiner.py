@@ -22,12 +22,12 @@ class MaskRefiner(nn.Module):
 
     def __init__(self, width: int, channels: int) -> None:
         super().__init__()
-        self.enter = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
+        self.input_image = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
         self.fine, self.fine_out = ConvBlock(width), ConvBlock(width)
-        self.shrink = nn.Conv2d(width, 2 * width, 2, stride=2)
-        self.told = nn.Conv2d(channels, 2 * width, 1)
+        self.down = nn.Conv2d(width, 2 * width, 2, stride=2)
+        self.input_features = nn.Conv2d(channels, 2 * width, 1)
         self.coarse = nn.Sequential(ConvBlock(2 * width), ConvBlock(2 * width))
-        self.grow = nn.Conv2d(2 * width, 4 * width, 1)
+        self.up = nn.Conv2d(2 * width, 4 * width, 1)
         self.head = zero_(nn.Conv2d(width, FOLDED_PX**2, 3, padding=1))
 
     def forward(
@@ -35,8 +35,8 @@ class MaskRefiner(nn.Module):
     ) -> Float[Tensor, "b hh ww"]:
         """``picture`` is RGB in [0, 1], its sides multiples of 4."""
         seen = torch.cat([picture * 2 - 1, pixel_coordinates(picture)], 1)
-        fine = self.fine(self.enter(torch.nn.functional.pixel_unshuffle(seen, FOLDED_PX)))
-        coarse = self.coarse(self.shrink(fine) + self.told(told))
-        larger = torch.nn.functional.pixel_shuffle(self.grow(coarse), 2)
+        fine = self.fine(self.input_image(torch.nn.functional.pixel_unshuffle(seen, FOLDED_PX)))
+        coarse = self.coarse(self.down(fine) + self.input_features(told))
+        larger = torch.nn.functional.pixel_shuffle(self.up(coarse), 2)
         logits = self.head(self.fine_out(fine + larger))
         return torch.nn.functional.pixel_shuffle(logits, FOLDED_PX)[:, 0]

@@ -23,7 +23,7 @@ class TextAdapter(nn.Module):
     def __init__(self, config: TextConfig) -> None:
         super().__init__()
         self.config = config
-        self.distance_bias = nn.Embedding(config.buckets, config.heads)
+        self.distance_bias = nn.Embedding(config.relative_position_buckets, config.heads)
         self.blocks = nn.ModuleList([TextBlock(config) for _ in range(BLOCKS)])
         for block in self.blocks:
             zero_(block.to_output)

@@ -31,7 +31,7 @@ from diff4splat.models.motion_unet.text_adapter import TextAdapter
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 
 CHANNELS = 3
-PICTURE_CHANNELS = 3 * CELL_PX**2 + 2
+IMAGE_CHANNELS = 3 * CELL_PX**2 + 2
 """The pixels of a cell and its place."""
 MULTIPLE_PX = 16
 """What the size of a picture must be a multiple of: the coarsest cells."""
@@ -50,32 +50,32 @@ class MotionUNet(nn.Module):
         heads: int,
         text: TextConfig,
         frequency_width: int = 128,
-        outline_width: int = 0,
+        mask_refiner_width: int = 0,
     ) -> None:
         super().__init__()
         fine, middle, coarse = widths(width, heads)
         self.frequency_width = frequency_width
         self.level_mlp = EmbeddingMlp(frequency_width, width)
         self.time_mlp = EmbeddingMlp(frequency_width, width)
-        self.reader = TextAdapter(text)
+        self.text_adapter = TextAdapter(text)
         self.pooled_text = nn.Linear(text.width, width)
-        self.untold = nn.Parameter(torch.zeros(text.width))
-        self.enter_picture = nn.Conv2d(PICTURE_CHANNELS, fine, 3, padding=1)
-        self.enter_motion = nn.Conv2d(CHANNELS, fine, 3, padding=1, bias=False)
+        self.null_text_embedding = nn.Parameter(torch.zeros(text.width))
+        self.input_image = nn.Conv2d(IMAGE_CHANNELS, fine, 3, padding=1)
+        self.input_motion = nn.Conv2d(CHANNELS, fine, 3, padding=1, bias=False)
         self.fine, self.middle, self.coarse = (
             UNetLevel(channels, width, heads, text.width) for channels in (fine, middle, coarse)
         )
-        self.shrink_1 = nn.Conv2d(fine, middle, 2, stride=2)
-        self.shrink_2 = nn.Conv2d(middle, coarse, 2, stride=2)
-        self.mixed = ModulatedConvBlock(coarse, width)
-        self.grow_2 = nn.Conv2d(coarse, 4 * middle, 1)
-        self.grow_1 = nn.Conv2d(middle, 4 * fine, 1)
+        self.down_1 = nn.Conv2d(fine, middle, 2, stride=2)
+        self.down_2 = nn.Conv2d(middle, coarse, 2, stride=2)
+        self.mid = ModulatedConvBlock(coarse, width)
+        self.up_2 = nn.Conv2d(coarse, 4 * middle, 1)
+        self.up_1 = nn.Conv2d(middle, 4 * fine, 1)
         self.middle_out = ModulatedConvBlock(middle, width)
         self.fine_out = ModulatedConvBlock(fine, width)
         # No norm before it: at low levels the answer is the noisy motion itself, size and all.
-        self.head = zero_(nn.Conv2d(fine, CHANNELS, 3, padding=1))
-        self.moves = zero_(nn.Conv2d(fine, CELL_PX**2, 3, padding=1))
-        self.outline = MaskRefiner(outline_width, fine) if outline_width else None
+        self.motion_head = zero_(nn.Conv2d(fine, CHANNELS, 3, padding=1))
+        self.mask_head = zero_(nn.Conv2d(fine, CELL_PX**2, 3, padding=1))
+        self.mask_refiner = MaskRefiner(mask_refiner_width, fine) if mask_refiner_width else None
 
     def forward(
         self,
@@ -94,7 +94,7 @@ class MotionUNet(nn.Module):
         """
         return self._motion(self.features(picture, noisy, level, text, text_mask), noisy)
 
-    def answers(
+    def predict_motion_and_mask(
         self,
         picture: Float[Tensor, "b 3 hh ww"],
         noisy: Float[Tensor, "b 3 t hc wc"],
@@ -109,9 +109,9 @@ class MotionUNet(nn.Module):
         """
         features = self.features(picture, noisy, level, text, text_mask)
         told = features.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)
-        moves = torch.nn.functional.pixel_shuffle(self.moves(told), CELL_PX)[:, 0]
-        if self.outline is not None:
-            moves = moves + self.outline(picture, told)
+        moves = torch.nn.functional.pixel_shuffle(self.mask_head(told), CELL_PX)[:, 0]
+        if self.mask_refiner is not None:
+            moves = moves + self.mask_refiner(picture, told)
         return self._motion(features, noisy), moves
 
     def features(
@@ -127,39 +127,41 @@ class MotionUNet(nn.Module):
         samples, frames = len(noisy), noisy.shape[2]
         words = None if text is None else self._read(text_tokens(text, text_mask))
         condition = self._condition(level, frames, words)
-        fine = self.fine(self._entered(picture, noisy), condition, samples, words)
-        middle = self.middle(self.shrink_1(fine), condition, samples, words)
-        coarse = self.coarse(self.shrink_2(middle), condition, samples, words)
-        coarse = self.mixed(coarse, condition)
-        middle = self.middle_out(middle + _twice(self.grow_2(coarse)), condition)
-        return self.fine_out(fine + _twice(self.grow_1(middle)), condition)
+        fine = self.fine(self._input_features(picture, noisy), condition, samples, words)
+        middle = self.middle(self.down_1(fine), condition, samples, words)
+        coarse = self.coarse(self.down_2(middle), condition, samples, words)
+        coarse = self.mid(coarse, condition)
+        middle = self.middle_out(middle + _upsample(self.up_2(coarse)), condition)
+        return self.fine_out(fine + _upsample(self.up_1(middle)), condition)
 
     def _motion(
         self, features: Float[Tensor, "n c hc wc"], noisy: Float[Tensor, "b 3 t hc wc"]
     ) -> Float[Tensor, "b 3 t hc wc"]:
-        motion = self.head(features)
+        motion = self.motion_head(features)
         return motion.unflatten(0, (len(noisy), noisy.shape[2])).transpose(1, 2)
 
     def _read(self, words: TextTokens) -> TextTokens:
-        return replace(words, states=self.reader(words))
+        return replace(words, states=self.text_adapter(words))
 
     def _condition(
         self, level: Float[Tensor, " b"], frames: int, words: TextTokens | None
     ) -> Float[Tensor, "n d"]:
         """Level and words of a sample, and the time of a latent frame as a share of the clip."""
         time = torch.arange(1, frames + 1, device=level.device) / frames
-        pooled = self.untold if words is None else words.pooled(self.untold)
+        pooled = (
+            self.null_text_embedding if words is None else words.pooled(self.null_text_embedding)
+        )
         by_sample = self.level_mlp(level_embedding(level, self.frequency_width))
         by_sample = by_sample + self.pooled_text(pooled)
         by_frame = self.time_mlp(level_embedding(time, self.frequency_width))
         return (by_sample[:, None] + by_frame).flatten(0, 1)
 
-    def _entered(
+    def _input_features(
         self, picture: Float[Tensor, "b 3 hh ww"], noisy: Float[Tensor, "b 3 t hc wc"]
     ) -> Float[Tensor, "n c hc wc"]:
         """The picture's features are made once for all frames."""
-        seen = self.enter_picture(torch.cat([cells(picture) * 2 - 1, cell_coordinates(noisy)], 1))
-        motion = self.enter_motion(noisy.transpose(1, 2).flatten(0, 1))
+        seen = self.input_image(torch.cat([cells(picture) * 2 - 1, cell_coordinates(noisy)], 1))
+        motion = self.input_motion(noisy.transpose(1, 2).flatten(0, 1))
         return (motion.unflatten(0, (len(noisy), -1)) + seen[:, None]).flatten(0, 1)
 
 
@@ -183,7 +185,7 @@ def cell_coordinates(noisy: Float[Tensor, "b 3 t hc wc"]) -> Float[Tensor, "b 2 
     return grid.expand(len(noisy), -1, -1, -1)
 
 
-def _twice(maps: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h2 w2"]:
+def _upsample(maps: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h2 w2"]:
     return torch.nn.functional.pixel_shuffle(maps, 2)
 
 

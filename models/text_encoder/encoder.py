@@ -37,7 +37,7 @@ def distance_buckets(length: int, config: TextConfig, device: torch.device) -> I
     """T5's bidirectional buckets of key − query: near ones exact, far ones logarithmic."""
     position = torch.arange(length, device=device)
     distance = position[None, :] - position[:, None]
-    half = config.buckets // 2
+    half = config.relative_position_buckets // 2
     exact = half // 2
     # A distance of 0 never reaches the logarithm; the clamp keeps it finite there.
     ratio = (distance.abs().clamp_min(1).float() / exact).log() / math.log(
@@ -80,7 +80,7 @@ class TextEncoder(nn.Module):
         super().__init__()
         self.config = config
         self.embedding = nn.Embedding(VOCABULARY, config.width)
-        self.distance_bias = nn.Embedding(config.buckets, config.heads)
+        self.distance_bias = nn.Embedding(config.relative_position_buckets, config.heads)
         self.blocks = nn.ModuleList([TextBlock(config) for _ in range(config.blocks)])
         self.norm_out = TokenRmsNorm(config.width)
 

@@ -5,17 +5,16 @@ video frames and pixels, ``d`` width, ``s`` text tokens. Noise level 0 is data a
 given per latent frame: an image condition overwrites latent frame 0 with the clean latent and
 gives it level 0.
 
-    latent ─ patch 1×2×2 ─ linear ─┐
-    draft ── patch 1×2×2 ─ linear ─┤
-    camera ─ adapter ──────────────┴ + ─ blocks ─ norm, modulate ─ linear (zero at first) ─ velocity
-    level ── sinusoid, MLP ─ modulation ───┘ │
-    text ─── MLP ─ cross-attention ──────────┘
+    latent ──────── patch 1×2×2 ─ linear ─┐
+    render ──────── patch 1×2×2 ─ linear ─┤
+    validity mask ─ patch 4×2×2 ─ linear ─┤
+    camera ──────── adapter ──────────────┴ + ─ blocks ─ norm, modulate ─ linear ─ velocity
+    level ─ sinusoid, MLP ─ modulation ────────┘ │
+    text ── MLP ─ cross-attention ───────────────┘
 
-``c`` includes the channels of a motion, where the model makes one (``video_motion``). Where a
-``motion_branch`` tells motion, it is asked on its own (``motion_sampling``), and not here.
-
-Where it predicts clean latents, the last linear layer answers what to add to the draft (to 0, where
-there is none), and the velocity follows from that: a fresh model leads any noise to the draft.
+The last linear layer is zero at first. Where the model predicts clean latents, that layer gives
+what to add to the render condition (to 0, where there is none), and the velocity follows from it: a
+fresh model leads any noise to the render condition.
 """
 
 from dataclasses import dataclass
@@ -34,9 +33,12 @@ from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TOKEN_PATCH
-from diff4splat.models.motion_unet.unet import MotionUNet
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
 from diff4splat.models.video_dit.dit_block import MODULATIONS, DitBlock
+from diff4splat.models.video_dit.render_condition import (
+    RenderCondition,
+    RenderConditionEmbedding,
+)
 
 PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
 
@@ -51,9 +53,9 @@ class DitConditions:
     """True where a text token is real; None when all are."""
     pooled_text: Float[Tensor, "b d"] | None = None
     """Added to the embedding of the level."""
-    draft: Float[Tensor, "b c t h w"] | None = None
-    """Latent of a draft of the video."""
-    draft_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
+    render_latent: Float[Tensor, "b c t h w"] | None = None
+    """Latent of the render condition, which clean predictions correct."""
+    render_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
 
 
 class TextProjection(nn.Module):
@@ -74,12 +76,11 @@ class VideoDiT(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        dit, channels = config.dit, config.vae.latent_channels + config.motion_channels
+        dit, channels = config.dit, config.vae.latent_channels
         self.config = dit
-        self.motion_channels = config.motion_channels
         self.patch_embedding = nn.Linear(channels * TOKEN_PATCH**2, dit.width)
-        if dit.draft:
-            self.draft_embedding = zero_(nn.Linear(channels * TOKEN_PATCH**2, dit.width))
+        if dit.render_condition:
+            self.condition_embedding = RenderConditionEmbedding(channels, dit.width)
         self.camera_adapter = CameraAdapter(dit.width, dit.camera_width, config.vae.space_stride)
         self.text_projection = TextProjection(config.text.width, dit.width)
         if dit.pooled_text:
@@ -90,11 +91,6 @@ class VideoDiT(nn.Module):
         self.norm_out = nn.LayerNorm(dit.width, eps=EPSILON, elementwise_affine=False)
         self.modulation_out = nn.Parameter(torch.zeros(2, dit.width))
         self.head = zero_(nn.Linear(dit.width, channels * TOKEN_PATCH**2))
-        self.motion_branch = None
-        if dit.motion_width:
-            self.motion_branch = MotionUNet(
-                dit.motion_width, dit.heads, config.text, outline_width=dit.motion_outline
-            )
 
     def forward(
         self,
@@ -103,35 +99,36 @@ class VideoDiT(nn.Module):
         camera: Float[Tensor, "b 6 f hh ww"] | None = None,
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
-        draft: Float[Tensor, "b c t h w"] | None = None,
+        condition: RenderCondition | None = None,
     ) -> Float[Tensor, "b c t h w"]:
         """Velocity in one call: ``prepare``, then ``velocity``."""
-        return self.velocity(latent, level, self.prepare(camera, text, text_mask, draft))
+        return self.velocity(latent, level, self.prepare(camera, text, text_mask, condition))
 
     def prepare(
         self,
         camera: Float[Tensor, "b 6 f hh ww"] | None = None,
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
-        draft: Float[Tensor, "b c t h w"] | None = None,
+        condition: RenderCondition | None = None,
     ) -> DitConditions:
         """Embed the conditions once for all steps of a sampler.
 
         Raises:
-            ShapeError: a draft is missing that the model sees, or given to one that sees none.
+            ShapeError: a render condition is missing, or given to a model that takes none.
         """
-        if self.config.draft != (draft is not None):
-            want, got = ("one", "none") if self.config.draft else ("none", "one")
-            raise ShapeError(f"draft: expected {want}, got {got}; DitConfig.draft decides")
-        seen = None if draft is None else self.draft_embedding(patchify(draft, PATCH))
+        if self.config.render_condition != (condition is not None):
+            want, got = ("one", "none") if self.config.render_condition else ("none", "one")
+            raise ShapeError(
+                f"render condition: expected {want}, got {got}; DitConfig.render_condition decides"
+            )
         states = None if text is None else self.text_projection(text)
         return DitConditions(
             camera=None if camera is None else self.camera_adapter(camera),
             text=states,
             text_mask=text_mask,
             pooled_text=None if states is None else self._pooled(states, text_mask),
-            draft=draft,
-            draft_tokens=seen,
+            render_latent=None if condition is None else condition.latent,
+            render_tokens=None if condition is None else self.condition_embedding(condition),
         )
 
     def _pooled(
@@ -155,8 +152,8 @@ class VideoDiT(nn.Module):
         tokens = self.patch_embedding(patchify(latent, PATCH))
         if conditions.camera is not None:
             tokens = tokens + conditions.camera
-        if conditions.draft_tokens is not None:
-            tokens = tokens + conditions.draft_tokens
+        if conditions.render_tokens is not None:
+            tokens = tokens + conditions.render_tokens
         rows, columns = tokens.shape[2:4]
         rope = rope_tables(
             tuple(tokens.shape[1:4]), self.config.width // self.config.heads, tokens.device
@@ -170,13 +167,13 @@ class VideoDiT(nn.Module):
             tokens = block(tokens, modulation, rope, conditions.text, conditions.text_mask)
         shift, scale = (embedding[..., None, :] + self.modulation_out)[..., None, :].unbind(2)
         patches = self.head(modulate(self.norm_out(tokens), shift, scale))
-        answer = unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
-        return self._as_velocity(answer, latent, level, conditions.draft)
+        output = unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
+        return self._as_velocity(output, latent, level, conditions.render_latent)
 
     def _as_velocity(
-        self, answer: Tensor, latent: Tensor, level: Tensor, draft: Tensor | None
+        self, output: Tensor, latent: Tensor, level: Tensor, render_latent: Tensor | None
     ) -> Float[Tensor, "b c t h w"]:
-        if self.config.predicts == "velocity":
-            return answer
-        clean = answer if draft is None else draft + answer
+        if self.config.prediction_type == "velocity":
+            return output
+        clean = output if render_latent is None else render_latent + output
         return velocity_from_clean(latent, clean, level[:, None, :, None, None].to(latent))

@@ -22,7 +22,7 @@ from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
 LOG_VARIANCE_RANGE = (-30.0, 20.0)
 """Clamp that keeps exp() finite in float32 and half precision losses (Stable Diffusion)."""
 FIRST_LOG_VARIANCE = -6.0
-"""Of latents around a linear code of variance 1: noise that costs no more than the code itself."""
+"""Of latents around a PCA shortcut of variance 1: its noise costs no more than the shortcut."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class VideoVae(nn.Module):
         self.config = config
         self.encoder = VaeEncoder(config)
         self.decoder = VaeDecoder(config)
-        self.code = _linear_code(config, self.encoder, self.decoder)
+        self.pca_shortcut = _pca_shortcut(config, self.encoder, self.decoder)
         self.register_buffer("latent_mean", torch.zeros(config.latent_channels))
         self.register_buffer("latent_std", torch.ones(config.latent_channels))
 
@@ -57,8 +57,8 @@ class VideoVae(nn.Module):
         """
         self._require_shape(video)
         mean, log_variance = self.encoder(video).chunk(2, 1)
-        if self.code is not None:
-            mean = mean + self.code.encode(video)
+        if self.pca_shortcut is not None:
+            mean = mean + self.pca_shortcut.encode(video)
         shift, std = self._statistics()
         return LatentDistribution(
             mean=(mean - shift) / std,
@@ -80,7 +80,9 @@ class VideoVae(nn.Module):
         shift, std = self._statistics()
         raw = latent * std + shift
         video, caches = self.decoder(raw, caches)
-        return (video if self.code is None else video + self.code.decode(raw)), caches
+        return (
+            video if self.pca_shortcut is None else video + self.pca_shortcut.decode(raw)
+        ), caches
 
     def initial_caches(self, latent: Float[Tensor, "b c t h w"]) -> tuple[Tensor, ...]:
         """The caches to begin a video of this latent's size with."""
@@ -111,9 +113,11 @@ class VideoVae(nn.Module):
             )
 
 
-def _linear_code(config: VaeConfig, encoder: VaeEncoder, decoder: VaeDecoder) -> PcaShortcut | None:
-    """The code, if asked for; convolutions then start as no correction at all."""
-    if not config.linear_code:
+def _pca_shortcut(
+    config: VaeConfig, encoder: VaeEncoder, decoder: VaeDecoder
+) -> PcaShortcut | None:
+    """The shortcut, if asked for; convolutions then start as no correction at all."""
+    if not config.pca_shortcut:
         return None
     zero_(encoder.conv_out)
     zero_(decoder.conv_out)

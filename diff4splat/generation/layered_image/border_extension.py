@@ -1,37 +1,65 @@
-"""What lies behind and around the first picture: a coarse second layer of Gaussians.
+"""A coarse layer that continues the image beyond its border and behind its edges (ours).
 
-Axes: ``hs ws`` cells of 4 pixels, with a margin on every side. Its base continues the first
-picture's border outwards, somewhat behind the surface that the picture shows: where the camera
-looks past its borders or behind an edge, it sees a plausible blur instead of black. The layer never
-moves.
+Axes: ``h w`` pixels of the image, ``hs ws`` cells of 4 pixels with a margin on every side. Where
+the camera looks past the border or behind an edge it sees a plausible blur instead of black. The
+layer is static. ``push_behind_surface`` moves every cell behind all pixels that its footprint
+covers: from the input camera a guess must not hide what the image shows.
 """
+
+from dataclasses import replace
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera, stack_cameras
+from diff4splat.geometry.depth import depth_from_distance, distance_from_depth
 from diff4splat.models.blocks.conv_block import CELL_PX
-from diff4splat.models.ldrm.gaussian_head import PixelBase
 from diff4splat.models.ldrm.refinement.heads import replicate_border
 
 BEHIND = 1.1
-"""Ray distance over that of the surface in front."""
-OPAQUE = 0.99
+"""Ray distance over that of the surface in front, and depth over that of any pixel covered."""
+OPACITY = 0.99
+FOOTPRINT_CELLS = 0.6
+REACH_SIGMAS = 3.0
+"""How far a footprint reaches, in standard deviations."""
 
 
 def border_extension(
-    rgb: Float[Tensor, "h w 3"], distance: Float[Tensor, "h w"], camera: Camera, margin: int
-) -> PixelBase:
-    """Base of the layer from the first picture, its ray distances and its camera."""
+    rgb: Float[Tensor, "h w 3"], depth: Float[Tensor, "h w"], camera: Camera, margin: int
+) -> ImageLayer:
+    """The layer of an image, with ``margin`` cells beyond each side."""
+    grid = extended_camera(camera, margin)
+    distance = distance_from_depth(camera, depth)
+    maps = torch.cat([rgb.movedim(-1, 0), distance[None]])[None]
+    cells = replicate_border(torch.nn.functional.avg_pool2d(maps, CELL_PX), margin)[0]
+    return ImageLayer(
+        camera=grid,
+        rgb=cells[:3].movedim(0, -1),
+        depth=depth_from_distance(stack_cameras([grid]), BEHIND * cells[3][None])[0],
+        mask=torch.ones_like(cells[3], dtype=torch.bool),
+        opacity=OPACITY,
+        footprint_px=FOOTPRINT_CELLS,
+    )
+
+
+def push_behind_surface(layer: ImageLayer, depth: Float[Tensor, "h w"], margin: int) -> ImageLayer:
+    """The layer of an image of depth z ``depth``, with no cell in front of a pixel it covers."""
+    farthest = BEHIND * farthest_covered(depth, margin)
+    return replace(layer, depth=torch.maximum(layer.depth, farthest))
+
+
+def extended_camera(camera: Camera, margin: int) -> Camera:
+    """The input view in cells of 4 pixels, ``margin`` of them beyond each side."""
     height, width = (side // CELL_PX for side in camera.size_px)
     grid = camera.resized((height, width))
-    grid = grid.cropped((-margin, -margin), (height + 2 * margin, width + 2 * margin))
-    maps = torch.cat([rgb.movedim(-1, 0), distance[None]])[None]
-    around = replicate_border(torch.nn.functional.avg_pool2d(maps, CELL_PX), margin)[0]
-    return PixelBase(
-        rgb=around[:3].movedim(0, -1)[None],
-        distance=BEHIND * around[3][None],
-        opacity=torch.full_like(around[3], OPAQUE)[None],
-        cameras=stack_cameras([grid]),
-    )
+    return grid.cropped((-margin, -margin), (height + 2 * margin, width + 2 * margin))
+
+
+def farthest_covered(depth: Float[Tensor, "h w"], margin: int) -> Float[Tensor, "hs ws"]:
+    """Depth of the farthest pixel under each cell's footprint; 0 where it covers none."""
+    reach = int(REACH_SIGMAS * FOOTPRINT_CELLS * CELL_PX) + 1
+    padded = torch.nn.functional.pad(depth[None, None], (margin * CELL_PX,) * 4)
+    farthest = torch.nn.functional.max_pool2d(padded, 2 * reach + 1, 1, reach)[0, 0]
+    return farthest[CELL_PX // 2 :: CELL_PX, CELL_PX // 2 :: CELL_PX]

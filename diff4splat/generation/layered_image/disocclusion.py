@@ -1,8 +1,8 @@
-"""What is seen where something went: what stands behind the picture, without that thing (ours).
+"""Colours of what a moving object uncovers: inpainting of the layers behind it (ours, ADR 23).
 
-Axes: ``h w`` pixels of the picture that networks see, ``n`` Gaussians. What stands behind continues
-the picture backwards, so behind a thing it has the colours of that thing, which stay as a blur when
-it goes. There it takes the colours of what stands around; where it lies does not change.
+Axes: ``h w`` pixels of the smaller copy that the networks see. The extended layers continue the
+image backwards, so behind an object they have the object's colours, which would stay when it moves
+away. There they take the colours of the static pixels around it.
 """
 
 from dataclasses import replace
@@ -11,34 +11,42 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.reconstruction import Canonical
-from diff4splat.geometry.camera import project
-from diff4splat.scene.harmonics import dc_from_color
+from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
+from diff4splat.models.blocks.conv_block import CELL_PX
 
 GROWN_PX = 2
-"""Around what goes, where it is mixed with what stands."""
+"""Around a moving object its colours are mixed with those of the static pixels."""
 
 
-def inpaint_disoccluded(
-    canonical: Canonical, moving: Bool[Tensor, "h w"], picture: InputImage
-) -> Canonical:
-    """The scene with what stands behind the ``moving`` coloured like what stands around it."""
-    stands = ~_grown(moving)
-    if bool(stands.all()) or not bool(stands.any()):
-        return canonical
-    standing = (canonical.every_cell == canonical.maps.gaussians[0, 0].numel()).nonzero()[:, 0]
-    gaussians, (height, width) = canonical.gaussians, moving.shape
-    pixels, depth = project(picture.camera, gaussians.means[standing])
-    column, row = pixels.nan_to_num(-1).clamp(-1, max(height, width)).floor().long().unbind(-1)
-    inside = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    column, row = column.clamp(0, width - 1), row.clamp(0, height - 1)
-    behind = (inside & ~stands[row, column]).nonzero()[:, 0]
-    colors = fill_from_neighbours(picture.rgb, stands)[row[behind], column[behind]]
-    sh = gaussians.sh.clone()
-    sh[standing[behind]] = 0
-    sh[standing[behind], 0] = dc_from_color(colors).to(sh)
-    return replace(canonical, gaussians=replace(gaussians, sh=sh))
+def inpaint_background(
+    layer: ImageLayer, rgb: Float[Tensor, "h w 3"], moving: Bool[Tensor, "h w"]
+) -> ImageLayer:
+    """The background layer with new colours where it is static behind something moving."""
+    static = ~grown(moving)
+    if not _inpaints(static):
+        return layer
+    behind = ~static & (layer.pixel_index == NO_PIXEL)
+    colors = fill_from_neighbours(rgb, static)
+    return replace(layer, rgb=torch.where(behind[..., None], colors, layer.rgb))
+
+
+def inpaint_border(
+    layer: ImageLayer, rgb: Float[Tensor, "h w 3"], moving: Bool[Tensor, "h w"]
+) -> ImageLayer:
+    """The same for the cells of the border extension, at the pixel in the middle of each."""
+    static = ~grown(moving)
+    if not _inpaints(static):
+        return layer
+    half = slice(CELL_PX // 2, None, CELL_PX)
+    rows, columns = (side // CELL_PX for side in rgb.shape[:2])
+    top, left = (
+        (size - side) // 2 for size, side in zip(layer.mask.shape, (rows, columns), strict=True)
+    )
+    inner = (slice(top, top + rows), slice(left, left + columns))
+    colors = layer.rgb.clone()
+    fresh = fill_from_neighbours(rgb, static)[half, half]
+    colors[inner] = torch.where(static[half, half][..., None], colors[inner], fresh)
+    return replace(layer, rgb=colors)
 
 
 def fill_from_neighbours(
@@ -47,16 +55,22 @@ def fill_from_neighbours(
     """``rgb`` where it is ``known``, at least somewhere; else the mean of the smallest window."""
     share = known.to(rgb)[None]
     maps = torch.cat([rgb.movedim(-1, 0) * share, share])[None]
-    found, have, side = rgb, known, 3
+    filled, have, side = rgb, known, 3
     while not bool(have.all()):
         mean = torch.nn.functional.avg_pool2d(maps, side, 1, side // 2, count_include_pad=False)[0]
         fresh = (mean[3] > 0) & ~have
         color = (mean[:3] / mean[3].where(fresh, 1)).movedim(0, -1)
-        found, have = torch.where(fresh[..., None], color, found), have | fresh
+        filled, have = torch.where(fresh[..., None], color, filled), have | fresh
         side = 2 * side + 1
-    return found
+    return filled
 
 
-def _grown(mask: Bool[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
+def grown(mask: Bool[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
+    """The mask with ``GROWN_PX`` pixels around it."""
     side = 2 * GROWN_PX + 1
     return torch.nn.functional.max_pool2d(mask.float()[None, None], side, 1, GROWN_PX)[0, 0] > 0
+
+
+def _inpaints(static: Bool[Tensor, "h w"]) -> bool:
+    """Something moves, and something else does not."""
+    return bool(static.any()) and not bool(static.all())

@@ -1,9 +1,8 @@
-"""Which pixels of later key frames show what an earlier one has shown already.
+"""Which pixels of later frames show what an earlier one shows already.
 
-Axes: ``k`` key frames, ``h w`` pixels. A pixel is covered when an earlier key frame sees the same
-point: it lies in its picture, at about the depth that it has there. What moves is at another place
-in every key frame and stays. Leaving covered pixels out keeps doubled surfaces, which never agree
-exactly, from blurring each other.
+Axes: ``k`` frames, ``h w`` pixels. An earlier frame sees the same point if the point lies in its
+image, at about the depth that it has there. Whatever moves is elsewhere in every frame. Leaving
+duplicate pixels out keeps two surfaces, which never agree exactly, from blurring each other.
 """
 
 import torch
@@ -19,25 +18,42 @@ TOLERANCE = 0.08
 
 @torch.no_grad()
 def visible_in_earlier_frame(
-    depth: Float[Tensor, "k h w"], cameras: Camera
+    depth: Float[Tensor, "k h w"],
+    cameras: Camera,
+    counted: Bool[Tensor, "k h w"] | None = None,
 ) -> Bool[Tensor, "k h w"]:
-    """``depth`` is z, above 0; ``cameras`` has batch shape (k,). The first frame has nothing."""
-    found = torch.zeros_like(depth, dtype=torch.bool)
+    """``depth`` is z, above 0; ``cameras`` has batch shape (k,). In the first frame all is false.
+
+    With ``counted``, only those pixels of earlier frames count.
+    """
+    visible = torch.zeros_like(depth, dtype=torch.bool)
     for key in range(1, len(depth)):
         for earlier in range(key):
-            found[key] |= _seen_by(depth, cameras, (key, earlier))
-    return found
+            mask = None if counted is None else counted[earlier]
+            visible[key] |= _seen_by(depth, cameras, (key, earlier), mask)
+    return visible
 
 
 def _seen_by(
-    depth: Float[Tensor, "k h w"], cameras: Camera, pair: tuple[int, int]
+    depth: Float[Tensor, "k h w"],
+    cameras: Camera,
+    pair: tuple[int, int],
+    mask: Bool[Tensor, "h w"] | None,
 ) -> Bool[Tensor, "h w"]:
-    """Pixels of the first key of ``pair`` that the second one shows."""
+    """Pixels of the first frame of ``pair`` that the second one shows, within ``mask``."""
     own, other = (cameras[slice(key, key + 1)] for key in pair)
     pixels, relative = other_pixels(own, other, 1 / depth[pair[0], None, None])
-    there = torch.nn.functional.grid_sample(
-        depth[pair[1], None, None], pixels[:, 0], mode="nearest", align_corners=False
-    )[0, 0]
+    there = nearest_pixel(depth[pair[1]], pixels)
     expected = relative[0, 0] * depth[pair[0]]
     agrees = (expected - there).abs() < TOLERANCE * expected
-    return inside(pixels, relative)[0, 0] & agrees
+    seen = inside(pixels, relative)[0, 0] & agrees
+    return seen if mask is None else seen & (nearest_pixel(mask.to(depth), pixels) > 0.5)
+
+
+def nearest_pixel(
+    image: Float[Tensor, "h w"], pixels: Float[Tensor, "1 1 h w 2"]
+) -> Float[Tensor, "h w"]:
+    """The image at normalised places, without interpolation; 0 outside."""
+    return torch.nn.functional.grid_sample(
+        image[None, None], pixels[:, 0], mode="nearest", align_corners=False
+    )[0, 0]

@@ -1,26 +1,22 @@
-"""Everything after the tokens when there is a detail decoder: features, raw maps, motion cues.
+"""LDRM's refinement: everything after the tokens (ours, ADR 15).
 
 Axes: ``b`` batch, ``k`` key frames, ``e`` width of a token, ``h4 w4`` token grid, ``h w`` cells of
 4 pixels, ``hh ww`` pixels, ``d`` channels for the deformation network.
 
-    tokens, sight ─ decoder ─┬─ pixel head ─── raw maps ─ depth ─ pixels followed ───────┐
-                             ├─ surroundings                                             │
-                             └──────────────────────────── features ─────────────────────┴─ motion
-
-Where there is one picture alone, a network of its own tells its depth (``picture_depth``).
+    tokens, posed video ─ decoder ─┬─ pixel head ── raw maps ─ depth ─ optical flow ─┐
+                                   ├─ border head                                    │
+                                   └──────────────────────── features ───────────────┴─ motion
 """
 
-import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.decoder import RefinementDecoder, widths
-from diff4splat.models.ldrm.refinement.heads import PixelHead, SurroundingsHead
+from diff4splat.models.ldrm.refinement.heads import BorderHead, PixelHead
 from diff4splat.models.ldrm.refinement.motion_features import motion_features
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
-from diff4splat.models.monocular_depth.network import MonocularDepthNet
 
 
 class RefinementBranch(nn.Module):
@@ -28,34 +24,23 @@ class RefinementBranch(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        width = widths(config.detail.width)[0]
+        channels = widths(config.refinement.channels)[0]
         self.activation = config.activation
         self.decoder = RefinementDecoder(config)
-        self.pixels = PixelHead(width)
-        margin = config.detail.surroundings
-        self.surroundings = SurroundingsHead(width, margin) if margin else None
-        own = config.detail.picture_width
-        self.picture_depth = MonocularDepthNet(own) if own else None
+        self.pixel_head = PixelHead(channels)
+        margin = config.refinement.border_cells
+        self.border_head = BorderHead(channels, margin) if margin else None
 
     def forward(
-        self, tokens: Float[Tensor, "b e k h4 w4"], sight: PosedVideo, *, moving: bool
+        self, tokens: Float[Tensor, "b e k h4 w4"], posed_video: PosedVideo, *, moving: bool
     ) -> RawGaussianMaps:
-        """``tokens`` of the answer are what the deformation network looks at, if it is asked."""
+        """Maps whose tokens are the input of the deformation network, if anything is ``moving``."""
         batch = len(tokens)
-        features = self.decoder(tokens, sight)
-        raw = self._with_own_depth(self.pixels(features).unflatten(0, (batch, -1)), sight)
+        features = self.decoder(tokens, posed_video)
+        raw = self.pixel_head(features).unflatten(0, (batch, -1))
         features = features.unflatten(0, (batch, -1))
-        around = None if self.surroundings is None else self.surroundings(features[:, 0])
-        seen = features.transpose(1, 2)
+        border = None if self.border_head is None else self.border_head(features[:, 0])
+        motion_input = features.transpose(1, 2)
         if moving:
-            seen = motion_features(features, raw[:, :, -1], sight, self.activation)
-        return RawGaussianMaps(gaussians=raw.transpose(1, 2), tokens=seen, surroundings=around)
-
-    def _with_own_depth(
-        self, raw: Float[Tensor, "b k 12 hh ww"], sight: PosedVideo
-    ) -> Float[Tensor, "b k 12 hh ww"]:
-        """One picture has no parallax that the decoder could see."""
-        if self.picture_depth is None or sight.rgb.shape[2] > 1:
-            return raw
-        distance = self.picture_depth(sight.rgb[:, :, 0])
-        return torch.cat([raw[:, :, :-1], distance[:, None].to(raw.dtype)], 2)
+            motion_input = motion_features(features, raw[:, :, -1], posed_video, self.activation)
+        return RawGaussianMaps(gaussians=raw.transpose(1, 2), tokens=motion_input, border=border)

@@ -27,50 +27,50 @@ class RefinementDecoder(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        own = config.detail
+        own = config.refinement
         self.config = own
-        fine, middle, coarse = widths(own.width)
-        if own.depths:
+        fine, middle, coarse = widths(own.channels)
+        if own.cost_volume_depths:
             self.match = nn.Sequential(
                 nn.Conv2d(CELL_CHANNELS, fine, 3, padding=1),
                 nn.SiLU(),
                 nn.Conv2d(fine, own.match_channels, 3, padding=1),
             )
-        self.enter = nn.Conv2d(CELL_CHANNELS + 2 * own.depths, fine, 3, padding=1)
+        self.input_conv = nn.Conv2d(CELL_CHANNELS + 2 * own.cost_volume_depths, fine, 3, padding=1)
         self.fine, self.middle, self.coarse = ConvBlock(fine), ConvBlock(middle), ConvBlock(coarse)
-        self.shrink_1 = nn.Conv2d(fine, middle, 2, stride=2)
-        self.shrink_2 = nn.Conv2d(middle, coarse, 2, stride=2)
+        self.down_1 = nn.Conv2d(fine, middle, 2, stride=2)
+        self.down_2 = nn.Conv2d(middle, coarse, 2, stride=2)
         self.tokens = nn.Conv2d(config.ldrm.width, coarse, 1)
-        self.mixed = ConvBlock(coarse)
-        self.grow_2 = nn.Conv2d(coarse, 4 * middle, 1)
-        self.grow_1 = nn.Conv2d(middle, 4 * fine, 1)
+        self.mid = ConvBlock(coarse)
+        self.up_2 = nn.Conv2d(coarse, 4 * middle, 1)
+        self.up_1 = nn.Conv2d(middle, 4 * fine, 1)
         self.middle_out, self.fine_out = ConvBlock(middle), ConvBlock(fine)
 
     def forward(
-        self, tokens: Float[Tensor, "b e k h4 w4"], sight: PosedVideo
+        self, tokens: Float[Tensor, "b e k h4 w4"], posed_video: PosedVideo
     ) -> Float[Tensor, "n c h w"]:
         """Features of all key frames in order."""
-        pixels = cells(sight.key_rgb.flatten(0, 1)) * 2 - 1
-        fine = self.fine(self.enter(torch.cat([pixels, *self._agreement(sight)], 1)))
-        middle = self.middle(self.shrink_1(fine))
-        coarse = self.coarse(self.shrink_2(middle))
-        coarse = self.mixed(coarse + self.tokens(tokens.transpose(1, 2).flatten(0, 1)))
-        middle = self.middle_out(middle + _twice(self.grow_2(coarse)))
-        return self.fine_out(fine + _twice(self.grow_1(middle)))
+        pixels = cells(posed_video.key_rgb.flatten(0, 1)) * 2 - 1
+        fine = self.fine(self.input_conv(torch.cat([pixels, *self._cost_volume(posed_video)], 1)))
+        middle = self.middle(self.down_1(fine))
+        coarse = self.coarse(self.down_2(middle))
+        coarse = self.mid(coarse + self.tokens(tokens.transpose(1, 2).flatten(0, 1)))
+        middle = self.middle_out(middle + _upsample(self.up_2(coarse)))
+        return self.fine_out(fine + _upsample(self.up_1(middle)))
 
-    def _agreement(self, sight: PosedVideo) -> list[Tensor]:
+    def _cost_volume(self, posed_video: PosedVideo) -> list[Tensor]:
         """Nothing where no depths are compared."""
-        if not self.config.depths:
+        if not self.config.cost_volume_depths:
             return []
-        video = sight.rgb.transpose(1, 2)
+        video = posed_video.rgb.transpose(1, 2)
         matched = self.match(cells(video.flatten(0, 1)) * 2 - 1).unflatten(0, video.shape[:2])
-        height, width = sight.cameras.size_px
-        cameras = sight.cameras.resized((height // CELL_PX, width // CELL_PX))
+        height, width = posed_video.cameras.size_px
+        cameras = posed_video.cameras.resized((height // CELL_PX, width // CELL_PX))
         return [cost_volume(matched, cameras, self._inverse_depths(matched.device)).flatten(0, 1)]
 
     def _inverse_depths(self, device: torch.device) -> Float[Tensor, " d"]:
-        nearest, farthest = self.config.range
-        return torch.linspace(1 / farthest, 1 / nearest, self.config.depths).to(device)
+        nearest, farthest = self.config.depth_range
+        return torch.linspace(1 / farthest, 1 / nearest, self.config.cost_volume_depths).to(device)
 
 
 def widths(width: int) -> tuple[int, ...]:
@@ -78,5 +78,5 @@ def widths(width: int) -> tuple[int, ...]:
     return tuple(width * share // GROWTH[0] for share in GROWTH)
 
 
-def _twice(maps: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h2 w2"]:
+def _upsample(maps: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h2 w2"]:
     return torch.nn.functional.pixel_shuffle(maps, 2)

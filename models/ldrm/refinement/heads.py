@@ -13,7 +13,7 @@ from diff4splat.models.blocks.conv_block import CELL_PX, NEIGHBOURS, ConvBlock, 
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.config.networks import GAUSSIAN_SPLIT
 
-LOOKS = sum(GAUSSIAN_SPLIT[:-1])
+APPEARANCE = sum(GAUSSIAN_SPLIT[:-1])
 """Channels of colour, scale, rotation and opacity."""
 
 
@@ -24,34 +24,34 @@ class PixelHead(nn.Module):
         super().__init__()
         self.distance = zero_(nn.Conv2d(width, 1, 3, padding=1))
         self.weights = nn.Conv2d(width, NEIGHBOURS * CELL_PX**2, 1)
-        self.looks = zero_(nn.Conv2d(width, LOOKS * CELL_PX**2, 1))
+        self.appearance = zero_(nn.Conv2d(width, APPEARANCE * CELL_PX**2, 1))
 
     def forward(self, features: Float[Tensor, "n c h w"]) -> Float[Tensor, "n 12 h4 w4"]:
         """In the order of GAUSSIAN_SPLIT."""
         distance = convex_upsample(self.distance(features), self.weights(features))
-        looks = torch.nn.functional.pixel_shuffle(self.looks(features), CELL_PX)
-        return torch.cat([looks, distance], 1)
+        appearance = torch.nn.functional.pixel_shuffle(self.appearance(features), CELL_PX)
+        return torch.cat([appearance, distance], 1)
 
 
-class SurroundingsHead(nn.Module):
+class BorderHead(nn.Module):
     """Twelve raw channels for every cell of the first picture and of a margin around it."""
 
     def __init__(self, width: int, margin: int) -> None:
         super().__init__()
         self.margin = margin
-        self.enter = nn.Conv2d(width + 2, width, 3, padding=1)
-        self.near = ConvBlock(width)
-        self.shrink = nn.Conv2d(width, width, 4, stride=4)
-        self.far = nn.Sequential(ConvBlock(width), ConvBlock(width))
+        self.input_conv = nn.Conv2d(width + 2, width, 3, padding=1)
+        self.local = ConvBlock(width)
+        self.downsample = nn.Conv2d(width, width, 4, stride=4)
+        self.context = nn.Sequential(ConvBlock(width), ConvBlock(width))
         self.out = zero_(nn.Conv2d(2 * width, sum(GAUSSIAN_SPLIT), 3, padding=1))
 
     def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 12 hs ws"]:
         """From the features of the first frame; borders continue outwards."""
         around = replicate_border(features, self.margin)
-        near = self.near(self.enter(torch.cat([around, self._places(around)], 1)))
-        far = self.far(self.shrink(near))
-        far = torch.nn.functional.interpolate(far, near.shape[-2:], mode="bilinear")
-        return self.out(torch.cat([near, far], 1))
+        local = self.local(self.input_conv(torch.cat([around, self._places(around)], 1)))
+        context = self.context(self.downsample(local))
+        context = torch.nn.functional.interpolate(context, local.shape[-2:], mode="bilinear")
+        return self.out(torch.cat([local, context], 1))
 
     def _places(self, around: Tensor) -> Float[Tensor, "b 2 hs ws"]:
         """How far outside the picture a cell lies, across and down; 0 inside, in margins."""

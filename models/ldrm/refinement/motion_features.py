@@ -38,14 +38,14 @@ CUES = SLOT_CUES * SLOTS + 1
 def motion_features(
     features: Float[Tensor, "b k c h4 w4"],
     raw_distance: Float[Tensor, "b k h w"],
-    sight: PosedVideo,
+    posed_video: PosedVideo,
     config: ActivationConfig,
 ) -> Float[Tensor, "b d k h4 w4"]:
     """Features of the key frames, then their cues."""
     with torch.no_grad(), torch.autocast(features.device.type, enabled=False):
         depth = key_depth(raw_distance, config)
         relative = (depth / PLANE_DEPTH).log()[:, :, None]
-        pixels = torch.cat([warped_flow(depth, sight).flatten(2, 3), relative], 2)
+        pixels = torch.cat([warped_flow(depth, posed_video).flatten(2, 3), relative], 2)
         cues = torch.nn.functional.avg_pool2d(pixels.flatten(0, 1), CELL_PX)
         cues = cues.unflatten(0, depth.shape[:2])
     return torch.cat([features, cues.to(features.dtype)], 2).transpose(1, 2)
@@ -59,11 +59,13 @@ def key_depth(
     return PLANE_DEPTH * activations.bounded_factor(raw, config.log_distance_limit)
 
 
-def warped_flow(depth: Float[Tensor, "b k h w"], sight: PosedVideo) -> Float[Tensor, "b k s 4 h w"]:
+def warped_flow(
+    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo
+) -> Float[Tensor, "b k s 4 h w"]:
     """Rate and difference of every pixel in every slot; beyond an end, those of the other way."""
-    later, earlier = (_one_way(depth, sight, sign) for sign in (1, -1))
-    last = sight.rgb.shape[2] - 1
-    ends = [(sight.keys == end)[:, None, None, None, None] for end in (last, 0)]
+    later, earlier = (_one_way(depth, posed_video, sign) for sign in (1, -1))
+    last = posed_video.rgb.shape[2] - 1
+    ends = [(posed_video.keys == end)[:, None, None, None, None] for end in (last, 0)]
     return torch.cat(
         [torch.where(ends[0], earlier, later), torch.where(ends[1], later, earlier)], 2
     )
@@ -83,39 +85,40 @@ def frames_between(keys: int) -> int:
 
 
 def _one_way(
-    depth: Float[Tensor, "b k h w"], sight: PosedVideo, sign: int
+    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo, sign: int
 ) -> Float[Tensor, "b k s 4 h w"]:
     """Slots at growing distance, each begun at the even motion that the one before it saw."""
-    own = sight.key_rgb.flatten(0, 1).float()
+    own = posed_video.key_rgb.flatten(0, 1).float()
     rate_px = torch.zeros_like(own[:, :2])
     slots = []
     for distance in DISTANCES:
-        frames = (sight.keys + sign * distance).clamp(0, sight.rgb.shape[2] - 1)
-        elapsed = (frames - sight.keys).repeat(len(depth)).to(own)[:, None, None, None]
-        other = _carried(depth, sight, frames)
+        frames = (posed_video.keys + sign * distance).clamp(0, posed_video.rgb.shape[2] - 1)
+        elapsed = (frames - posed_video.keys).repeat(len(depth)).to(own)[:, None, None, None]
+        other = _carried(depth, posed_video, frames)
         flow = track_flow(own, other, rate_px * elapsed)
         difference = (warp(other, flow) - own).abs().mean(1, keepdim=True)
         rate_px = torch.where(elapsed == 0, rate_px, flow / elapsed)
-        slots.append(torch.cat([_rate(rate_px, sight), difference / DIFFERENCE_UNIT], 1))
+        slots.append(torch.cat([_rate(rate_px, posed_video), difference / DIFFERENCE_UNIT], 1))
     return torch.stack(slots, 1).unflatten(0, depth.shape[:2])
 
 
-def _rate(rate_px: Float[Tensor, "n 2 h w"], sight: PosedVideo) -> Float[Tensor, "n 3 h w"]:
+def _rate(rate_px: Float[Tensor, "n 2 h w"], posed_video: PosedVideo) -> Float[Tensor, "n 3 h w"]:
     """Pixels per frame as depths per clip, along the axes of the first camera."""
-    cameras = flat_cameras(sight.key_cameras)
-    count = sight.rgb.shape[2] - 1
+    cameras = flat_cameras(posed_video.key_cameras)
+    count = posed_video.rgb.shape[2] - 1
     across = count * rate_px / cameras.focal_px[:, :, None, None].to(rate_px)
     turn = cameras.world_from_camera[:, :3, :2].to(rate_px)
     return torch.einsum("nij,njhw->nihw", turn, across) / RATE_UNIT
 
 
 def _carried(
-    depth: Float[Tensor, "b k h w"], sight: PosedVideo, frames: Int[Tensor, " k"]
+    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo, frames: Int[Tensor, " k"]
 ) -> Float[Tensor, "n 3 h w"]:
     """One frame for each key frame, as that one's camera would have seen it."""
     own, other = (
-        flat_cameras(c) for c in (sight.key_cameras, camera_frames(sight.cameras, frames))
+        flat_cameras(c)
+        for c in (posed_video.key_cameras, camera_frames(posed_video.cameras, frames))
     )
     pixels, _ = other_pixels(own, other, 1 / depth.flatten(0, 1)[:, None])
-    neighbour = sight.rgb[:, :, frames].transpose(1, 2).flatten(0, 1)
+    neighbour = posed_video.rgb[:, :, frames].transpose(1, 2).flatten(0, 1)
     return sampled(neighbour, pixels)[:, :, 0].float()

@@ -30,11 +30,11 @@ class PosedVideo:
         want, got = (batch, *video), (*self.cameras.batch_shape, *self.cameras.size_px)
         if tuple(want) != tuple(got):
             raise ShapeError(
-                f"Sight.cameras: expected batch, frames and size {want}, got {got}; "
+                f"PosedVideo.cameras: expected batch, frames and size {want}, got {got}; "
                 "give every picture its camera"
             )
 
-    def sample(self, index: int) -> "Sight":
+    def sample(self, index: int) -> "PosedVideo":
         """One batch element, as a batch of one."""
         own = slice(index, index + 1)
         return PosedVideo(rgb=self.rgb[own], cameras=self.cameras[own])

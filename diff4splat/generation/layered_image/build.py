@@ -1,0 +1,83 @@
+"""From an image, its depth and its displacement to all layers.
+
+image, depth, displacement ─ upsample ─ pixels ─ subpixel infill        the image shows these
+smaller copy ─┬─ background layer                                       these extend them into
+└─ border extension ─ inpaint what moving objects uncover  what the image hides
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.layered_image.background_layer import background_layer
+from diff4splat.generation.layered_image.border_extension import (
+    border_extension,
+    push_behind_surface,
+)
+from diff4splat.generation.layered_image.disocclusion import inpaint_background, inpaint_border
+from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
+from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
+from diff4splat.generation.layered_image.upsampling import upsample_maps
+from diff4splat.models.ldrm.plane_prior import OPAQUE
+
+PIXEL_FOOTPRINT_PX = 0.25
+"""Standard deviation of a pixel's Gaussian, drawn without dilation: sharp from every side."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageMaps:
+    """What the priors say about the smaller copy of an image."""
+
+    depth: Float[Tensor, "h w"]
+    """z in scene units."""
+    displacement: Float[Tensor, "t h w 3"] | None
+    """From the first frame, in scene units, at the times of the latent frames; None is static."""
+
+
+def build_layered_image(
+    small: InputImage, image: InputImage, maps: ImageMaps, border_cells: int
+) -> LayeredImage:
+    """The layers of ``image``; ``small`` is the copy that ``maps`` belong to."""
+    pixels = pixel_layer(small, image, maps)
+    hidden = hidden_layers(small, maps, border_cells)
+    if small.camera.size_px != image.camera.size_px:
+        hidden = [replace(layer, pixel_index=None) for layer in hidden]
+    return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
+
+
+def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list[ImageLayer]:
+    """The background layer, and the border extension if it has any cells."""
+    moving = _moving(maps)
+    background = background_layer(small.rgb, maps.depth, small.camera, maps.displacement)
+    layers = [inpaint_background(background, small.rgb, moving)]
+    if border_cells:
+        border = border_extension(small.rgb, maps.depth, small.camera, border_cells)
+        border = push_behind_surface(border, maps.depth, border_cells)
+        layers.append(inpaint_border(border, small.rgb, moving))
+    return layers
+
+
+def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageLayer:
+    """One opaque cell per pixel of the image."""
+    depth, displacement = upsample_maps(maps.depth, maps.displacement, (small.rgb, image.rgb))
+    return ImageLayer(
+        camera=image.camera,
+        rgb=image.rgb,
+        depth=depth,
+        mask=torch.ones_like(depth, dtype=torch.bool),
+        opacity=OPAQUE,
+        footprint_px=PIXEL_FOOTPRINT_PX,
+        displacement=displacement,
+        pixel_index=torch.arange(depth.numel(), device=depth.device).view_as(depth),
+        in_image=True,
+    )
+
+
+def _moving(maps: ImageMaps) -> Bool[Tensor, "h w"]:
+    """Pixels that are displaced at any time."""
+    if maps.displacement is None:
+        return torch.zeros_like(maps.depth, dtype=torch.bool)
+    return maps.displacement.any(-1).any(0)

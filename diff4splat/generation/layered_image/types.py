@@ -1,0 +1,61 @@
+"""An image as layers: colour, depth, mask and displacement on the grid of a camera each.
+
+Axes: ``h w`` rows and columns of a layer, ``t`` latent frames. Every layer stays a map until the
+end, when ``gaussians.py`` makes one Gaussian of each valid cell.
+"""
+
+from dataclasses import dataclass
+
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from diff4splat.errors import ShapeError
+from diff4splat.geometry.camera import Camera
+
+NO_PIXEL = -1
+"""Index of a cell whose colour no pixel of the image decides."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageLayer:
+    """One surface per cell."""
+
+    camera: Camera
+    """At the origin; its size is the layer's grid."""
+    rgb: Float[Tensor, "h w 3"]
+    depth: Float[Tensor, "h w"]
+    """z in scene units; any finite number above 0 where the mask is false."""
+    mask: Bool[Tensor, "h w"]
+    """True where the layer has a cell."""
+    opacity: float
+    footprint_px: float
+    """Standard deviation of a cell's Gaussian, in cells."""
+    displacement: Float[Tensor, "t h w 3"] | None = None
+    """From the first frame, in scene units, along the first camera's axes; None is static."""
+    pixel_index: Int[Tensor, "h w"] | None = None
+    """Pixel of the image, row by row, whose colour each cell has; ``NO_PIXEL`` where none."""
+    in_image: bool = False
+    """Whether the image shows this layer; the others extend it into what the image hides."""
+
+    def __post_init__(self) -> None:
+        size = self.camera.size_px
+        found = {"rgb": self.rgb.shape[:2], "depth": self.depth.shape, "mask": self.mask.shape}
+        if self.displacement is not None:
+            found["displacement"] = self.displacement.shape[1:3]
+        if self.pixel_index is not None:
+            found["pixel_index"] = self.pixel_index.shape
+        for name, got in found.items():
+            if tuple(got) != size:
+                raise ShapeError(f"ImageLayer.{name}: expected the grid {size}, got {tuple(got)}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayeredImage:
+    """All layers of one image; those that the image shows come first."""
+
+    layers: tuple[ImageLayer, ...]
+
+    @property
+    def shown_count(self) -> int:
+        """Cells of the layers that the image shows."""
+        return sum(int(layer.mask.sum()) for layer in self.layers if layer.in_image)

@@ -1,0 +1,142 @@
+"""Which networks one request needs, decided before any of them is loaded.
+
+    depth prior          if the model has one; else the image lies on a plane
+    motion prior         if the model has one and a prompt asks for motion; else the image is static
+    text encoder         if a prompt is given and something takes it
+    VAE, DiT, LDRM, deformation    only where hidden regions are filled by the video model
+
+What the plan leaves out is neither loaded nor run, and the card says why.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from diff4splat.errors import ConfigError
+from diff4splat.models.config.model import Fill, ModelConfig
+from diff4splat.models.factory import model_parts, parameter_counts
+from diff4splat.progress.run_log import RunLog
+
+FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
+"""What fills hidden regions by video."""
+RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
+"""What turns a true video into a scene."""
+WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
+UNTRAINED_FILL = "the video model is not trained"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequestFacts:
+    """What a request has, before any file is read."""
+
+    prompt: bool
+    fill: Fill | None = None
+    """None takes the model's default."""
+    still: bool = False
+    """Nothing may move."""
+    frames: int = 2
+    """Frames of the camera path as the networks see it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkippedPart:
+    """A network that is neither loaded nor run."""
+
+    part: str
+    why: str
+    changes_result: bool
+    """Whether running it could change the scene."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GenerationPlan:
+    """The networks that run, and why the others do not."""
+
+    parts: frozenset[str]
+    skipped: tuple[SkippedPart, ...]
+
+    @property
+    def fills(self) -> bool:
+        """Whether the video model fills what the image hides."""
+        return "ldrm" in self.parts
+
+    @property
+    def moves(self) -> bool:
+        """Whether the motion prior runs."""
+        return "motion_unet" in self.parts
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether the depth prior runs."""
+        return "monocular_depth" in self.parts
+
+    @property
+    def shows_image(self) -> bool:
+        """Whether the image's own pixels are shown; else LDRM reconstructs every frame."""
+        return self.has_depth or not self.fills
+
+    def record(self, config: ModelConfig, log: RunLog) -> None:
+        """Note what is skipped, with the weights that this saves."""
+        counts = parameter_counts(config)
+        for skipped in self.skipped:
+            saved = f"{counts[skipped.part]:,} weights neither loaded nor run"
+            error = None if skipped.changes_result else 0.0
+            log.left_out(skipped.part, skipped.why, saved, error)
+
+
+def plan_generation(
+    config: ModelConfig, trained: Collection[str], facts: RequestFacts
+) -> GenerationPlan:
+    """The networks that this request needs.
+
+    Raises:
+        ConfigError: the video model is asked to fill, but it is not trained and other parts are.
+    """
+    reasons = {
+        "monocular_depth": _untrained("monocular_depth", trained),
+        "motion_unet": _untrained("motion_unet", trained) or _motion_reason(facts),
+    }
+    fill = _fill_reason(config, trained, facts)
+    reasons |= dict.fromkeys(FILL_PARTS, fill)
+    if facts.still and not fill:
+        reasons["deformation"] = "nothing may move"
+    users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
+    unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
+    reasons["text_encoder"] = "no prompt" if not facts.prompt else unread
+    parts = model_parts(config)
+    skipped = [
+        SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] == WORSE_FILL)
+        for part in parts
+        if reasons[part]
+    ]
+    running = frozenset(part for part in parts if not reasons[part])
+    return GenerationPlan(parts=running, skipped=tuple(skipped))
+
+
+def _untrained(part: str, trained: Collection[str]) -> str:
+    """Random models run whole; in others a part that is not trained stays out."""
+    return "it is not trained" if trained and part not in trained else ""
+
+
+def _motion_reason(facts: RequestFacts) -> str:
+    if facts.still:
+        return "nothing may move"
+    if facts.frames < 2:
+        return "the camera path has one frame"
+    return "" if facts.prompt else "no prompt asks for motion"
+
+
+def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFacts) -> str:
+    """Why the video model does not fill; empty where it does."""
+    usable = not trained or set(FILL_PARTS) <= set(trained)
+    if facts.fill == "video" and not usable:
+        missing = ", ".join(sorted(set(FILL_PARTS) - set(trained)))
+        raise ConfigError(
+            f"--fill video: expected a trained video model, got {missing} untrained; "
+            "train these parts or leave out --fill"
+        )
+    if facts.fill == "none":
+        return "--fill none"
+    if not usable:
+        return UNTRAINED_FILL
+    wanted = facts.fill or config.default_fill
+    return "" if wanted == "video" else WORSE_FILL

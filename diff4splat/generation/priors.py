@@ -1,0 +1,54 @@
+"""Depth and displacement of an image by the priors of a model.
+
+Axes: ``h w`` pixels of the copy that the networks see, ``t`` latent frames, ``s d`` text. Without a
+depth prior the image lies on a plane; without a motion prior it is static.
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.layered_image.build import ImageMaps
+from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
+from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.settings import why_unguided
+from diff4splat.models.hub.model import Model
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.ldrm.refinement.motion_features import key_depth
+from diff4splat.progress.run_log import RunLog
+
+
+def image_maps(
+    model: Model, image: InputImage, frames: int, request: MotionRequest, log: RunLog
+) -> ImageMaps:
+    """Depth, and displacement over ``frames`` latent frames, by the priors that are loaded."""
+    with log.phases.phase("predict depth"):
+        depth = image_depth(model, image)
+    if model.networks.motion_unet is None or frames < 2:
+        return ImageMaps(depth=depth, displacement=None)
+    motion = _sample_motion(model, image, frames, request, log)
+    mask = motion.mask(request.settings.motion.threshold)
+    displacement = rigid_component_offsets(motion.field, mask, depth)
+    return ImageMaps(depth=depth, displacement=displacement if displacement.any() else None)
+
+
+def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:
+    """Z of every pixel in scene units."""
+    network = model.networks.monocular_depth
+    if network is None:
+        return torch.full_like(image.rgb[..., 0], PLANE_DEPTH)
+    raw = network(image.rgb.movedim(-1, 0)[None])[:, 0]
+    return key_depth(raw, model.config.activation)[0]
+
+
+def _sample_motion(
+    model: Model, image: InputImage, frames: int, request: MotionRequest, log: RunLog
+) -> MotionSample:
+    motion = request.settings.motion
+    with log.phases.phase("sample motion", motion.steps) as advance:
+        sample = sample_motion(model.networks.motion_unet, image, frames, request, advance)
+    if sample.calls.saved:
+        why = "no prompt" if request.text is None else why_unguided(motion.guidance)
+        log.left_out("guidance pass", why, f"{sample.calls.saved} network calls")
+    return sample

@@ -1,0 +1,166 @@
+"""What the image hides, by the video model and LDRM.
+
+    layered image ─ render along the path ─ VAE ─┐
+    noise, rays, text ───────────────────────────┴─ DiT ─ latents ─ LDRM ─ hidden cells ─ deform
+
+Axes: ``s d`` text. A cell of a later frame is hidden where no layer that the image shows covers
+it. Without a depth prior the image has no geometry of its own: then LDRM reconstructs every cell of
+every frame, which is the paper's way.
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.generation.canonical_scene import (
+    CanonicalScene,
+    keyframe_plane_prior,
+    prune_cells,
+    reconstruct,
+)
+from diff4splat.generation.deformation_motion import deform
+from diff4splat.generation.hidden_cells import FillGrid, at_grid, hidden_grid, whole_grid
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.layered_image.gaussians import GaussianSet
+from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
+from diff4splat.generation.render_condition import (
+    RenderedImage,
+    encode_condition,
+    render_layered_image,
+)
+from diff4splat.generation.settings import GenerationSettings, why_unguided
+from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
+from diff4splat.generation.video_sampling import Conditions, sample_video
+from diff4splat.generation.video_to_gaussians import (
+    RawVideoMaps,
+    VideoLatent,
+    image_plane_base,
+    raw_video_maps,
+)
+from diff4splat.geometry.rays import plucker_map, relative_to_first
+from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.models.deformation.keyframes import DeformationUnits
+from diff4splat.models.hub.model import Model
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.progress.run_log import RunLog
+
+FOOTPRINT_CELLS = 0.6
+"""Standard deviation of a hidden cell: the scene is drawn without dilation, and cells must meet."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FillRequest:
+    """Everything that decides about a fill, at the networks' size."""
+
+    image: InputImage
+    layered: LayeredImage
+    path: CameraPath
+    text: Float[Tensor, "1 s d"] | None
+    seed: int
+    settings: GenerationSettings
+    hidden_only: bool
+    """False where LDRM also reconstructs what the image shows."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VideoFill:
+    """Gaussians of the filled cells, and where these lie."""
+
+    gaussians: GaussianSet
+    grid: FillGrid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _FilledVideo:
+    """A sampled video as LDRM sees it."""
+
+    latent: VideoLatent
+    rendered: RenderedImage | None
+
+
+def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill:
+    """Sample a video, and reconstruct what the image does not show of it."""
+    video = _sample(model, request, log)
+    with log.phases.phase("reconstruct"):
+        moving = model.networks.deformation is not None
+        raw = raw_video_maps(model, video.latent, moving=moving, log=log)
+        grid = _grid(model, request, video, raw)
+        config = model.config.activation
+        if request.hidden_only:
+            config = replace(config, footprint_px=FOOTPRINT_CELLS)
+        canonical = reconstruct(raw.maps, grid.base, config, grid.filled)
+        canonical = prune_cells(canonical, request.settings.min_opacity, log)
+    return VideoFill(gaussians=_with_motion(model, request, canonical, log), grid=grid)
+
+
+def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
+    settings = request.settings
+    rendered, conditions = _conditions(model, request, log)
+    with log.phases.phase("sample video", settings.steps) as advance:
+        sample = sample_video(model.networks.dit, conditions, settings, request.seed, advance)
+    if sample.calls.saved:
+        why = "no prompt" if request.text is None else why_unguided(settings.guidance)
+        log.left_out("guidance pass", why, f"{sample.calls.saved} network calls")
+    latent = VideoLatent(
+        latent=sample.latent, first_frame=request.image, cameras=request.path.cameras
+    )
+    return _FilledVideo(latent=latent, rendered=rendered)
+
+
+def _conditions(
+    model: Model, request: FillRequest, log: RunLog
+) -> tuple[RenderedImage | None, Conditions]:
+    conditioned, rendered = model.config.dit.render_condition, None
+    if conditioned or request.hidden_only:
+        with log.phases.phase("render condition"):
+            rendered = render_layered_image(request.layered, request.path)
+    with log.phases.phase("encode image"):
+        image = request.image.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
+        conditions = Conditions(
+            image_latent=model.networks.vae.encode(image).mean,
+            plucker=plucker_map(relative_to_first(request.path.cameras)).movedim(0, 1)[None],
+            text=request.text,
+            render=encode_condition(model, rendered) if conditioned else None,
+        )
+    return rendered, conditions
+
+
+def _grid(model: Model, request: FillRequest, video: _FilledVideo, raw: RawVideoMaps) -> FillGrid:
+    """LDRM's grid with the cells to fill."""
+    frames = torch.arange(len(request.path))
+    if raw.frames is None:
+        base = image_plane_base(model, video.latent)
+    else:
+        rgb, frames = raw.frames.key_rgb[0].movedim(1, -1), frames[::TIME_STRIDE]
+        base = keyframe_plane_prior(rgb, raw.frames.key_cameras[0])
+    grid = whole_grid(raw.maps.gaussians[0], base, model.config.activation)
+    if not request.hidden_only:
+        return grid
+    return hidden_grid(grid, at_grid(video.rendered, frames, model.config.ldrm.grid_stride))
+
+
+def _with_motion(
+    model: Model, request: FillRequest, canonical: CanonicalScene, log: RunLog
+) -> GaussianSet:
+    units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.config.activation)
+    camera, threshold_px = request.image.camera, request.settings.static_threshold_px
+    motion = deform(model.networks.deformation, canonical, request.path.times_s, units, log)
+    threshold_px = deformation_threshold_px(model.config, camera, threshold_px)
+    return GaussianSet(
+        gaussians=canonical.gaussians,
+        motion=prune_static_tracks(canonical.gaussians, motion, camera, threshold_px, log),
+        pixel_index=_pixel_index(model, request, canonical),
+    )
+
+
+def _pixel_index(model: Model, request: FillRequest, canonical: CanonicalScene) -> Tensor:
+    """Cells of the first frame show the image, if LDRM reconstructs them."""
+    index = canonical.cell_index
+    if request.hidden_only:
+        return torch.full_like(index, NO_PIXEL)
+    height, width = request.image.camera.size_px
+    cells = height * width // model.config.ldrm.grid_stride**2
+    return torch.where(index < cells, index, NO_PIXEL)

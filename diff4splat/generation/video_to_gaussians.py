@@ -1,0 +1,77 @@
+"""A video's latent, its first frame and its cameras through LDRM.
+
+Axes: ``c t h w`` latents, ``f`` video frames. A generated video and a true one take this way.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.generation.canonical_scene import CanonicalScene, reconstruct, reconstruct_refined
+from diff4splat.generation.input_image import InputImage
+from diff4splat.geometry.camera import Camera, stack_cameras
+from diff4splat.geometry.rays import plucker_map, relative_to_first
+from diff4splat.models.hub.model import Model
+from diff4splat.models.ldrm.gaussian_head import PixelBase
+from diff4splat.models.ldrm.plane_prior import plane_base
+from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.progress.run_log import RunLog
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VideoLatent:
+    """A video as networks hand it on."""
+
+    latent: Float[Tensor, "1 c t h w"]
+    """Standardised."""
+    first_frame: InputImage
+    """As it is, not decoded."""
+    cameras: Camera
+    """Batch shape (f,), of the image's size."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawVideoMaps:
+    """LDRM's output with the frames that it saw."""
+
+    maps: RawGaussianMaps
+    frames: PosedVideo | None
+    """Decoded; only refinement needs them."""
+
+
+def raw_video_maps(model: Model, video: VideoLatent, *, moving: bool, log: RunLog) -> RawVideoMaps:
+    """LDRM's raw maps; optical flow is computed only where something is ``moving``."""
+    rays = plucker_map(relative_to_first(video.cameras)).movedim(0, 1)[None]
+    frames = None
+    if model.config.refinement.used:
+        frames = decode_posed_video(model, video)
+    else:
+        why = "LDRM reads latents"
+        log.left_out("video decoder", why, "decoding every frame")
+    maps = model.networks.ldrm(video.latent, rays, frames, moving=moving)
+    return RawVideoMaps(maps=maps, frames=frames)
+
+
+def video_gaussians(model: Model, video: VideoLatent, log: RunLog) -> CanonicalScene:
+    """Gaussians of everything that the video shows."""
+    raw = raw_video_maps(model, video, moving=True, log=log)
+    if raw.frames is not None:
+        return reconstruct_refined(raw.maps, raw.frames, model.config.activation, log)
+    return reconstruct(raw.maps, image_plane_base(model, video), model.config.activation)
+
+
+def image_plane_base(model: Model, video: VideoLatent) -> PixelBase:
+    """The first frame on its plane, seen by every camera."""
+    image = video.first_frame
+    return plane_base(image.rgb, image.camera, video.cameras, model.config.ldrm.grid_stride)
+
+
+def decode_posed_video(model: Model, video: VideoLatent) -> PosedVideo:
+    """The decoded video after the true first frame."""
+    decoded = (model.networks.vae.decode(video.latent).float() + 1) / 2
+    first = video.first_frame.rgb.movedim(-1, 0)[None, :, None].to(decoded)
+    rgb = torch.cat([first, decoded[:, :, 1:].clamp(0, 1)], 2)
+    return PosedVideo(rgb=rgb, cameras=stack_cameras([video.cameras]))

@@ -1,0 +1,48 @@
+"""Checks that configurations share; all raise a ConfigError in the same words."""
+
+from typing import Protocol
+
+from diff4splat.errors import ConfigError
+
+
+class HasHeads(Protocol):
+    """A transformer's width and number of attention heads."""
+
+    width: int
+    heads: int
+
+
+def require(holds: bool, what: str, expected: str, got: object) -> None:
+    """Raise a ConfigError in the usual words unless ``holds``."""
+    if not holds:
+        raise ConfigError(f"{what}: expected {expected}, got {got!r}")
+
+
+def require_counts(config: object, *names: str) -> None:
+    """Every named field must be a whole number of at least 1."""
+    for name in names:
+        value = getattr(config, name)
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        require(
+            whole and value >= 1,
+            f"{type(config).__name__}.{name}",
+            "a whole number of at least 1",
+            value,
+        )
+
+
+def require_heads(config: HasHeads, smallest: int) -> None:
+    """The width must split into heads of an even width of at least ``smallest``."""
+    what = f"{type(config).__name__}.heads"
+    require(
+        config.width % config.heads == 0, what, f"a divisor of width {config.width}", config.heads
+    )
+    head = config.width // config.heads
+    require(head % 2 == 0 and head >= smallest, what, f"even heads of at least {smallest}", head)
+
+
+def require_optional_width(config: object, name: str) -> None:
+    """The named field must be a whole number; 0 leaves the network out."""
+    value = getattr(config, name)
+    whole = isinstance(value, int) and not isinstance(value, bool) and value >= 0
+    require(whole, f"{type(config).__name__}.{name}", "a whole number of at least 0", value)

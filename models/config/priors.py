@@ -1,0 +1,49 @@
+"""Settings of the priors: networks that see one image and no video."""
+
+from dataclasses import dataclass
+
+from diff4splat.models.config.checks import require, require_counts, require_optional_width
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MonocularDepthConfig:
+    """Depth prior: a U-Net from one image to the depth of its pixels (ours, ADR 23)."""
+
+    channels: int = 0
+    """At half the resolution; 0 leaves the prior out, and the image lies on a plane."""
+
+    def __post_init__(self) -> None:
+        require_optional_width(self, "channels")
+
+    @property
+    def used(self) -> bool:
+        """Whether there is such a network."""
+        return self.channels > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionUNetConfig:
+    """Motion prior: a U-Net from one image and text to displacements and a mask (ours, ADR 22)."""
+
+    width: int = 0
+    """Channels at a quarter of the resolution; 0 leaves the prior out, and the image is static."""
+    heads: int = 4
+    """Of text cross-attention; twice as many must divide the width."""
+    mask_refiner_width: int = 0
+    """Channels of the network that refines the mask at pixels (ADR 25); 0 leaves it out."""
+
+    def __post_init__(self) -> None:
+        require_counts(self, "heads")
+        for name in ("width", "mask_refiner_width"):
+            require_optional_width(self, name)
+        fits = self.width % (2 * self.heads) == 0
+        expected = f"0 or a multiple of {2 * self.heads}, twice the heads"
+        require(fits, "MotionUNetConfig.width", expected, self.width)
+        fits = self.used or not self.mask_refiner_width
+        expected = "0 without the network that it belongs to"
+        require(fits, "MotionUNetConfig.mask_refiner_width", expected, self.mask_refiner_width)
+
+    @property
+    def used(self) -> bool:
+        """Whether there is such a network."""
+        return self.width > 0

@@ -1,0 +1,44 @@
+"""The render condition: the layered image along the path, and which of its pixels are valid.
+
+Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and columns, ``f hh ww``
+video frames and pixels, ``h2 w2`` tokens, ``d`` width. Image-to-3D video models are conditioned
+this way (ViewCrafter, arXiv 2409.02048; GEN3C, arXiv 2503.03751): valid pixels are seen in the
+input image, all others are to be filled.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.blocks.patches import fill_first_pack, patchify
+from diff4splat.models.config.networks import TIME_STRIDE, TOKEN_PATCH
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderCondition:
+    """A rendered video as the transformer takes it."""
+
+    latent: Float[Tensor, "b c t h w"]
+    """Standardised."""
+    validity: Float[Tensor, "b 1 f hh ww"]
+    """1 where the input image shows the pixel, 0 where it hides it."""
+
+
+class RenderConditionEmbedding(nn.Module):
+    """Tokens of a render condition; zero when fresh."""
+
+    def __init__(self, channels: int, width: int) -> None:
+        super().__init__()
+        self.latent = zero_(nn.Linear(channels * TOKEN_PATCH**2, width))
+        self.validity = zero_(nn.Linear(TIME_STRIDE * TOKEN_PATCH**2, width, bias=False))
+
+    def forward(self, condition: RenderCondition) -> Float[Tensor, "b t h2 w2 d"]:
+        """One token per 2×2 latent pixels; validity is averaged over each latent pixel."""
+        latent = patchify(condition.latent, (1, TOKEN_PATCH, TOKEN_PATCH))
+        side_px = condition.validity.shape[-1] // condition.latent.shape[-1]
+        share = torch.nn.functional.avg_pool3d(condition.validity, (1, side_px, side_px))
+        share = patchify(fill_first_pack(share), (TIME_STRIDE, TOKEN_PATCH, TOKEN_PATCH))
+        return self.latent(latent) + self.validity((1 - share).to(latent))
