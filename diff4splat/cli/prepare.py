@@ -101,7 +101,7 @@ class PrepareLatents:
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.configs.recipes import find_recipe
-        from diff4splat.models.hub.pretrained import load_model
+        from diff4splat.models.hub.model import load_model
         from diff4splat.training.latents.encode import EncodingJob, encode_clips
 
         phases = ConsolePhases()

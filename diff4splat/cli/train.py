@@ -84,11 +84,11 @@ class Train:
 
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""
-        from diff4splat.models.hub.pretrained import load_model, with_text_encoder
+        from diff4splat.models.hub.model import load_model
 
         if self.from_model is None:
             return None
-        return with_text_encoder(load_model(self.from_model))
+        return load_model(self.from_model)
 
     def _require_some_work(self) -> None:
         """Refuse limits that leave nothing to do, before anything is loaded.

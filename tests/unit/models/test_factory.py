@@ -103,7 +103,9 @@ def test_paper_model_has_the_published_order_of_magnitude() -> None:
 
 
 def test_documentation_lists_the_counts() -> None:
-    text = (Path(__file__).parents[3] / "docs" / "networks.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "networks.md").read_text(
+        encoding="utf-8"
+    )
     counts = [parameter_counts(make()) for make in SIZES.values()]
     rows = {part: [table[part] for table in counts] for part in counts[0]}
     rows["total"] = [sum(table.values()) for table in counts]
