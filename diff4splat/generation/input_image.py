@@ -48,7 +48,7 @@ class InputImage:
     notes: tuple[str, ...] = ()
     """What was done to the photograph, in words."""
 
-    def to(self, device: torch.device) -> "Picture":
+    def to(self, device: torch.device) -> "InputImage":
         """Move pixels and camera."""
         return replace(self, rgb=self.rgb.to(device), camera=self.camera.to(device))
 
