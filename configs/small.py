@@ -67,9 +67,8 @@ def small_recipe() -> Recipe:
 
 def _generating(dynamic: StageRecipe) -> tuple[StageRecipe, ...]:
     """What comes after the reconstruction of true videos."""
-    single, generator = _single(dynamic), _generator(dynamic)
-    told = _told(single)
-    return single, _depth(single), told, generator, _branch(generator), _joint(told)
+    generator = _generator(dynamic)
+    return _depth(dynamic), generator, _branch(generator)
 
 
 def _autoencoder(data: DataSettings) -> StageRecipe:
@@ -128,49 +127,20 @@ def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
     )
 
 
-def _single(dynamic: StageRecipe) -> StageRecipe:
-    """LDRM from one picture too: what drafts are made from. Depth needs no second moment."""
-    data = replace(dynamic.data, target_frames=2, moving_targets=False, tracks=0)
-    return replace(
-        dynamic,
-        name="single",
-        kind="static",
-        steps=1_500,
-        global_batch=8,
-        micro_batch=8,
-        trained=("ldrm",),
-        data=data,
-        single_share=0.75,
-        true_pictures=True,
-        gates=(),
-    )
-
-
-def _depth(single: StageRecipe) -> StageRecipe:
+def _depth(dynamic: StageRecipe) -> StageRecipe:
     """Depth of pictures without a video: seven of each clip, none of them rendered."""
     return replace(
-        single,
+        dynamic,
         name="depth",
         kind="depth",
         steps=6_000,
         global_batch=8,
         micro_batch=8,
+        trained=("ldrm",),
         optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
         losses=LossWeights(depth_log=1.0, depth_edges=0.5, depth_shift=1.0, sky=0.2),
-        data=replace(single.data, target_frames=4, moving_targets=True),
-    )
-
-
-def _told(single: StageRecipe) -> StageRecipe:
-    """LDRM from one picture, judged along the path while things move: what they and edges hide."""
-    return replace(
-        single,
-        name="told",
-        kind="told",
-        steps=2_500,
-        losses=replace(single.losses, photometric=12.0),
-        optimizer=replace(single.optimizer, learning_rate=2e-4),
-        data=replace(single.data, target_frames=4, moving_targets=True, tracks=TRACKS),
+        data=replace(dynamic.data, target_frames=4, tracks=0),
+        gates=(),
     )
 
 
@@ -207,16 +177,4 @@ def _branch(generator: StageRecipe) -> StageRecipe:
         losses=replace(generator.losses, flow_motion=1.0, moves=10.0),
         data=replace(generator.data, moments=True),
         level_shift=16.0,
-    )
-
-
-def _joint(told: StageRecipe) -> StageRecipe:
-    """The reconstruction, on motion as the branch makes it; right or wrong, it is what is shown."""
-    return replace(
-        told,
-        name="joint",
-        kind="generated",
-        steps=400,
-        data=replace(told.data, augment=False),
-        optimizer=replace(told.optimizer, learning_rate=1e-4, warmup_steps=20),
     )

@@ -19,17 +19,15 @@ StageKind = Literal[
     "motion",
     "dynamic",
     "depth",
-    "told",
     "generator",
     "branch",
     "joint",
-    "generated",
 ]
 Precision = Literal["float32", "bfloat16"]
 Parallel = Literal["none", "ddp", "fsdp2"]
 Direction = Literal["at_least", "at_most"]
-RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "depth", "told", "joint", "generated")
-READING = ("generator", "branch", "joint", "generated")
+RECONSTRUCTING = ("sight", "static", "motion", "dynamic", "depth", "joint")
+READING = ("generator", "branch", "joint")
 """Kinds that read captions, which speak of left and right."""
 
 
@@ -311,7 +309,7 @@ class Recipe:
         _require(fits, f"{what}: data.moments", "false but for a motion branch", "true")
         stride, framed = stage.data.track_stride, detail and stage.kind in RECONSTRUCTING
         fits = not framed or stride == TIME_STRIDE
-        branches = stage.kind not in ("branch", "generated") or self.model.dit.motion_width > 0
+        branches = stage.kind != "branch" or self.model.dit.motion_width > 0
         _require(branches, f"{what}: model.dit.motion_width", "a motion branch for its kind", 0)
         tells = stage.kind != "depth" or (detail and self.model.detail.picture_width > 0)
         _require(tells, f"{what}: model.detail.picture_width", "a network for its kind", 0)

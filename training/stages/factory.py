@@ -8,7 +8,6 @@ from diff4splat.training.recipe import StageKind
 from diff4splat.training.stages.autoencoder import AutoencoderStage
 from diff4splat.training.stages.branch import MotionDiffusionStage
 from diff4splat.training.stages.depth import DepthStage
-from diff4splat.training.stages.generated import ImageTo4dFinetuneStage
 from diff4splat.training.stages.generator import VideoDiffusionStage
 from diff4splat.training.stages.joint import JointStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
@@ -18,7 +17,6 @@ from diff4splat.training.stages.reconstruction import (
     SightStage,
     StaticStage,
 )
-from diff4splat.training.stages.told import ImageTo4dStage
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
     {
@@ -27,12 +25,10 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "static": StaticStage,
         "motion": MotionStage,
         "depth": DepthStage,
-        "told": ImageTo4dStage,
         "branch": MotionDiffusionStage,
         "dynamic": DynamicStage,
         "generator": VideoDiffusionStage,
         "joint": JointStage,
-        "generated": ImageTo4dFinetuneStage,
     }
 )
 

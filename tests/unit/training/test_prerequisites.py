@@ -45,22 +45,16 @@ WITH_SIGHT = {
     "static-low": {"vae": "vae", "ldrm": "sight"},
     "motion": {"vae": "vae", "ldrm": "static-low"},
     "dynamic": {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
-    "single": {"vae": "vae", "ldrm": "dynamic"},
-    "depth": {"ldrm": "single"},
-    "told": {"vae": "vae", "ldrm": "depth", "deformation": "dynamic"},
-    "generator": {"vae": "vae", "ldrm": "told"},
+    "depth": {"ldrm": "dynamic"},
+    "generator": {"vae": "vae", "ldrm": "depth"},
     "branch": {"text_encoder": "generator", "dit": "generator"},
-    "joint": BUILDS_ON["joint"] | {"ldrm": "told", "dit": "branch"},
 }
 """What differs in ``small``, at its only size: seeing is learnt first, and motion by itself."""
 SIGHT_CONTINUES = {
     "static-low": "sight",
     "dynamic": "motion",
-    "single": "dynamic",
-    "depth": "single",
-    "told": "depth",
+    "depth": "dynamic",
     "branch": "generator",
-    "joint": "told",
 }
 
 

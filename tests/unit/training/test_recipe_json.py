@@ -24,12 +24,11 @@ def test_every_recipe_survives_its_json(name: str) -> None:
 @pytest.mark.parametrize("name", RECIPES)
 def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     names = [stage.name for stage in recipe_by_name(name).stages]
-    # Small has one size, so one static stage; its detail decoder learns to see before it, its
-    # deformation network what moves behind it, and then what a single picture shows and hides.
-    # The branch that tells motion reads what the generator's text encoder has learnt.
-    small = ["sight", "static-low", "motion", "dynamic", "single", "depth", "told"]
+    # Small has one size, so one static stage. The motion network reads the text encoder that
+    # the stage before it trains.
+    small = ["sight", "static-low", "motion", "dynamic", "depth"]
     middle = small if name == "small" else ["static-low", "static-high", "dynamic"]
-    last = ["branch", "joint"] if name == "small" else ["joint"]
+    last = ["branch"] if name == "small" else ["joint"]
     assert names == ["vae", *middle, "generator", *last]
 
 
@@ -123,7 +122,7 @@ def test_stages_that_do_not_exist_are_refused() -> None:
         ("stages.vae.data.crop_px=[64,256]", r"data.crop_px: expected .* got \(64, 256\)"),
         ("stages.vae.data.input_stride=0", "data.input_stride: expected at least 1, got 0"),
         ("stages.sight.true_pictures=false", "stage sight: expected a detail decoder and"),
-        ("stages.joint.data.augment=true", "stage joint: data.augment: expected false"),
+        ("stages.generator.data.augment=true", "generator: data.augment: expected false"),
         (
             "stages.dynamic.data.track_stride=1",
             "dynamic: .* expected 4 with a detail",
@@ -150,7 +149,7 @@ def test_moments_are_for_motion_branches_and_few() -> None:
         changed(recipe_by_name("small"), ["stages.dynamic.data.moments=true"])
 
 
-@pytest.mark.parametrize("name", ["told", "generator", "branch", "joint"])
+@pytest.mark.parametrize("name", ["generator", "branch"])
 def test_stages_that_learn_where_things_go_follow_points(name: str) -> None:
     assert recipe_by_name("small").stage(name).data.tracks > 0
 

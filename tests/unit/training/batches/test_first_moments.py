@@ -21,7 +21,7 @@ STANDING = replace(MOVING, moving_targets=False)
 
 
 def sample(clip: Clip, data: DataSettings = STANDING, index: int = 0) -> ClipBatch:
-    origin = Origin(key=SampleKey(0, "single", index, "sample"), source="made")
+    origin = Origin(key=SampleKey(0, "first", index, "sample"), source="made")
     return make_sample(clip, data, origin)
 
 
