@@ -91,7 +91,7 @@ class PrepareLatents:
     model: str = "small"
     """Model (folder or name) that encodes."""
     config: str = "small"
-    """Recipe whose generator stage says which frames, and at what size."""
+    """Recipe whose video_diffusion stage sets the frames and their size."""
     mirror: bool = True
     """Each clip also with left and right exchanged, in pictures and in words."""
 
@@ -108,7 +108,7 @@ class PrepareLatents:
         prepare_renderer(speck("cpu"), phases)
         job = EncodingJob(
             model=load_model(self.model),
-            data=find_recipe(self.config).stage("generator").data,
+            data=find_recipe(self.config).stage_of_kind("video_diffusion").data,
             clips=self.clips,
             folder=self.out,
             mirror=self.mirror,

@@ -7,14 +7,14 @@ import torch
 
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.video_vae.vae import VideoVae
-from diff4splat.training.linear_start import BlockMoments, set_principal_components
+from diff4splat.training.pca_init import BlockStatistics, set_principal_components
 
 CONFIG = replace(tiny_size().vae, linear_code=True)
 
 
 def test_components_are_those_of_numpy_and_start_the_autoencoder() -> None:
     vae, video = VideoVae(CONFIG), torch.rand(2, 3, 5, 32, 48)
-    moments = BlockMoments(vae.code)
+    moments = BlockStatistics(vae.code)
     moments.add(video)
     set_principal_components(vae.code, moments)
     rows = vae.code.blocks(video).flatten(0, -2).double().numpy()
