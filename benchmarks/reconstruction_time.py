@@ -18,7 +18,7 @@ from diff4splat.evaluation.protocol_json import load_protocol
 from diff4splat.generation.video_to_scene import scene_from_video
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.hub.pretrained import load_model
+from diff4splat.models.hub.model import load_model
 from diff4splat.paths.camera_path import CameraPath
 
 

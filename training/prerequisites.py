@@ -19,13 +19,14 @@ from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import PARTS, Networks, create_networks
 from diff4splat.models.hub.pretrained import Model
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
-from diff4splat.training.recipe import Recipe, StageRecipe
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stages.factory import STAGES
-from diff4splat.training.trainer.checkpoint_files import read_checkpoint
-from diff4splat.training.trainer.distributed import Processes
-from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.trainer.checkpoints.export import load_parts
+from diff4splat.training.trainer.checkpoints.files import read_checkpoint
+from diff4splat.training.trainer.distributed.processes import Processes
 from diff4splat.training.trainer.gates import read_result, stage_may_start
-from diff4splat.training.trainer.run_files import CHECKPOINTS, RESULT_FILE
+from diff4splat.training.trainer.logs.run_files import CHECKPOINTS, RESULT_FILE
 
 
 def sources_of_parts(recipe: Recipe, stage: StageRecipe) -> dict[str, StageRecipe]:

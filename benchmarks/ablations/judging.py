@@ -26,7 +26,7 @@ from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.models.hub.pretrained import Model, load_model
 from diff4splat.models.video_vae.vae import LatentDistribution, VideoVae
 from diff4splat.progress.phases import Phases
-from diff4splat.training.stage_run import MODEL_FOLDER
+from diff4splat.training.train_stage import MODEL_FOLDER
 
 SHIPPED = "held_out_v2"
 SHORTEST = 2
@@ -111,7 +111,7 @@ def judge(variant: Variant, folder: Path, held_out: HeldOut, phases: Phases) -> 
         Diff4SplatError: the trained model cannot be loaded.
     """
     model = load_model(folder / MODEL_FOLDER)
-    pictures = "true pictures" if variant.true_pictures else "decoded pictures"
+    pictures = "true pictures" if variant.use_ground_truth_frames else "decoded pictures"
     identity = model_identity(Diff4SplatPipeline(model), f"reconstruction, {pictures}")
     subject = Reconstructor(
         reconstruct=partial(reconstruct_clip, _seeing(model, variant)),
@@ -123,6 +123,6 @@ def judge(variant: Variant, folder: Path, held_out: HeldOut, phases: Phases) -> 
 
 
 def _seeing(model: Model, variant: Variant) -> Model:
-    if not variant.true_pictures:
+    if not variant.use_ground_truth_frames:
         return model
     return replace(model, networks=replace(model.networks, vae=TruePictures(model.networks.vae)))

@@ -12,7 +12,7 @@ from diff4splat.error_time.tables import this_machine
 from diff4splat.evaluation.protocol import Protocol
 from diff4splat.evaluation.report_writer import ARROWS, number
 from diff4splat.evaluation.summary import Mean
-from diff4splat.training.recipe import Recipe
+from diff4splat.training.recipe.recipe import Recipe
 
 FORMAT = "diff4splat-ablations 1"
 

@@ -20,9 +20,13 @@ from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.pretrained import Model
-from diff4splat.training.batches.motion_truth import continued, moving_pixels, pixel_motion
-from diff4splat.training.batches.scale import normalized
-from diff4splat.training.batches.window import from_first_camera
+from diff4splat.training.batches.motion_targets import (
+    extend_to_all_cells,
+    moving_mask,
+    pixel_motion,
+)
+from diff4splat.training.batches.normalise_scale import normalized
+from diff4splat.training.batches.temporal_crop import from_first_camera
 
 REFERENCE = MotionSettings(steps=64)
 INPUT_STRIDE = 2
@@ -57,7 +61,7 @@ def prepared(model: Model, protocol: Protocol) -> list[Told]:
             Told(
                 picture=input_picture(unit_rgb(view.rgb[0]), view.cameras[0]),
                 text=model.networks.text_encoder.encode_prompt(clip.note.caption),
-                truth=continued(motion, moving_pixels(motion)),
+                truth=extend_to_all_cells(motion, moving_mask(motion)),
             )
         )
     return found

@@ -20,8 +20,8 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_sampling import Conditions, sample_video
 from diff4splat.metrics.image import psnr
 from diff4splat.models.hub.pretrained import Model
-from diff4splat.training.batches.scale import normalized
-from diff4splat.training.batches.window import from_first_camera
+from diff4splat.training.batches.normalise_scale import normalized
+from diff4splat.training.batches.temporal_crop import from_first_camera
 from diff4splat.training.latents.encode import encode_clip
 from diff4splat.training.stages.model_stage import camera_rays, shown_video
 

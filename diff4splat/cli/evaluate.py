@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from diff4splat.evaluation.systems import Subject
+    from diff4splat.generation.settings import GenerationSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,8 +31,10 @@ class Evaluate:
     """Measure the first so many clips only; the table then says that it is a subset."""
     features: str | None = None
     """LPIPS weights that you have, as `vgg:FILE` or `alex:TRUNK,HEADS`; if left out, a stand-in."""
-    steps: int = 8
-    """Steps of the sampler."""
+    steps: int | None = None
+    """Steps of the samplers of motion and video. If left out, 1 for motion, 8 for video."""
+    fill: Literal["none", "video"] | None = None
+    """What fills hidden regions, as in `generate`. If left out, the model decides."""
     fresh: bool = False
     """Measure again what an earlier run into the same folder has measured."""
 
@@ -79,7 +82,6 @@ class Evaluate:
 
     def subject(self) -> "Subject":
         """The model in the role that the task asks for."""
-        from dataclasses import replace
         from functools import partial
 
         from diff4splat.evaluation.systems import (
@@ -89,15 +91,23 @@ class Evaluate:
             reconstruct_clip,
         )
         from diff4splat.generation.pipeline import Diff4SplatPipeline
-        from diff4splat.generation.settings import GenerationSettings
+        from diff4splat.generation.plan import RECONSTRUCTION_PARTS
+        from diff4splat.models.hub.model import load_model
 
-        settings = GenerationSettings(steps=self.steps)
-        pipeline = Diff4SplatPipeline.from_pretrained(self.model)
         if self.task != "reconstruction":
-            return Generator(pipeline=pipeline, settings=settings)
-        identity = replace(
-            model_identity(pipeline, "reconstruction"), untrained=not pipeline.model.reconstructs
-        )
+            pipeline = Diff4SplatPipeline.from_pretrained(self.model)
+            return Generator(pipeline=pipeline, settings=self.settings())
+        model = load_model(self.model, RECONSTRUCTION_PARTS)
         return Reconstructor(
-            reconstruct=partial(reconstruct_clip, pipeline.model), identity=identity
+            reconstruct=partial(reconstruct_clip, model),
+            identity=model_identity(model, RECONSTRUCTION_PARTS, "reconstruction"),
         )
+
+    def settings(self) -> "GenerationSettings":
+        """Steps and filling as asked for, the defaults elsewhere."""
+        from diff4splat.generation.settings import GenerationSettings, MotionSettings
+
+        if self.steps is None:
+            return GenerationSettings(fill=self.fill)
+        motion = MotionSettings(steps=self.steps)
+        return GenerationSettings(steps=self.steps, motion=motion, fill=self.fill)

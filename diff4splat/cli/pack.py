@@ -31,7 +31,7 @@ class Pack:
         """Check, write, and print what each part takes."""
         from diff4splat.cli.console import note
         from diff4splat.models.hub.export import export_model
-        from diff4splat.models.hub.pretrained import load_model
+        from diff4splat.models.hub.model import load_model
 
         self._require_usable()
         packed = export_model(

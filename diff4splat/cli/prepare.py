@@ -91,7 +91,7 @@ class PrepareLatents:
     model: str = "small"
     """Model (folder or name) that encodes."""
     config: str = "small"
-    """Recipe whose generator stage says which frames, and at what size."""
+    """Recipe whose video_diffusion stage sets the frames and their size."""
     mirror: bool = True
     """Each clip also with left and right exchanged, in pictures and in words."""
 
@@ -101,14 +101,14 @@ class PrepareLatents:
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.configs.recipes import find_recipe
-        from diff4splat.models.hub.pretrained import load_model
+        from diff4splat.models.hub.model import load_model
         from diff4splat.training.latents.encode import EncodingJob, encode_clips
 
         phases = ConsolePhases()
         prepare_renderer(speck("cpu"), phases)
         job = EncodingJob(
             model=load_model(self.model),
-            data=find_recipe(self.config).stage("generator").data,
+            data=find_recipe(self.config).stage_of_kind("video_diffusion").data,
             clips=self.clips,
             folder=self.out,
             mirror=self.mirror,

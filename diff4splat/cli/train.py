@@ -19,13 +19,14 @@ class Train:
     config: str
     """Recipe: test, small or paper; or a JSON file such as the recipe.json of a run."""
     stage: str
-    """Name of the stage, as the recipe has it: vae, static-low, dynamic, generator, joint."""
+    """Name of the stage, as in the recipe: vae, static-low, dynamic, video_diffusion, joint."""
     out: Path = Path("training-run")
     """Folder of the whole run; every stage has its own folder in it."""
     clips: Path | None = None
     """Folder of shards to learn from; if left out, the worlds that the recipe names."""
     latents: tuple[Path, ...] = ()
-    """Folders of encoded clips (prepare latents) for a generator stage, instead of clips."""
+    """Folders of encoded clips (prepare latents) for a video_diffusion stage, instead of
+    clips."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Changes such as stages.vae.steps=2000 or trainer.parallel=ddp; may be given again."""
     from_model: str | None = None
@@ -48,11 +49,11 @@ class Train:
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.cli.worlds import prepare_sources
         from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
-        from diff4splat.training.recipe_json import changed
-        from diff4splat.training.stage_run import StageRun, is_first_process, train_stage
+        from diff4splat.training.recipe.overrides import override
+        from diff4splat.training.train_stage import StageRequest, is_main_process, train_stage
 
         self._require_some_work()
-        recipe = changed(find_recipe(self.config), [one for given in self.set for one in given])
+        recipe = override(find_recipe(self.config), [one for given in self.set for one in given])
         if self.clips is not None:
             recipe = with_clips(recipe, self.clips)
         if self.latents:
@@ -61,7 +62,7 @@ class Train:
         phases = ConsolePhases()
         prepare_renderer(speck("cpu"), phases)
         prepare_sources(recipe.stage(self.stage).data.sources, phases)
-        asked = StageRun(
+        request = StageRequest(
             recipe=recipe,
             stage=self.stage,
             folder=self.out,
@@ -74,8 +75,8 @@ class Train:
             phases=phases,
             note=note,
         )
-        result = train_stage(asked)
-        if not is_first_process():
+        result = train_stage(request)
+        if not is_main_process():
             return
         measures = ", ".join(f"{name} {value:.4g}" for name, value in result.measures.items())
         total = recipe.stage(self.stage).steps
@@ -84,11 +85,11 @@ class Train:
 
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""
-        from diff4splat.models.hub.pretrained import load_model, with_text_encoder
+        from diff4splat.models.hub.model import load_model
 
         if self.from_model is None:
             return None
-        return with_text_encoder(load_model(self.from_model))
+        return load_model(self.from_model)
 
     def _require_some_work(self) -> None:
         """Refuse limits that leave nothing to do, before anything is loaded.

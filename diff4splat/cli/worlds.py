@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from diff4splat.evaluation.protocol import SourceRange
     from diff4splat.progress.phases import Phases
-    from diff4splat.training.recipe import SourceSettings
+    from diff4splat.training.recipe.data import SourceSettings
 
 COMPILE_S = 20
 """Seconds that compiling takes on a laptop."""

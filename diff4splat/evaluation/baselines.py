@@ -21,7 +21,7 @@ from diff4splat.evaluation.sample import Case
 from diff4splat.geometry.camera import Camera
 from diff4splat.metrics.image import psnr
 from diff4splat.scene.scene import Scene
-from diff4splat.training.batches.scale import valid_depth
+from diff4splat.training.batches.normalise_scale import valid_depth
 
 NEAREST, BEST_PLANE, MEAN_PLANE = "nearest frame", "best plane (oracle)", "mean-depth plane"
 ZERO_MOTION = "zero motion"

@@ -23,7 +23,7 @@ from diff4splat.evaluation.sample import Case
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-from diff4splat.training.batches.scale import valid_depth
+from diff4splat.training.batches.normalise_scale import valid_depth
 
 AGREEMENT = 0.05
 """Largest difference of two depths of one surface, as a share of the depth in the input frame."""

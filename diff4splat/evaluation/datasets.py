@@ -8,7 +8,7 @@ from diff4splat.evaluation.protocol import Protocol
 from diff4splat.evaluation.protocol_json import LoadedProtocol
 from diff4splat.evaluation.sources import ClipSource
 from diff4splat.training.batches.sources import EndlessClips, open_source
-from diff4splat.training.recipe import DataSettings, SourceSettings
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
 
 
 @dataclass(frozen=True, slots=True)

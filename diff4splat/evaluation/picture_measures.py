@@ -21,7 +21,7 @@ from diff4splat.metrics.image import psnr
 from diff4splat.metrics.masked import mean_or_nan
 from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.metrics.structure import ssim
-from diff4splat.training.batches.scale import valid_depth
+from diff4splat.training.batches.normalise_scale import valid_depth
 
 Entries = list[Score | Skip]
 LEAST_SEEN_PX = 16

@@ -11,7 +11,7 @@ from pathlib import Path
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.evaluation.protocol import VERSION, Protocol
 from diff4splat.io.existing import require_file
-from diff4splat.training.typed_json import TypedReader
+from diff4splat.training.config_codec import TypedReader
 
 FORMAT = "diff4splat-evaluation"
 PACKAGE = "diff4splat.evaluation.protocols"

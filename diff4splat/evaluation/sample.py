@@ -18,8 +18,8 @@ from diff4splat.errors import InputError
 from diff4splat.evaluation.protocol import Judged, Pair, Protocol, Task
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.io.pixels import unit_rgb
+from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
-from diff4splat.training.batches.scale import normalized
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

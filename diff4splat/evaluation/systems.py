@@ -1,6 +1,6 @@
 """Systems under test: what sees the input of a case and answers with a scene."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Protocol as Interface
 from typing import runtime_checkable
@@ -13,11 +13,12 @@ from diff4splat.data.clip import Clip
 from diff4splat.evaluation.sample import Case
 from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.plan import RequestFacts, plan_generation
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_to_scene import scene_from_video
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.scene import Scene
 
@@ -60,7 +61,10 @@ class Generator:
     @property
     def identity(self) -> Identity:
         """Model and sampling settings."""
-        return model_identity(self.pipeline, repr(self.settings))
+        model = self.pipeline.model
+        facts = RequestFacts(prompt=True, fill=self.settings.fill, still=self.settings.still)
+        plan = plan_generation(model.config, model.trained, facts)
+        return model_identity(model, plan.parts, repr(self.settings))
 
     def answer(self, case: Case, seed: int) -> Scene:
         """Generate along the input view's cameras, with the clip's caption if it has one."""
@@ -94,15 +98,14 @@ def reconstruct_clip(model: Model, clip: Clip) -> Scene:
     return scene_from_video(model, unit_rgb(view.rgb), path)
 
 
-def model_identity(pipeline: Diff4SplatPipeline, settings: str) -> Identity:
-    """Which model a pipeline runs."""
-    model = pipeline.model
+def model_identity(model: Model, parts: Collection[str], settings: str) -> Identity:
+    """Which model runs, with which of its networks."""
     return Identity(
         name=model.config.name,
-        weights_sha256=model.weights_sha256,
+        weights_sha256=model.weights_sha256(parts),
         fingerprint=model.config.fingerprint(),
         settings=settings,
-        untrained=model.untrained,
+        untrained=not model.trained.issuperset(parts),
     )
 
 

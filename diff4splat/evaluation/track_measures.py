@@ -17,9 +17,9 @@ from diff4splat.evaluation.protocol import Protocol
 from diff4splat.evaluation.records import Score, Skip
 from diff4splat.evaluation.sample import Case
 from diff4splat.metrics.tracks import track_endpoint_error
-from diff4splat.training.batches.targets import seen_cells
+from diff4splat.training.batches.targets import visible_cells
 
-LEAST_MOTION = 1e-3
+MIN_MOTION = 1e-3
 """Mean true offset, in model units, below which a clip has no motion to compare with."""
 
 
@@ -66,7 +66,7 @@ def track_entries(row: str, case: Case, answer: Answer, followed: list[Followed]
     error = _end_point_error(predicted, followed)
     still = _end_point_error([torch.zeros_like(one.offsets) for one in followed], followed)
     entries: Entries = [Score(row=row, key=keys[0], value=round(error, 6))]
-    if still < LEAST_MOTION:
+    if still < MIN_MOTION:
         return [*entries, Skip(row=row, key=keys[1], why="nothing moves in the clip")]
     return [*entries, Score(row=row, key=keys[1], value=round(error / still, 6))]
 
@@ -80,6 +80,6 @@ def _end_point_error(predicted: list[Float[Tensor, "_t _n 3"]], followed: list[F
 
 def _seen(case: Case, frame: int) -> tuple[Int[Tensor, " n"], Int[Tensor, "n 2"]]:
     """Points that the input view shows in ``frame`` on their own object, and their pixels."""
-    seen = seen_cells(case.clip)
+    seen = visible_cells(case.clip)
     seen = seen[seen[:, 1] == frame]
     return seen[:, 0], seen[:, 2:]

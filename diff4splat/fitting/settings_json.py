@@ -7,7 +7,7 @@ from typing import Any
 
 from diff4splat.errors import ConfigError
 from diff4splat.fitting.settings import FitSettings
-from diff4splat.training.typed_json import TypedReader
+from diff4splat.training.config_codec import TypedReader
 
 
 def changed(settings: FitSettings, changes: Sequence[str]) -> FitSettings:

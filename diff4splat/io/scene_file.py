@@ -1,6 +1,6 @@
 """The scene file: one versioned ``.safetensors`` with Gaussians, motion, path and provenance.
 
-Axes: ``n`` Gaussians, ``k`` harmonics, ``t`` frames of the path. docs/scene-format.md has every
+Axes: ``n`` Gaussians, ``k`` harmonics, ``t`` frames of the path. docs/reference/scene-format.md has every
 tensor. Only what moves is stored with keys; equal scenes give equal bytes.
 """
 

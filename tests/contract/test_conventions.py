@@ -1,4 +1,4 @@
-"""One test per line of docs/conventions.md, found by the name in brackets."""
+"""One test per line of docs/reference/conventions.md, found by the name in brackets."""
 
 import re
 from pathlib import Path
@@ -34,7 +34,7 @@ from diff4splat.scene.motion.spacetime import SpacetimeMotion
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 
-PAGE = Path(__file__).parents[2] / "docs" / "conventions.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "conventions.md"
 F64 = torch.float64
 
 

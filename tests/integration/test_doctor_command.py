@@ -28,7 +28,7 @@ from diff4splat.render.trace import warm as tracer
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
-from diff4splat.training.recipe import SourceSettings
+from diff4splat.training.recipe.data import SourceSettings
 
 KERNELS = ("project", "blend")
 DRAWING = ("shade", "hide", "read")
@@ -339,7 +339,7 @@ def test_train_compiles_what_draws_its_worlds_ahead(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("diff4splat.training.stage_run.train_stage", stopped)
+    monkeypatch.setattr("diff4splat.training.train_stage.train_stage", stopped)
     change = f'stages.vae.data.sources=[{{"kind": "{source}", "folder": "clips"}}]'
     arguments = ["train", "--config", "test", "--stage", "vae", "--set", change]
     assert run([*arguments, "--out", str(tmp_path)]) == 2

@@ -18,12 +18,14 @@ from stage_fixtures import STAGES, make_stage, stage_recipe
 from diff4splat.data.clip import Clip
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.losses.motion import track_motion
-from diff4splat.training.recipe import OptimizerSettings, StageRecipe, TrainerSettings
+from diff4splat.training.recipe.optimizer import OptimizerSettings
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.recipe.trainer import TrainerSettings
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.trainer.run import run_stage
+from diff4splat.training.trainer.loop.fit import fit_stage
 from diff4splat.training.trainer.settings import RunSettings
 
-STEPS = {"vae": 600, "dynamic": 400, "generator": 300, "joint": 400}
+STEPS = {"vae": 600, "dynamic": 400, "video_diffusion": 300, "joint": 400}
 USUAL_STEPS = 150
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
@@ -54,7 +56,10 @@ class OneClip:
 
 def overfit(name: str, folder: Path) -> list[float]:
     """The total loss of every step."""
-    recipe = stage_recipe(name, motion_size=0.0)
+    recipe = stage_recipe(name)
+    if name in ("dynamic", "joint"):
+        motion = replace(recipe.losses.motion, displacement_l1=0.0)
+        recipe = replace(recipe, losses=replace(recipe.losses, motion=motion))
     recipe = replace(
         recipe,
         data=replace(recipe.data, target_frames=TARGET_FRAMES),
@@ -67,7 +72,7 @@ def overfit(name: str, folder: Path) -> list[float]:
         folder=folder, seed=0, fingerprint="overfit", trainer=trainer, device="cpu"
     )
     samples = ClipSamples(recipe, 0, [OneClip(recipe)])
-    run_stage(make_stage(recipe), samples, recipe, settings)
+    fit_stage(make_stage(recipe), samples, recipe, settings)
     rows = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
     return [row[f"loss/{TOTAL}"] for row in rows if row["event"] == "step"]
 

@@ -12,8 +12,8 @@ import pytest
 import torch
 from toy_training import Toy, ToySamples, ToyStage, toy_run, weights
 
-from diff4splat.training.trainer.export import load_parts
-from diff4splat.training.trainer.run import run_stage
+from diff4splat.training.trainer.checkpoints.export import load_parts
+from diff4splat.training.trainer.loop.fit import fit_stage
 
 SUPPORT = Path(__file__).parents[1] / "support"
 MODES = ("ddp", "fsdp2")
@@ -53,7 +53,7 @@ def alone(folder: Path, samples: ToySamples | None = None, **changes: object) ->
     """Weights of the same run in this process."""
     stage = ToyStage()
     changes = {"checkpoint_every": 2} | changes
-    run_stage(stage, samples or ToySamples(), Toy().recipe(), toy_run(folder, **changes))
+    fit_stage(stage, samples or ToySamples(), Toy().recipe(), toy_run(folder, **changes))
     return weights(stage)
 
 

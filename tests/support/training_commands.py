@@ -11,9 +11,9 @@ from clip_shards import changes
 
 from diff4splat.cli.main import run
 from diff4splat.training.prerequisites import last_checkpoint
-from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.trainer.checkpoints.export import load_parts
 
-STAGES = ("vae", "static-low", "static-high", "dynamic", "generator", "joint")
+STAGES = ("vae", "static-low", "static-high", "dynamic", "video_diffusion", "joint")
 DRAWN = ("--size", "32", "--frames", "5", "--views", "2", "--tracks", "16")
 SAVING = ("--set", "trainer.checkpoint_every=2", "trainer.keep_checkpoints=9")
 

@@ -10,7 +10,7 @@ import torch
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.batches.sources import EndlessClips, open_source
-from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
 

@@ -1,7 +1,7 @@
-"""Clips to latents and drafts, once and for all; each clip also in a mirror.
+"""Clips to latents and render conditions, stored for training; each clip also mirrored.
 
     clip ─ input video ─┬─ vae ──────────────────────────── latent
-                        └─ first picture ─ draft ─ vae ──── draft
+                        └─ first image ─ render ─ vae ───── render condition
 
 Axes: ``f`` video frames, ``c t h w`` latents.
 """
@@ -19,20 +19,18 @@ from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
 from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
 from diff4splat.errors import InputError
-from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.render_condition import render_condition_latent
 from diff4splat.geometry.camera import stack_cameras
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.pretrained import Model
-from diff4splat.models.motion_unet.motion_field import pack_motion
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.augment import mirrored
-from diff4splat.training.batches.motion_truth import motion_truth
+from diff4splat.training.batches.motion_targets import motion_targets
+from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
-from diff4splat.training.batches.scale import normalized
-from diff4splat.training.batches.window import from_first_camera
-from diff4splat.training.latents.stored import LatentPack, has_pack, join_packs, write_pack
-from diff4splat.training.recipe import DataSettings
+from diff4splat.training.batches.temporal_crop import from_first_camera
+from diff4splat.training.latents.latent_shards import LatentPack, has_pack, join_packs, write_pack
+from diff4splat.training.latents.video_latents import packed_motion, render_condition
+from diff4splat.training.recipe.data import DataSettings
 
 PACK = 128
 """Clips per file."""
@@ -99,7 +97,7 @@ def _input_clip(clip: Clip, data: DataSettings) -> Clip:
             f"{clip.frames}; leave the clip out"
         )
     clip = from_first_camera(resized(clip, data.size_px))
-    return normalized(clip, data.least_depth_share)
+    return normalized(clip, data.min_valid_depth)
 
 
 def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
@@ -107,10 +105,9 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
     view, frames = clip.views[0], slice(None, data.clip_frames, data.input_stride)
     rgb, cameras = unit_rgb(view.rgb[frames]), view.cameras[frames].to(torch.float32)
     latent = model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean
-    picture = InputImage(rgb=rgb[0], camera=cameras[0], focal_source="clip")
     return LatentPack(
         latent=latent,
-        draft=render_condition_latent(model, picture, cameras) if model.config.dit.draft else None,
+        render_condition=render_condition(model, rgb[0], cameras),
         motion=true_motion(model, clip, data),
         cameras=stack_cameras([cameras]),
         is_static=torch.tensor([clip.note.is_static]),
@@ -120,7 +117,5 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
 
 
 def true_motion(model: Model, clip: Clip, data: DataSettings) -> Float[Tensor, "1 m t h w"]:
-    """For a model that makes one; otherwise without channels."""
-    cells = motion_truth(clip, data.input_stride)[None]
-    packed = pack_motion(cells, model.config.vae.space_stride)
-    return packed[:, : model.config.motion_channels]
+    """Motion channels of a clip; none for a model without motion channels."""
+    return packed_motion(model.config, motion_targets(clip, data.input_stride)[None])

@@ -1,4 +1,4 @@
-"""What the video model learns from: latents of true videos and of their drafts.
+"""Training samples of the video model: latents of true videos and of their render conditions.
 
 Axes: ``b`` batch, ``c t h w`` latents, ``f`` video frames.
 """
@@ -19,8 +19,8 @@ class LatentBatch:
     sample_index: Int[Tensor, " b"]
     source: tuple[str, ...]
     latent: Float[Tensor, "b c t h w"]
-    draft: Float[Tensor, "b c t h w"] | None
-    """None for a model that sees no draft."""
+    render_condition: Float[Tensor, "b c t h w"] | None
+    """None for a model without render conditions."""
     motion: Float[Tensor, "b m t h w"]
     """True motion (``video_motion``); no channels for a model that makes none."""
     cameras: Camera
@@ -32,11 +32,12 @@ class LatentBatch:
 
     def to(self, device: torch.device) -> "LatentBatch":
         """Move every tensor."""
+        condition = self.render_condition
         return replace(
             self,
             sample_index=self.sample_index.to(device),
             latent=self.latent.to(device),
-            draft=None if self.draft is None else self.draft.to(device),
+            render_condition=None if condition is None else condition.to(device),
             motion=self.motion.to(device),
             cameras=self.cameras.to(device),
         )
@@ -44,12 +45,14 @@ class LatentBatch:
 
 def collate_latents(samples: list[LatentBatch]) -> LatentBatch:
     """Batches of one sample each, as one."""
-    drafts = [sample.draft for sample in samples if sample.draft is not None]
+    conditions = [
+        sample.render_condition for sample in samples if sample.render_condition is not None
+    ]
     return LatentBatch(
         sample_index=torch.cat([sample.sample_index for sample in samples]),
         source=tuple(name for sample in samples for name in sample.source),
         latent=torch.cat([sample.latent for sample in samples]),
-        draft=torch.cat(drafts) if drafts else None,
+        render_condition=torch.cat(conditions) if conditions else None,
         motion=torch.cat([sample.motion for sample in samples]),
         cameras=join_cameras([sample.cameras for sample in samples]),
         captions=tuple(text for sample in samples for text in sample.captions),

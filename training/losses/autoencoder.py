@@ -2,7 +2,7 @@
 
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid, ``*d`` everything else of a video.
 
-    divergence  = mean of ½ (μ² + σ² − 1 − ln σ²)           KL(N(μ, σ²) ‖ N(0, 1)) per dimension
+    kl          = mean of ½ (μ² + σ² − 1 − ln σ²)           KL(N(μ, σ²) ‖ N(0, 1)) per dimension
     charbonnier = mean of sqrt(d² + ε²) − ε,  ε = 1e-3      (Lai et al., arXiv 1704.03915, §3.3)
 
 Latent diffusion sums the divergence over dimensions (arXiv 2112.10752, appendix G); the mean makes
@@ -19,7 +19,7 @@ CHARBONNIER_WIDTH = 1e-3
 """Below this error the loss is quadratic."""
 
 
-def posterior_divergence(
+def kl_divergence(
     mean: Float[Tensor, "b c t h w"], log_variance: Float[Tensor, "b c t h w"]
 ) -> Float[Tensor, " b"]:
     """How far a diagonal Gaussian posterior is from the standard normal, mean over dimensions.

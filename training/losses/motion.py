@@ -9,9 +9,9 @@ displacements are from the time a point was found at to the queried time, in the
 to standstill, and the paper gives no reason for it: weight 0 switches it off. In a scene in which
 nothing moves the truth is zero, and both terms ask for the same.
 
-``width`` w rounds the distance off near 0, √(d² + w²) − w (ours). Most points stand still, and a
-plain distance pulls each of them to exactly zero as hard as it pulls others to where they go: a
-network that does not know yet which is which then stays at zero.
+``huber_delta`` w makes the distance quadratic near 0, √(d² + w²) − w (ours). Most points are
+static, and a plain distance pulls each of them to exactly zero as hard as it pulls moving points to
+their displacement: an untrained network, which cannot tell them apart, then stays at zero.
 """
 
 import torch
@@ -28,8 +28,8 @@ def track_motion(
     valid: Bool[Tensor, "b *k n"] | None = None,
     *,
     distance_weight: float = 2.0,
-    size_weight: float = 1.0,
-    width: float = 0.0,
+    l1_weight: float = 1.0,
+    huber_delta: float = 0.0,
 ) -> Float[Tensor, " b"]:
     """The motion loss over an element's valid points; 0 with zero gradient without any.
 
@@ -39,11 +39,11 @@ def track_motion(
     predicted, truth, valid = _known(predicted, truth, valid)
     # The norm's gradient is 0 where both agree exactly.
     apart = torch.linalg.vector_norm(predicted - truth, dim=-1)
-    if width:
-        apart = torch.hypot(apart, torch.full_like(apart, width)) - width
+    if huber_delta:
+        apart = torch.hypot(apart, torch.full_like(apart, huber_delta)) - huber_delta
     loss = distance_weight * apart
-    if size_weight:
-        loss = loss + size_weight * predicted.abs().sum(-1)
+    if l1_weight:
+        loss = loss + l1_weight * predicted.abs().sum(-1)
     return masked_mean(loss.flatten(1), valid.flatten(1))
 
 

@@ -14,7 +14,7 @@ from diff4splat.errors import FileFormatError
 from diff4splat.evaluation import datasets as opening
 from diff4splat.evaluation.datasets import open_clips
 from diff4splat.evaluation.protocol_json import LoadedProtocol
-from diff4splat.training.recipe import DataSettings, SourceSettings
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
 
 
 def test_shards_lie_beside_the_protocol_file(tmp_path: Path) -> None:

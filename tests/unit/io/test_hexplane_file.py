@@ -17,7 +17,7 @@ from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, w
 from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
 from diff4splat.scene.motion.static import StaticMotion
 
-PAGE = Path(__file__).parents[3] / "docs" / "scene-format.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "scene-format.md"
 
 
 @pytest.fixture

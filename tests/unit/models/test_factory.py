@@ -121,9 +121,12 @@ def test_paper_model_has_the_published_order_of_magnitude() -> None:
 
 
 def test_documentation_lists_the_counts() -> None:
-    text = (Path(__file__).parents[3] / "docs" / "networks.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "networks.md").read_text(
+        encoding="utf-8"
+    )
     counts = [parameter_counts(make()) for make in SIZES.values()]
-    rows = {part: [table[part] for table in counts] for part in counts[0]}
+    rows = {part: [table.get(part) for table in counts] for part in PARTS}
     rows["total"] = [sum(table.values()) for table in counts]
     for part, row in rows.items():
-        assert f"| {part} | {' | '.join(f'{count:,}' for count in row)} |" in text
+        cells = " | ".join("–" if count is None else f"{count:,}" for count in row)
+        assert f"| {part} | {cells} |" in text

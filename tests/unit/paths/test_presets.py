@@ -6,7 +6,7 @@ import pytest
 
 from diff4splat.paths.presets import ALIASES, AMBIGUOUS, PRESETS
 
-PAGE = Path(__file__).parents[3] / "docs" / "camera-paths.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "camera-paths.md"
 
 
 def test_near_depth_and_turn_amplitudes() -> None:

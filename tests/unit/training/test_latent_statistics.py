@@ -20,7 +20,7 @@ from diff4splat.training.latent_statistics import (
     read_statistics,
     write_statistics,
 )
-from diff4splat.training.trainer.samples import EVALUATION_START
+from diff4splat.training.trainer.loading.samples import EVALUATION_START
 
 
 @pytest.fixture(scope="module")

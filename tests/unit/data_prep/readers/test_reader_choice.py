@@ -15,7 +15,7 @@ from diff4splat.data_prep.readers.options import FormatName, ReadOptions
 from diff4splat.data_prep.readers.registry import detect_format, read_capture
 from diff4splat.errors import ConfigError, FileFormatError, InputError
 
-PAGE = Path(__file__).parents[4] / "docs" / "captures.md"
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "captures.md"
 
 
 def test_an_empty_or_missing_folder_is_refused(tmp_path: Path) -> None:
