@@ -1,10 +1,11 @@
 """Checks that configurations share; all raise a ConfigError in the same words."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from diff4splat.errors import ConfigError
 
 
+@runtime_checkable
 class HasHeads(Protocol):
     """A transformer's width and number of attention heads."""
 
