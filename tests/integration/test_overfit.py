@@ -1,8 +1,8 @@
 """Every stage overfits one clip through the real trainer: its loss falls to a tenth.
 
-The tests that always run take a quarter of the steps, in which the loss halves. Noise, levels and
-targets differ at every step; only the clip is the same. In stages with motion the paper's pull to
-zero motion is off: its minimum is far above zero by design (see the last test).
+The tests that always run take fewer steps, with a looser limit. Noise, levels and targets differ at
+every step; only the clip is the same. In stages with motion the paper's pull to zero motion is off:
+its minimum is far above zero by design (see the last test).
 """
 
 import json
@@ -26,8 +26,19 @@ from diff4splat.training.trainer.settings import RunSettings
 
 STEPS = {"vae": 600, "dynamic": 400, "generator": 300, "joint": 400}
 USUAL_STEPS = 150
-SHORT_STEPS = {"dynamic": 100, "generator": 100, "joint": 100}
-USUAL_SHORT_STEPS = 50
+SHORT_STEPS = {
+    "vae": (50, 0.45),
+    "static-low": (40, 0.12),
+    "static-high": (40, 0.12),
+    "dynamic": (190, 0.28),
+    "generator": (100, 0.45),
+    "joint": (100, 0.45),
+}
+"""Steps and the share of the first loss that may remain.
+
+More remains when cameras are exchanged, when motion is not rendered or when the noise is not that
+of the target.
+"""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 
@@ -75,18 +86,18 @@ def overfit(name: str, steps: int, folder: Path) -> list[float]:
     return [row[f"loss/{TOTAL}"] for row in rows if row["event"] == "step"]
 
 
-def left_over(losses: list[float], last: int) -> float:
+def remaining(losses: list[float], last: int) -> float:
     """The mean loss of the last steps over that of the first five."""
     return statistics.mean(losses[-last:]) / statistics.mean(losses[:5])
 
 
 @pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize("name", STAGES)
-def test_the_loss_of_one_clip_halves(name: str, tmp_path: Path) -> None:
-    steps = SHORT_STEPS.get(name, USUAL_SHORT_STEPS)
+def test_the_loss_of_one_clip_falls(name: str, tmp_path: Path) -> None:
+    steps, limit = SHORT_STEPS[name]
     losses = overfit(name, steps, tmp_path)
     assert len(losses) == steps
-    assert left_over(losses, last=10) <= 0.5
+    assert remaining(losses, last=10) <= limit
 
 
 @pytest.mark.slow
@@ -94,7 +105,7 @@ def test_the_loss_of_one_clip_halves(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", STAGES)
 def test_one_clip_is_learnt_by_heart(name: str, tmp_path: Path) -> None:
     losses = overfit(name, STEPS.get(name, USUAL_STEPS), tmp_path)
-    assert left_over(losses, last=20) <= 0.1
+    assert remaining(losses, last=20) <= 0.1
 
 
 def test_the_papers_motion_loss_cannot_fall_to_a_tenth() -> None:
