@@ -32,7 +32,7 @@ SHORT_STEPS = {
     "static-high": (40, 0.12),
     "dynamic": (190, 0.28),
     "generator": (100, 0.45),
-    "joint": (100, 0.45),
+    "joint": (80, 0.5),
 }
 """Steps and the share of the first loss that may remain.
 
