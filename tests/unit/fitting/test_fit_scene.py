@@ -21,8 +21,8 @@ from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 
 SETTINGS = FitSettings(
-    coarse_steps=60,
-    fine_steps=160,
+    coarse_steps=40,
+    fine_steps=80,
     harmonics=0,
     stillness=Stillness(min_score=0.01),
     rates=Rates(planes=Decay(first=5e-2, last=1e-2), decoder=Decay(first=1e-2, last=1e-3)),

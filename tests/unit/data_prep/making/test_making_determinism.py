@@ -74,6 +74,6 @@ def test_other_processors_make_the_same_worlds() -> None:
     folders = [str(here), str(here.parents[2] / "support")]
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", PROGRAM, *folders],
-        env=plain, capture_output=True, text=True, check=True, timeout=120,
+        env=plain, capture_output=True, text=True, check=True, timeout=600,
     )  # fmt: skip
     assert json.loads(done.stdout.splitlines()[-1]) == GOLDEN
