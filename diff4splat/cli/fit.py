@@ -78,47 +78,48 @@ class Fit:
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
         from diff4splat.cli.renderer import compile_ahead, prepare_renderer
-        from diff4splat.fitting.checkpoint import FILE
-        from diff4splat.fitting.fit import FitRun, fit_scene
-        from diff4splat.fitting.frame_renderer import Sight
+        from diff4splat.fitting.checkpoint import CHECKPOINT_FILE
+        from diff4splat.fitting.fit import fit_scene
+        from diff4splat.fitting.fit_types import FitRequest
+        from diff4splat.fitting.frames.frame_renderer import FrameRenderer
         from diff4splat.fitting.results import RESULT_FILES, FitReport, write_results
         from diff4splat.progress.run_log import RunLog
         from diff4splat.render.trace import warm as tracer
 
         settings = self.settings()
-        outputs = [self.out / name for name in (*RESULT_FILES, FILE)]
+        outputs = [self.out / name for name in (*RESULT_FILES, CHECKPOINT_FILE)]
         require_inputs_kept([self.data, *([self.init] if self.init else [])], outputs)
         log = RunLog(phases=ConsolePhases())
-        capture, scene = self.capture(), self.initial_scene()
+        capture, initial = self.capture(), self.initial_scene()
         for line in capture.notes:
             note(line)
         if self.renderer in ("auto", "raster"):
             prepare_renderer(speck("cpu"), log.phases)
-        sight = Sight(capture=capture, backend=self.renderer, settings=settings.camera)
-        if sight.traced and not tracer.is_ready():
+        renderer = FrameRenderer(capture=capture, backend=self.renderer, settings=settings.camera)
+        if renderer.traced and not tracer.is_ready():
             compile_ahead(tracer, log.phases)
         if self.restart:
-            (self.out / FILE).unlink(missing_ok=True)
-        asked = FitRun(
+            (self.out / CHECKPOINT_FILE).unlink(missing_ok=True)
+        request = FitRequest(
             capture=capture,
             settings=settings,
             folder=self.out,
-            init=scene,
+            init=initial,
             backend=self.renderer,
             stop_after_s=None if self.minutes is None else 60 * self.minutes,
             phases=log.phases,
             note=note,
         )
-        result = fit_scene(asked)
+        result = fit_scene(request)
         report = FitReport(result=result, capture=capture, settings=settings, inputs=self.inputs())
-        made = write_results(report, self.out, log)
+        scene = write_results(report, self.out, log)
         for line in result.omissions:
             note(f"left out: {line}")
         for line in recovered(result.learned):
             note(line)
         note(summary(report))
-        moving = len(made.motion.moving_index)
-        note(f"wrote {self.out} ({len(made.gaussians):,} Gaussians, {moving:,} of them moving)")
+        moving = len(scene.motion.moving_index)
+        note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians, {moving:,} of them moving)")
         if not result.finished:
             note("time is up; the same command goes on")
 
@@ -127,7 +128,7 @@ class Fit:
         from dataclasses import replace
 
         from diff4splat.fitting.settings import FitSettings
-        from diff4splat.fitting.settings_json import changed
+        from diff4splat.fitting.settings_json import apply_changes
 
         if self.minutes is not None and not self.minutes > 0:
             raise ConfigError(f"--minutes: expected more than 0, got {self.minutes:g}")
@@ -139,7 +140,7 @@ class Fit:
         )
         if self.steps is not None:
             start = replace(start, fine_steps=self.steps)
-        return changed(start, [one for given in self.set for one in given])
+        return apply_changes(start, [one for given in self.set for one in given])
 
     def capture(self) -> "Capture":
         """The data."""
@@ -179,14 +180,14 @@ def shown(value: "float | list[float]") -> str:
 
 def summary(report) -> str:
     """Quality in one line."""
-    from diff4splat.fitting.results import quality_facts
+    from diff4splat.fitting.results import quality_summary
 
-    held, trained = quality_facts(report.result.held_out), quality_facts(report.result.training)
-    judged = "nothing held out"
+    held, trained = quality_summary(report.result.held_out), quality_summary(report.result.training)
+    quality = "nothing held out"
     if held is not None:
         structure = "" if held["ssim"] is None else f", SSIM {held['ssim']:.3f}"
-        judged = (
+        quality = (
             f"held out ({report.result.split.kind}): {held['psnr_db']:.2f} dB{structure} over "
             f"{held['frames']} frames"
         )
-    return f"{judged}; learnt from: {trained['psnr_db']:.2f} dB; {report.result.seconds:.0f} s"
+    return f"{quality}; learnt from: {trained['psnr_db']:.2f} dB; {report.result.seconds:.0f} s"

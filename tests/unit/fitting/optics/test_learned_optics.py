@@ -8,10 +8,10 @@ from traced_fits import photographed, said, scene
 
 from diff4splat.errors import ConfigError
 from diff4splat.fitting.optics import coefficients
-from diff4splat.fitting.optics.camera_model import shows
+from diff4splat.fitting.optics.camera_model import differs_from_pinhole
 from diff4splat.fitting.optics.learned import LearnedOptics
 from diff4splat.fitting.parameter_table import ParameterTable
-from diff4splat.fitting.settings import Rates
+from diff4splat.fitting.settings import LearningRates
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.lenses.blender_fisheye import BLENDER_DEFAULT, BlenderFisheye
 from diff4splat.geometry.lenses.build import blender_camera, fisheye_camera
@@ -43,8 +43,8 @@ def test_everything_starts_where_the_capture_says():
     assert float(found.optics.aperture.radius.detach()) == pytest.approx(0.1)
     assert float(found.optics.shutter.readout_s.detach()) == pytest.approx(0.05)
     assert float(found.focal_factor.detach()) == 1.0
-    assert set(parts.rates(Rates(), 0.0)) == set(parts.names)
-    assert all(facts["start"] == facts["recovered"] for facts in parts.facts(table).values())
+    assert set(parts.rates(LearningRates(), 0.0)) == set(parts.names)
+    assert all(facts["start"] == facts["recovered"] for facts in parts.report(table).values())
 
 
 def test_only_a_camera_that_is_learning_has_gradients():
@@ -72,13 +72,15 @@ def test_only_a_camera_that_is_learning_has_gradients():
     ],
 )
 def test_a_mode_moves_the_picture_by_a_pixel_and_no_two_alike(lens, camera):
-    changes = coefficients.modes(lens, camera)
+    changes = coefficients.displacement_modes(lens, camera)
     assert changes.shape[1] >= 3
-    directions, exist = lens.directions(coefficients.grid(camera))
+    directions, exist = lens.directions(coefficients.image_plane_grid(camera))
     small, moved = 1e-5, []
     for mode in changes.T:
         pair = [
-            coefficients.placed(lens, coefficients.taken(lens) + side * small * mode)
+            coefficients.with_coefficients(
+                lens, coefficients.coefficient_vector(lens) + side * small * mode
+            )
             for side in (-0.5, 0.5)
         ]
         early, late = (other.points(directions[exist])[0] for other in pair)
@@ -90,25 +92,30 @@ def test_a_mode_moves_the_picture_by_a_pixel_and_no_two_alike(lens, camera):
 
 def test_coefficients_that_are_not_learned_stay():
     lens = BlenderFisheye(coefficients=torch.tensor(BLENDER_DEFAULT).double())
-    other = coefficients.placed(lens, coefficients.taken(lens) * 2)
+    other = coefficients.with_coefficients(lens, coefficients.coefficient_vector(lens) * 2)
     assert float(other.coefficients[0]) == 0.0
     torch.testing.assert_close(other.coefficients[1:], 2 * lens.coefficients[1:])
     radial = torch.tensor([-0.1, 0, 0, 0.3, 0, 0])
-    assert coefficients.learnable(OpenCVPinhole(radial=radial))["radial"].tolist() == [0, 1, 2, 3]
+    assert coefficients.learnable_indices(OpenCVPinhole(radial=radial))["radial"].tolist() == [
+        0,
+        1,
+        2,
+        3,
+    ]
 
 
 def test_a_lens_that_folds_back_goes_back_and_starts_anew():
     parts, table = learned(EVERYTHING, ("lens", "focus"))
     with torch.no_grad():
         table["camera_lens"][0] = 0.5
-    parts.bound(table)
+    parts.clamp(table)
     assert float(table["camera_lens"].detach()[0]) == 0.5
     table["camera_lens"].grad = torch.ones_like(table["camera_lens"])
     table.step({"camera_lens": 0.01})
     with torch.no_grad():
         table["camera_lens"][0] = -80.0
         table["camera_focus"].fill_(50.0)
-    parts.bound(table)
+    parts.clamp(table)
     assert float(table["camera_lens"].detach()[0]) == 0.5
     assert "camera_lens/exp_avg" not in table.tensors()
     assert float(table["camera_focus"].detach()) == pytest.approx(math.log(20.0))
@@ -119,7 +126,7 @@ def test_numbers_that_are_not_finite_go_back_too():
     for name in parts.names:
         with torch.no_grad():
             table[name].fill_(math.nan)
-    parts.bound(table)
+    parts.clamp(table)
     assert not any(bool(table[name].detach().any()) for name in parts.names)
 
 
@@ -140,6 +147,10 @@ def test_what_the_capture_does_not_say_cannot_be_learned(name: str, optics: Opti
 
 
 def test_distortion_of_nothing_is_drawn_as_a_pinhole():
-    assert not shows(Optics(lens=OpenCVPinhole()))
+    assert not differs_from_pinhole(Optics(lens=OpenCVPinhole()))
     bent = OpenCVPinhole(radial=torch.tensor([0.1, 0, 0, 0, 0, 0]))
-    assert shows(Optics(lens=bent)) and not shows(Optics()) and not shows(None)
+    assert (
+        differs_from_pinhole(Optics(lens=bent))
+        and not differs_from_pinhole(Optics())
+        and not differs_from_pinhole(None)
+    )

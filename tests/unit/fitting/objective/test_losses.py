@@ -5,13 +5,13 @@ import torch
 from small_fits import with_flow
 
 from diff4splat.data.capture.capture import Frame
-from diff4splat.fitting.losses import (
+from diff4splat.fitting.objective.losses import (
     color_loss,
     depth_loss,
     flow_loss,
-    picture_loss,
+    image_loss,
 )
-from diff4splat.fitting.settings import Weights
+from diff4splat.fitting.settings import LossWeights
 from diff4splat.render.settings import RenderOutput
 
 GENERATOR = torch.Generator().manual_seed(3)
@@ -31,7 +31,7 @@ def test_masked_pixels_have_no_gradient(ssim: float):
     counts[:, :9] = True
     made = RGB.clone().requires_grad_()
     frame = Frame(rgb=OTHER, counts=counts)
-    picture_loss(RenderOutput(rgb=made), frame, Weights(ssim=ssim)).backward()
+    image_loss(RenderOutput(rgb=made), frame, LossWeights(ssim=ssim)).backward()
     assert made.grad[:, :9].abs().sum() > 0
     assert not made.grad[:, 9:].any()
 
@@ -39,7 +39,7 @@ def test_masked_pixels_have_no_gradient(ssim: float):
 def test_a_mask_over_everything_gives_nothing_and_stays_finite():
     made = RGB.clone().requires_grad_()
     frame = Frame(rgb=OTHER, counts=torch.zeros(16, 20, dtype=torch.bool))
-    loss = picture_loss(RenderOutput(rgb=made), frame, Weights(ssim=0.2))
+    loss = image_loss(RenderOutput(rgb=made), frame, LossWeights(ssim=0.2))
     loss.backward()
     assert float(loss.detach()) == pytest.approx(0.0, abs=1e-6)
     assert not made.grad.any()

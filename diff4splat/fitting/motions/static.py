@@ -1,4 +1,4 @@
-"""No motion: the coarse stage, and the baseline that every motion has to beat."""
+"""No motion, for the coarse stage and the static baseline."""
 
 from collections.abc import Mapping
 
@@ -7,12 +7,12 @@ from jaxtyping import Int
 from torch import Tensor
 
 from diff4splat.fitting.parameter_table import ParameterTable
-from diff4splat.fitting.settings import Rates, Weights
+from diff4splat.fitting.settings import LearningRates, LossWeights
 from diff4splat.scene.motion.static import StaticMotion
 
 
-class Still:
-    """Nothing moves."""
+class NoMotion:
+    """A static scene."""
 
     def __init__(self, time_range_s: tuple[float, float]) -> None:
         self._time_range_s = time_range_s
@@ -29,21 +29,21 @@ class Still:
     def motion(
         self, table: ParameterTable, moving_index: Int[Tensor, " m"], degree: int
     ) -> StaticMotion:
-        """Standing still over the time of the capture."""
+        """No displacement over the time range of the capture."""
         del table, moving_index, degree
         return StaticMotion(time_range_s=self._time_range_s)
 
-    def rates(self, rates: Rates, extent: float, progress: float) -> Mapping[str, float]:
+    def rates(self, rates: LearningRates, extent: float, progress: float) -> Mapping[str, float]:
         """None."""
         del rates, extent, progress
         return {}
 
-    def penalty(self, table: ParameterTable, weights: Weights) -> Tensor | None:
+    def penalty(self, table: ParameterTable, weights: LossWeights) -> Tensor | None:
         """None."""
         del table, weights
 
     def split_in_time(
-        self, rows: Mapping[str, Tensor], chosen: Tensor, generator: torch.Generator
+        self, rows: Mapping[str, Tensor], selected: Tensor, generator: torch.Generator
     ) -> None:
-        """None: time is not a column."""
-        del rows, chosen, generator
+        """None: there are no per-Gaussian times."""
+        del rows, selected, generator

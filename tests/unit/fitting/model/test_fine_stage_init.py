@@ -7,40 +7,44 @@ import torch
 from small_fits import ball_capture
 
 from diff4splat.data.capture.capture import Capture
-from diff4splat.fitting.canonical import raw_points
-from diff4splat.fitting.fine_stage_init import Departure, Surroundings, depart
-from diff4splat.fitting.frame_renderer import Sight
-from diff4splat.fitting.model import SceneModel
-from diff4splat.fitting.motions.spacetime import Pulses
-from diff4splat.fitting.motions.still import Still
-from diff4splat.fitting.pictures import FrameStore, Schedule
-from diff4splat.fitting.settings import Density, FitSettings
+from diff4splat.fitting.frames.frame_renderer import FrameRenderer
+from diff4splat.fitting.frames.frame_schedule import FrameSchedule
+from diff4splat.fitting.frames.frame_store import FrameStore
+from diff4splat.fitting.model.canonical import params_from_points
+from diff4splat.fitting.model.fine_stage_init import FineStageInit, InitContext, init_fine_stage
+from diff4splat.fitting.model.scene_model import SceneModel
+from diff4splat.fitting.motions.spacetime import SpacetimeGaussians
+from diff4splat.fitting.motions.static import NoMotion
+from diff4splat.fitting.settings import DensitySettings, FitSettings
 
 
-def departed(capture: Capture, moving: int, budget: int, use_depth: bool = True) -> Departure:
-    model = SceneModel(raw_points(capture.points, 0), Still((0.0, 1.0)), torch.zeros(60).bool())
+def departed(capture: Capture, moving: int, budget: int, use_depth: bool = True) -> FineStageInit:
+    model = SceneModel(
+        params_from_points(capture.points, 0), NoMotion((0.0, 1.0)), torch.zeros(60).bool()
+    )
     settings = FitSettings(
         motion="spacetime", harmonics=0, time_slices=4, use_depth=use_depth,
-        density=Density(budget=budget),
+        density=DensitySettings(budget=budget),
     )  # fmt: skip
-    around = Surroundings(
-        sight=Sight(capture=capture), store=FrameStore(capture), schedule=Schedule(capture, 2, 0),
+    context = InitContext(
+        renderer=FrameRenderer(capture=capture), store=FrameStore(capture),
+        schedule=FrameSchedule(capture, 2, 0),
         settings=settings,
     )  # fmt: skip
     moves = torch.arange(60) < moving
-    return depart(model, moves, Pulses((0.0, 1.0), 0.05), around)
+    return init_fine_stage(model, moves, SpacetimeGaussians((0.0, 1.0), 0.05), context)
 
 
 @pytest.mark.parametrize("use_depth", [True, False])
 @pytest.mark.parametrize(("moving", "budget"), [(60, 80), (60, 40), (5, 1000), (60, 10_000)])
 def test_the_budget_holds_and_the_slices_cover_the_time(moving: int, budget: int, use_depth: bool):
     leaving = departed(ball_capture(views=3, times=3, held=()), moving, budget, use_depth)
-    carried = int(leaving.moves.sum())
+    carried = int(leaving.moving_mask.sum())
     assert carried <= max(0.75 * budget - (60 - moving), 4)
-    centers = leaving.rows["time_centers_s"][leaving.moves]
+    centers = leaving.rows["time_centers_s"][leaving.moving_mask]
     assert 2 <= len(centers.unique()) <= 4
     assert float(centers.min()) < 0.5 < float(centers.max())
-    assert all(len(value) == len(leaving.moves) for value in leaving.rows.values())
+    assert all(len(value) == len(leaving.moving_mask) for value in leaving.rows.values())
 
 
 def test_with_depth_pulses_start_on_pixels_of_their_time():
@@ -56,8 +60,8 @@ def test_with_depth_pulses_start_on_pixels_of_their_time():
 def test_without_depth_in_the_pictures_the_moving_ones_are_repeated():
     capture = ball_capture(views=3, times=3, held=(), with_depth=False)
     leaving = departed(capture, 5, 1000)
-    assert int(leaving.moves.sum()) == 4 * 5
-    assert set(map(tuple, leaving.rows["means"][leaving.moves].tolist())) == set(
+    assert int(leaving.moving_mask.sum()) == 4 * 5
+    assert set(map(tuple, leaving.rows["means"][leaving.moving_mask].tolist())) == set(
         map(tuple, capture.points.positions[:5].tolist())
     )
 
@@ -65,4 +69,4 @@ def test_without_depth_in_the_pictures_the_moving_ones_are_repeated():
 def test_nothing_that_moves_stays_as_it_is():
     capture = ball_capture(views=3, times=3, held=())
     leaving = departed(replace(capture), 0, 1000)
-    assert not leaving.moves.any() and len(leaving.rows["means"]) == 60
+    assert not leaving.moving_mask.any() and len(leaving.rows["means"]) == 60

@@ -1,4 +1,4 @@
-"""What tells one fit from another."""
+"""A fingerprint that identifies a fit, so that a checkpoint is only resumed by the same fit."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ from diff4splat.scene.scene import Scene
 
 
 def fingerprint(capture: Capture, settings: FitSettings, init: Scene | None) -> str:
-    """A hash of everything that decides the result, but not of when it was stopped."""
+    """SHA-256 over all inputs that decide the result; excludes time limits."""
     numbers: list[Tensor] = [
         capture.cameras.world_from_camera,
         capture.cameras.focal_px,
@@ -24,7 +24,7 @@ def fingerprint(capture: Capture, settings: FitSettings, init: Scene | None) -> 
         numbers += [track.times_s, track.world_from_camera]
     digest = hashlib.sha256(json.dumps(asdict(settings), sort_keys=True).encode())
     if capture.optics is not None:
-        digest.update(_text(capture.optics).encode())
+        digest.update(_optics_text(capture.optics).encode())
     if init is not None:
         numbers.append(init.gaussians.means)
     for tensor in numbers:
@@ -32,15 +32,15 @@ def fingerprint(capture: Capture, settings: FitSettings, init: Scene | None) -> 
     return digest.hexdigest()
 
 
-def _text(optics: Optics) -> str:
-    """All numbers of optics and of its parts."""
-    parts = [optics, optics.lens, optics.aperture, optics.shutter]
-    found = [type(optics.lens).__name__]
-    for part in parts:
-        for one in () if part is None else fields(part):
-            value = getattr(part, one.name)
+def _optics_text(optics: Optics) -> str:
+    """All numbers of the optics and of its components."""
+    components = [optics, optics.lens, optics.aperture, optics.shutter]
+    text = [type(optics.lens).__name__]
+    for component in components:
+        for entry in () if component is None else fields(component):
+            value = getattr(component, entry.name)
             if isinstance(value, Tensor):
                 value = value.detach().double().tolist()
-            if part is not optics or isinstance(value, int | float | str):
-                found.append(f"{one.name}={value}")
-    return "; ".join(found)
+            if component is not optics or isinstance(value, int | float | str):
+                text.append(f"{entry.name}={value}")
+    return "; ".join(text)
