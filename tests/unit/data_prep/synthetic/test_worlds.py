@@ -3,7 +3,7 @@ import pytest
 import torch
 from made_worlds import COUNT, SPLITS, made_world
 
-from diff4splat.data_prep.synthetic.action import direction_seen
+from diff4splat.data_prep.synthetic.actors import camera_direction
 from diff4splat.data_prep.synthetic.captions.grammar import parse_caption
 from diff4splat.data_prep.synthetic.splits import load_split
 from diff4splat.data_prep.synthetic.world import World, WorldObject
@@ -112,7 +112,7 @@ def test_directions_are_measured() -> None:
     still = np.zeros((1, 5, 3))
 
     def seen(way: np.ndarray) -> str:
-        return direction_seen((np.concatenate([still, still + way]),), camera)
+        return camera_direction((np.concatenate([still, still + way]),), camera)
 
     assert seen(right) == "right" and seen(-right) == "left"
     assert seen(ahead) == "away" and seen(-ahead) == "toward"

@@ -1,7 +1,7 @@
-"""Who stands where, and what must stay free.
+"""Occupied and visible space of a world, seen from above.
 
-Axes: ``n`` discs, ``c`` cameras. Seen from above everything is a disc (x, z, radius) with a height.
-A thing may not touch another, nor a camera, nor hide what moves from a camera.
+Axes: ``n`` discs, ``c`` cameras. Every object is a disc (x, z, radius) with a height. An object may
+not touch another one or a camera, nor occlude a moving object.
 """
 
 from dataclasses import dataclass, field
@@ -9,51 +9,51 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.motions.act import Posed
+from diff4splat.data_prep.synthetic.motions.context import PartPositions
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Placed:
-    """A thing at its place in the world."""
+class PlacedObject:
+    """An object with its positions in the world."""
 
     family: str
-    """Key of ``FAMILIES``, or what captions call a part of the place."""
+    """Key of ``FAMILIES``, or the caption name of a part of the scene."""
     shape: Shape
-    parts: Posed
+    parts: PartPositions
     motion: str = ""
-    """Key of ``MOTIONS``; empty when it stands."""
+    """Key of ``MOTIONS``; empty for a static object."""
     size_m: float = 1.0
-    """What patterns on it are scaled by."""
+    """Size that scales its textures."""
 
 
 @dataclass(slots=True)
-class Plan:
-    """The ground plan of one world; filled as things are placed."""
+class FloorPlan:
+    """The floor plan of one world; filled as objects are placed."""
 
     eyes: Float64[np.ndarray, "c 3"]
-    """Every camera position that must stay free and see."""
+    """Camera positions that must stay free and keep their view."""
     margin_m: float
     discs: list[tuple[float, float, float]] = field(default_factory=list)
     watched: list[tuple[float, float, float, float]] = field(default_factory=list)
-    """(x, height, z, radius) of what must be seen."""
+    """(x, height, z, radius) of regions that must stay visible."""
 
     def is_free(self, x: float, z: float, radius: float) -> bool:
-        """Whether a disc touches no other."""
+        """Whether a disc overlaps no other."""
         if not self.discs:
             return True
-        taken = np.array(self.discs)
-        gap = np.hypot(taken[:, 0] - x, taken[:, 1] - z) - taken[:, 2] - radius
+        occupied = np.array(self.discs)
+        gap = np.hypot(occupied[:, 0] - x, occupied[:, 1] - z) - occupied[:, 2] - radius
         return bool(gap.min() > 0.0)
 
     def is_clear(self, x: float, z: float, radius: float, height: float) -> bool:
-        """Whether a thing there leaves every camera room and sight."""
+        """Whether an object there leaves every camera free and every watched region visible."""
         away = np.hypot(self.eyes[:, 0] - x, self.eyes[:, 2] - z) - radius
         if bool((away < self.margin_m).any()):
             return False
-        return not any(self._hides(x, z, radius, height, target) for target in self.watched)
+        return not any(self._occludes(x, z, radius, height, target) for target in self.watched)
 
-    def _hides(
+    def _occludes(
         self,
         x: float,
         z: float,
@@ -74,11 +74,11 @@ class Plan:
         return bool((between & (aside < radius + 0.7 * tr) & (height > sight)).any())
 
     def take(self, x: float, z: float, radius: float) -> None:
-        """Mark a disc as taken."""
+        """Mark a disc as occupied."""
         self.discs.append((x, z, radius))
 
-    def watch(self, parts: Posed, height: float) -> None:
-        """Keep the way of something that moves free and in sight."""
+    def watch(self, parts: PartPositions, height: float) -> None:
+        """Keep the trajectory of a moving object free and visible."""
         low = np.min([part.min(1) for part in parts], axis=0)
         high = np.max([part.max(1) for part in parts], axis=0)
         for k in range(0, len(low), max(1, len(low) // 8)):

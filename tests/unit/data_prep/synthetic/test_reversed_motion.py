@@ -9,19 +9,19 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diff4splat.data_prep.synthetic.action import (
-    TURNED_SHARES,
-    direction_seen,
+from diff4splat.data_prep.synthetic.actors import (
+    REVERSED_SHARES,
+    camera_direction,
     displacement,
-    frozen,
-    turned_back,
+    freeze,
+    reversed_motion,
 )
 from diff4splat.data_prep.synthetic.captions.grammar import parse_caption
 from diff4splat.data_prep.synthetic.captions.vocabulary import OPPOSITE
-from diff4splat.data_prep.synthetic.draws import Draws
-from diff4splat.data_prep.synthetic.layout.plan import Placed
-from diff4splat.data_prep.synthetic.layout.props import natural_shape
-from diff4splat.data_prep.synthetic.motions.act import Posed
+from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
+from diff4splat.data_prep.synthetic.layout.props import shape_of_size
+from diff4splat.data_prep.synthetic.motions.context import PartPositions
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.world import World, WorldObject
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import ConfigError
@@ -51,7 +51,7 @@ def same(one: World, other: World) -> bool:
     )
 
 
-def random_parts(seed: int) -> Posed:
+def random_parts(seed: int) -> PartPositions:
     numbers = np.random.default_rng(seed)
     return tuple(numbers.normal(size=(4, count, 3)) for count in (3, 5))
 
@@ -62,14 +62,14 @@ def test_turned_back_goes_so_much_of_the_way_in_the_other_direction(
     seed: int, share: float
 ) -> None:
     parts = random_parts(seed)
-    before, after = displacement(parts), displacement(turned_back(parts, share))
+    before, after = displacement(parts), displacement(reversed_motion(parts, share))
     np.testing.assert_allclose(after[[0, 2]], -share * before[[0, 2]], atol=1e-12)
     np.testing.assert_allclose(after[1], before[1], atol=1e-12)
 
 
 def test_turned_back_keeps_the_first_frame_height_and_posture() -> None:
     parts = random_parts(0)
-    turned = turned_back(parts, 0.7)
+    turned = reversed_motion(parts, 0.7)
     for part, other in zip(parts, turned, strict=True):
         np.testing.assert_array_equal(other[0], part[0])
         np.testing.assert_array_equal(other[..., 1], part[..., 1])
@@ -87,10 +87,10 @@ def test_the_first_frame_is_the_same_and_the_way_the_opposite(index: int) -> Non
     for one, other in zip(moving(plain), moving(turned), strict=True):
         np.testing.assert_array_equal(one.positions[0], other.positions[0])
         np.testing.assert_array_equal(one.positions[..., 1], other.positions[..., 1])
-        seen = [direction_seen((thing.positions,), camera) for thing in (one, other)]
+        seen = [camera_direction((thing.positions,), camera) for thing in (one, other)]
         assert seen[1] == OPPOSITE[seen[0]]
         size = [np.linalg.norm(displacement((x.positions,))[[0, 2]]) for x in (one, other)]
-        assert min(abs(size[1] / size[0] - share) for share in TURNED_SHARES) < 1e-2
+        assert min(abs(size[1] / size[0] - share) for share in REVERSED_SHARES) < 1e-2
 
 
 def test_every_travelling_thing_is_turned() -> None:
@@ -145,9 +145,9 @@ def test_frozen_things_stand_as_the_first_frame_shows_them() -> None:
 
 
 def test_frozen_keeps_what_a_thing_is() -> None:
-    parts, shape = random_parts(0), natural_shape("ball", 1.0, Draws("ball"), (0.1, 5.0))
-    thing = Placed(family="ball", shape=shape, parts=parts, motion="rolls", size_m=1.0)
-    stands = frozen(thing)
+    parts, shape = random_parts(0), shape_of_size("ball", 1.0, Rng("ball"), (0.1, 5.0))
+    thing = PlacedObject(family="ball", shape=shape, parts=parts, motion="rolls", size_m=1.0)
+    stands = freeze(thing)
     assert stands.motion == "" and stands.family == "ball" and stands.shape is shape
     for part, other in zip(parts, stands.parts, strict=True):
         np.testing.assert_array_equal(other, part[:1])

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.materials import ROLES
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.facets import box, ear_clipped, extruded
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.shapes.revolve import ball, rod, superquadric
@@ -29,7 +29,7 @@ def edge_balance(piece: Surface) -> tuple[int, int]:
 @pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_every_family_is_well_made(name: str, seed: int) -> None:
-    shape = FAMILIES[name].make(Draws("shape", seed)).of_height(1.0)
+    shape = FAMILIES[name].make(Rng("shape", seed)).of_height(1.0)
     assert shape.height == pytest.approx(1.0)
     assert shape.bounds[1][1] == pytest.approx(0.0, abs=1e-9)
     assert 0.1 < shape.radius < 8
@@ -47,14 +47,14 @@ def test_every_family_is_well_made(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", sorted(set(FAMILIES) - {"flag", "towel", "banner"}))
 def test_bodies_are_closed_and_consistent(name: str) -> None:
-    for part in FAMILIES[name].make(Draws("closed")).parts:
+    for part in FAMILIES[name].make(Rng("closed")).parts:
         if part.role not in OPEN_ROLES:
             assert edge_balance(part.surface)[0] == 0, part.role
 
 
 def test_no_triangle_is_degenerate() -> None:
     for name, family in FAMILIES.items():
-        for part in family.make(Draws("area")).of_height(1.0).parts:
+        for part in family.make(Rng("area")).of_height(1.0).parts:
             a, b, c = (part.surface.vertices[part.surface.triangles[:, k]] for k in range(3))
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
             assert (area > 1e-12).mean() > 0.97, name
@@ -83,7 +83,7 @@ def test_texture_coordinates_are_metres() -> None:
 
 
 def test_scaling_scales_texture_coordinates_and_pivots() -> None:
-    shape = FAMILIES["quadruped"].make(Draws("q"))
+    shape = FAMILIES["quadruped"].make(Rng("q"))
     once, twice = shape.of_height(1.0), shape.of_height(2.0)
     assert np.allclose(2 * once.parts[0].surface.uv, twice.parts[0].surface.uv)
     assert np.allclose(2 * np.array(once.joints[0].pivot), twice.joints[0].pivot)
@@ -104,7 +104,7 @@ def test_ear_clipping_covers_the_polygon() -> None:
 
 
 def test_normals_point_outward() -> None:
-    piece = lump(Draws("l"), roughness=0.0)
+    piece = lump(Rng("l"), roughness=0.0)
     assert np.allclose(vertex_normals(piece.vertices, piece.triangles), piece.vertices, atol=0.02)
 
 

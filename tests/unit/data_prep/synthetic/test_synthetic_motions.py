@@ -2,9 +2,14 @@ import numpy as np
 import pytest
 
 from diff4splat.data_prep.synthetic.captions.vocabulary import VERBS
-from diff4splat.data_prep.synthetic.draws import Draws
-from diff4splat.data_prep.synthetic.motions.act import Act, Performance, jointed, turning
+from diff4splat.data_prep.synthetic.motions.context import (
+    MotionContext,
+    MotionResult,
+    articulated,
+    axis_rotations,
+)
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS, families_for
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 
 TIMES = np.arange(17) / 8.0
@@ -17,14 +22,14 @@ def size_for(motion: str, family: str) -> float:
     return next(0.5 * (a + b) for a, b in fitting if a <= b)
 
 
-def performance(motion: str, family: str, times_s: np.ndarray = TIMES) -> Performance:
+def performance(motion: str, family: str, times_s: np.ndarray = TIMES) -> MotionResult:
     height = size_for(motion, family)
-    shape = FAMILIES[family].make(Draws("s", family)).of_height(height)
-    act = Act(shape=shape, times_s=times_s, travel_m=2.5 * height, draws=Draws("a", motion))
+    shape = FAMILIES[family].make(Rng("s", family)).of_height(height)
+    act = MotionContext(shape=shape, times_s=times_s, travel_m=2.5 * height, rng=Rng("a", motion))
     return MOTIONS[motion].perform(act)
 
 
-def everything(done: Performance) -> np.ndarray:
+def everything(done: MotionResult) -> np.ndarray:
     return np.concatenate(done.parts, axis=1)
 
 
@@ -106,9 +111,9 @@ def test_cloth_moves_and_its_pole_does_not() -> None:
 
 
 def test_joints_carry_their_children() -> None:
-    shape = FAMILIES["robot_arm"].make(Draws("r"))
+    shape = FAMILIES["robot_arm"].make(Rng("r"))
     quarter = np.array([0.0, np.pi / 2])
-    still, turned = jointed(shape, {2: quarter}, 2)[0]
+    still, turned = articulated(shape, {2: quarter}, 2)[0]
     hand = shape.parts[0].surface.joint == 3
     pivot = np.array(shape.joints[1].pivot)
     away = np.linalg.norm(still[hand] - pivot, axis=1), np.linalg.norm(turned[hand] - pivot, axis=1)
@@ -118,7 +123,7 @@ def test_joints_carry_their_children() -> None:
 
 
 def test_turning_is_a_rotation_about_its_axis() -> None:
-    turn = turning((0.0, 0.0, 1.0), np.array([np.pi / 2]))[0]
+    turn = axis_rotations((0.0, 0.0, 1.0), np.array([np.pi / 2]))[0]
     assert np.allclose(turn, [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 

@@ -1,7 +1,7 @@
-"""Grids on which a world's numbers lie.
+"""Quantisation of the numbers of a world.
 
-Sines and matrix products differ in their last bits from processor to processor. Rounding to a grid
-that is coarse beside such differences, and fine beside anything visible, makes them equal.
+Sines and matrix products differ in their last bits between processors. The grids here are coarser
+than these differences and finer than anything visible, so worlds are equal on every machine.
 """
 
 import numpy as np
@@ -15,13 +15,13 @@ LENS_BITS = 20
 COLOR_BITS = 12
 
 
-def to_grid(
+def quantise(
     values: Float64[np.ndarray, "*shape"], bits: int = LENGTH_BITS
 ) -> Float64[np.ndarray, "*shape"]:
     """The nearest multiples of 2^-bits; never a negative zero."""
     return np.round(values * 2.0**bits) * 2.0**-bits + 0.0
 
 
-def number_on_grid(value: float, bits: int = COLOR_BITS) -> float:
+def quantise_number(value: float, bits: int = COLOR_BITS) -> float:
     """The nearest multiple of 2^-bits."""
     return round(value * 2.0**bits) * 2.0**-bits + 0.0
