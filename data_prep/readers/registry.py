@@ -1,4 +1,4 @@
-"""Which reader a folder is for, and the one way to read a capture."""
+"""Detects the format of a capture and reads it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _READERS: dict[FormatName, _Reader] = {
 
 
 def read_capture(path: Path | str, options: ReadOptions | None = None) -> Capture:
-    """The capture in a folder, or in the folder of a file; pictures are read when asked for.
+    """Read the capture in a folder, or in the folder of a file; images are decoded on demand.
 
     Raises:
         InputError: no such folder, none or several formats, or a scene cannot be fitted to it.
@@ -56,10 +56,10 @@ def read_capture(path: Path | str, options: ReadOptions | None = None) -> Captur
 
 
 def detect_format(path: Path | str) -> FormatName:
-    """Which format a folder, or the folder of a file, is in.
+    """Detect the format of a folder, or of the folder of a file.
 
     Raises:
-        InputError: none or several; lists what each looks like.
+        InputError: none or several; lists the expected files of each.
     """
     return _detected(locate_capture(path))
 
@@ -81,7 +81,7 @@ def _detected(location: CaptureLocation) -> FormatName:
 
 
 def _is_other_json(file: Path) -> bool:
-    """A ``transforms.json`` by whatever name; files that other formats name decide nothing."""
+    """Whether a JSON file is a ``transforms.json`` under another name."""
     others = ("dataset.json", "metadata.json", "scene.json", "manifest.json")
     split = file.name.startswith("transforms_") and dnerf.matches(file.parent)
     ours = file.name == "camera.json" and camera_json.matches(file.parent)

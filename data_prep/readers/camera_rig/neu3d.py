@@ -1,6 +1,6 @@
 """Neural 3D Video (DyNeRF): ``poses_bounds.npy`` and a video, or numbered pictures, per camera.
 
-Rows are in the order of the cameras' names. The data set's page says that camera 0 is for tests
+Rows are in the order of the cameras' names. Camera 0 is the test camera
 (Li et al., CVPR 2022).
 """
 
@@ -39,14 +39,14 @@ _OUT_OF_STEP = (
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     return (folder / "poses_bounds.npy").is_file() and bool(
         camera_videos(folder) or camera_folders(folder)
     )
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
-    """What the files say.
+    """Read the capture.
 
     Raises:
         FileFormatError: the array is damaged, or its rows are not the cameras.
@@ -75,7 +75,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
 
 
 def _rig(folder: Path, shrink: int) -> tuple[Rig, tuple[str, ...]]:
-    """Pictures where every camera has them, since they can be read in any order; else videos."""
+    """Images if every camera has them, since they allow random access; else videos."""
     folders, videos = camera_folders(folder), camera_videos(folder)
     if not folders and not videos:
         raise FileFormatError(
@@ -131,7 +131,7 @@ def _fps(asked: float | None, videos: list[VideoFile]) -> tuple[float, tuple[str
 
 
 def _at_video_size(shot: Shot) -> Shot:
-    """The lens of a frame that its video has made smaller already."""
+    """The shot with the intrinsics of its downscaled video."""
     if not isinstance(shot.image, VideoFrame):
         return shot
     video = shot.image.video

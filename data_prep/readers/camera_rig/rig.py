@@ -1,7 +1,7 @@
-"""Cameras called ``cam00``, ``cam01`` and so on, whose pictures are numbered by time.
+"""Rigs of cameras ``cam00``, ``cam01`` and so on, with images numbered by time.
 
-The number of a picture, not its place in the folder, is its time: a picture that is missing makes
-a gap and shifts nothing. Number 0 or 1, whichever the rig begins with, is time 0.
+The number of an image is its time, so a missing image leaves a gap. The first number of the rig, 0
+or 1, is time 0.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,13 +23,13 @@ RIG_FPS = 30.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rig:
-    """The pictures of every camera by number; cameras in the order of their names."""
+    """The images of every camera by number; cameras in the order of their names."""
 
     by_camera: dict[str, dict[int, ImageFile | VideoFrame]]
 
     @property
     def names(self) -> list[str]:
-        """Of the cameras."""
+        """Names of the cameras."""
         return list(self.by_camera)
 
     def notes(self) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ def rig_from_folders(folders: Mapping[str, Path]) -> Rig:
 def rig_shots(
     rig: Rig, poses: Float[Tensor, "c 4 4"], lenses: Sequence[Intrinsics], fps: float
 ) -> list[Shot]:
-    """Every picture of standing cameras, camera by camera in the order of time."""
+    """Every image of static cameras, camera by camera in the order of time."""
     first = min(min(pictures) for pictures in rig.by_camera.values())
     return [
         Shot(
@@ -70,7 +70,7 @@ def rig_shots(
 
 
 def fps_note(fps: float | None, default: float) -> tuple[str, ...]:
-    """Where times come from, when nobody said."""
+    """A note if the frame rate is an assumption."""
     if fps is not None:
         return ()
     return (f"times: {default:g} frames per second were assumed; give fps if it was another rate",)

@@ -2,7 +2,7 @@
 
 A count, then records. Camera: identifier, model, width, height, parameters. Image: identifier,
 quaternion, translation, camera, name with a zero at its end, a count and so many 2D points. Point:
-identifier, position, colour, error, a count and so many places where it is seen.
+identifier, position, colour, error, a count and so many observations.
 """
 
 import struct
@@ -24,19 +24,19 @@ _POINT_2D_BYTES, _SEEN_BYTES = 24, 8
 
 
 class _Bytes:
-    """A file that is read from start to end."""
+    """A sequential binary reader."""
 
     def __init__(self, file: Path) -> None:
         require_file(file, "a binary file of a COLMAP model")
         self.file, self._data, self._position = file, file.read_bytes(), 0
 
     def take(self, layout: str) -> tuple:
-        """The next values."""
+        """Read the next values."""
         start = self.skip(struct.calcsize(layout))
         return struct.unpack_from(layout, self._data, start)
 
     def skip(self, count: int) -> int:
-        """Pass ``count`` bytes; where they began."""
+        """Skip ``count`` bytes; returns their offset."""
         start, self._position = self._position, self._position + count
         if self._position > len(self._data):
             raise self.cut_off()
@@ -51,7 +51,7 @@ class _Bytes:
         return self._data[start:end].decode("utf-8", errors="replace")
 
     def cut_off(self) -> FileFormatError:
-        """The refusal of a file that ends too early."""
+        """The error for a truncated file."""
         return FileFormatError(
             f"{self.file}: expected a whole binary COLMAP file, got one that ends too early "
             f"({len(self._data)} bytes); copy it again"

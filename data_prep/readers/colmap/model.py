@@ -1,4 +1,4 @@
-"""A COLMAP model: cameras, the images it found poses for, and points.
+"""A COLMAP model: cameras, the registered images, and points.
 
 ``cameras``, ``images`` and ``points3D`` as ``.bin`` or ``.txt``, in one folder. Poses are
 camera_from_world: a quaternion wxyz and a translation, OpenCV axes; pixel centres are at +0.5
@@ -65,7 +65,7 @@ class ModelImage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """A whole model."""
+    """Cameras, images and points of a model."""
 
     folder: Path
     cameras: dict[int, ModelCamera]
@@ -76,7 +76,7 @@ class Model:
 
 
 def model_folder(folder: Path) -> Path | None:
-    """Where in ``folder`` a model lies, if one does."""
+    """The subfolder with a model; None without one."""
     for name in SPARSE_FOLDERS:
         if suffix_of(folder / name) is not None:
             return folder / name
@@ -84,7 +84,7 @@ def model_folder(folder: Path) -> Path | None:
 
 
 def suffix_of(folder: Path) -> str | None:
-    """``.bin`` or ``.txt``; binary goes first, as in COLMAP."""
+    """``.bin`` or ``.txt``; binary files have priority, as in COLMAP."""
     for suffix in (".bin", ".txt"):
         if all((folder / f"{name}{suffix}").is_file() for name in ("cameras", "images")):
             return suffix

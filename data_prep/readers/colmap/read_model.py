@@ -1,4 +1,4 @@
-"""A COLMAP model from either kind of files, and what it means: lenses and poses.
+"""Reads a COLMAP model from text or binary files, with its intrinsics and poses.
 
 Axes: ``i`` images. With SIMPLE_PINHOLE f, c_x, c_y; PINHOLE f_x, f_y, c_x, c_y; SIMPLE_RADIAL
 f, c_x, c_y, k; RADIAL f, c_x, c_y, k₁, k₂; OPENCV f_x, f_y, c_x, c_y, k₁, k₂, p₁, p₂. The fisheyes
@@ -74,7 +74,7 @@ def image_poses(images: Sequence[ModelImage], where: Path) -> Float[Tensor, "i 4
 
 
 def camera_intrinsics(camera: ModelCamera, where: str) -> Intrinsics:
-    """The lens of a camera.
+    """The intrinsics of a camera.
 
     Raises:
         FileFormatError: a number is not finite, a size or focal length not above 0, or a fisheye

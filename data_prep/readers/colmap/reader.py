@@ -1,8 +1,8 @@
-"""Pictures with a COLMAP model: several standing cameras, or one that moves.
+"""Captures with a COLMAP model: several static cameras, or one moving camera.
 
 Several cameras have folders ``cam01``, ``cam02`` and so on (also within ``images``); otherwise the
-pictures of one folder are a video. Times are counted in frames. The layout names no test pictures:
-those that are usually called so in the layout of several cameras are training pictures.
+images of one folder are a video. Times are frame numbers. The layout has no test split: the images
+that its tools call test are training images.
 """
 
 from pathlib import Path
@@ -33,12 +33,12 @@ _NO_TEST = "; what this layout's tools call test are training pictures, so they 
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     return model_folder(folder) is not None and bool(_cameras(folder) or image_folder(folder))
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
-    """What the files say.
+    """Read the capture.
 
     Raises:
         FileFormatError: the model is missing or damaged, or does not fit the pictures.

@@ -1,4 +1,4 @@
-"""Several standing cameras in folders ``cam01``, ``cam02`` and so on, posed by one COLMAP model.
+"""Several static cameras in folders ``cam01``, ``cam02`` and so on, posed by one COLMAP model.
 
 An image of the model belongs to the camera whose folder is in its name (``cam01/frame_00001.jpg``),
 whose name it has (``cam01.png``), or whose number it ends with (``image1.jpg``).
@@ -26,7 +26,7 @@ _STANDS = 1e-4
 def read_rig(
     model: Model, folders: Mapping[str, Path], fps: float
 ) -> tuple[list[Shot], tuple[str, ...]]:
-    """Every picture of each camera that the model has a pose for, and notes.
+    """Every image of each camera with a pose in the model, and notes.
 
     Raises:
         FileFormatError: no camera has one, or one has several that differ.

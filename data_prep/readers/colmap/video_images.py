@@ -1,7 +1,6 @@
-"""One moving camera: the pictures of one folder in the order of time, with poses from COLMAP.
+"""One moving camera: the images of one folder in the order of time, with poses from COLMAP.
 
-Time counts all pictures of the folder: one that COLMAP found no pose for is left out but leaves its
-gap, so that what follows keeps its time.
+Time counts all images of the folder. An image without a pose is skipped and leaves a gap.
 """
 
 from pathlib import Path
@@ -21,7 +20,7 @@ IMAGE_FOLDERS = ("images", "input", "rgb", "frames")
 
 
 def image_folder(folder: Path) -> Path | None:
-    """Where the pictures of a video lie, if they do."""
+    """The folder with the images of a video; None without one."""
     for name in IMAGE_FOLDERS:
         if (folder / name).is_dir() and images_below(folder / name):
             return folder / name

@@ -1,4 +1,4 @@
-"""From a reader's draft to a capture: sizes compared, lenses fitted, cameras made."""
+"""Turns the draft of a reader into a capture: checks sizes, scales intrinsics, builds cameras."""
 
 from collections import defaultdict
 from dataclasses import replace
@@ -15,7 +15,7 @@ from diff4splat.geometry.camera import Camera
 
 
 def assemble_capture(draft: CaptureDraft, options: ReadOptions) -> Capture:
-    """The capture that ``draft`` describes; the head of every picture is looked at.
+    """The capture of ``draft``; reads the header of every image.
 
     Raises:
         InputError: there are no pictures.
@@ -24,7 +24,7 @@ def assemble_capture(draft: CaptureDraft, options: ReadOptions) -> Capture:
     """
     if not draft.shots:
         raise InputError(f"{draft.name}: expected pictures, got none; check the folder")
-    shots = _with_fitted_lenses(every_nth_time(draft.shots, options.frame_step))
+    shots = _with_scaled_intrinsics(every_nth_time(draft.shots, options.frame_step))
     _require_blocks(shots[0].lens.size_px, draft.shrink, draft.name)
     return Capture(
         name=draft.name,
@@ -43,7 +43,7 @@ def assemble_capture(draft: CaptureDraft, options: ReadOptions) -> Capture:
 
 
 def every_nth_time(shots: list[Shot], step: int) -> list[Shot]:
-    """Every ``step``-th time of each camera, of what is learnt and of what is held out."""
+    """Every ``step``-th time of each camera, separately for training and test frames."""
     if step == 1:
         return shots
     times = defaultdict(set)
@@ -53,7 +53,7 @@ def every_nth_time(shots: list[Shot], step: int) -> list[Shot]:
     return [shot for shot in shots if shot.time_s in kept[shot.camera, shot.held_out]]
 
 
-def _with_fitted_lenses(shots: list[Shot]) -> list[Shot]:
+def _with_scaled_intrinsics(shots: list[Shot]) -> list[Shot]:
     size_px = shots[0].image.size_px()
     for shot in shots:
         require_size(shot.image.where, shot.image.size_px(), size_px)

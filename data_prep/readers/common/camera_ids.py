@@ -1,7 +1,7 @@
-"""Which pictures one camera took, where a file lists poses and times alone.
+"""Assigns camera ids to frames of which only poses and times are known.
 
-Axes: ``f`` frames. Poses that come back are standing cameras. Otherwise one camera moves, and the
-second picture of a time is of a second camera.
+Axes: ``f`` frames. Repeated poses are static cameras. Otherwise one camera moves, and the second
+frame of a time belongs to a second camera.
 """
 
 from collections import Counter
@@ -11,16 +11,16 @@ from torch import Tensor
 
 from diff4splat.data.capture.split import same_view_groups
 
-_FEWEST_RETURNS = 2
-"""Pictures per pose, in the mean, that make a pose a standing camera."""
+_MIN_FRAMES_PER_POSE = 2
+"""Mean frames per pose from which poses count as static cameras."""
 
 
 def assign_camera_ids(world_from_camera: Float[Tensor, "f 4 4"], times_s: list[float]) -> list[int]:
-    """A number from 0 for each frame, in the order in which cameras first appear."""
+    """A camera id from 0 for each frame, in the order of first appearance."""
     groups = _by_appearance(same_view_groups(world_from_camera).tolist())
-    standing = len(times_s) >= _FEWEST_RETURNS * len(set(groups))
+    static = len(times_s) >= _MIN_FRAMES_PER_POSE * len(set(groups))
     once = len(set(zip(groups, times_s, strict=True))) == len(times_s)
-    return groups if standing and once else _by_turn(times_s)
+    return groups if static and once else _by_turn(times_s)
 
 
 def _by_appearance(groups: list[int]) -> list[int]:

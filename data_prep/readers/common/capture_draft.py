@@ -1,4 +1,4 @@
-"""What a reader knows of a capture before any picture is decoded.
+"""A capture as read from its metadata, before any image is decoded.
 
 Axes: ``f`` frames. Cameras are OpenCV (x right, y down, z forward).
 """
@@ -18,11 +18,11 @@ from diff4splat.data_prep.readers.files.video_file import VideoFrame
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """One picture of one camera at one time."""
+    """One image of one camera at one time."""
 
     image: ImageFile | VideoFrame
     lens: Intrinsics
-    """Of the picture the cameras were made for; fitted to the real one later."""
+    """For the image size in the metadata; scaled to the actual size later."""
     world_from_camera: Float[Tensor, "4 4"]
     time_s: float
     camera: int
@@ -33,14 +33,14 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaptureDraft:
-    """A capture whose pictures have not been looked at."""
+    """A capture with undecoded images."""
 
     name: str
     source: str
     shots: list[Shot]
     split_reason: str
     shrink: int
-    """What is left of the downscaling that was asked for."""
+    """Downscale factor that remains to be applied."""
     points: PointCloud | None = None
     background: tuple[float, float, float] | None = None
     notes: tuple[str, ...] = ()

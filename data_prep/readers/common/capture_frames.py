@@ -1,4 +1,4 @@
-"""The pictures of a capture, read when they are asked for."""
+"""Frames of a capture, decoded on demand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,11 +15,11 @@ from diff4splat.data_prep.readers.files.pixel_layers import PixelLayers
 from diff4splat.errors import FileFormatError, InputError
 
 _MAP_BYTES = 1 << 28
-"""For where straightened pixels come from; a rig has one such map per camera."""
+"""Cache for undistortion maps; a rig has one per camera."""
 
 
 class CaptureFrames:
-    """Frames by the order of ``shots``: composited, masked, straightened, made coarser."""
+    """Frames in the order of ``shots``: composited, masked, undistorted and downscaled."""
 
     def __init__(
         self, shots: Sequence[Shot], background: pixel_layers.Color | None, shrink: int
@@ -31,7 +31,7 @@ class CaptureFrames:
         return len(self._shots)
 
     def read(self, index: int) -> Frame:
-        """The picture of frame ``index``.
+        """Decode frame ``index``.
 
         Raises:
             InputError: there is no such frame.
@@ -40,13 +40,13 @@ class CaptureFrames:
         if not 0 <= index < len(self):
             raise InputError(f"frame: expected 0 to {len(self) - 1}, got {index}")
         shot = self._shots[index]
-        known = self._known(shot)
+        layers = self._layers(shot)
         if shot.lens.is_distorted:
-            known = pixel_layers.undistort(known, *self._map(shot.lens))
-        return pixel_layers.to_frame(pixel_layers.downscale(known, self._shrink))
+            layers = pixel_layers.undistort(layers, *self._map(shot.lens))
+        return pixel_layers.to_frame(pixel_layers.downscale(layers, self._shrink))
 
-    def _known(self, shot: Shot) -> PixelLayers:
-        """Everything the files say, on the grid of the picture as stored."""
+    def _layers(self, shot: Shot) -> PixelLayers:
+        """All pixel layers at the stored resolution."""
         pixels = shot.image.read()
         size_px = pixels.rgb.shape[:2]
         require_size(shot.image.where, size_px, shot.lens.size_px)
@@ -68,7 +68,7 @@ class CaptureFrames:
 
 
 def require_size(where: str, got: tuple[int, ...], want: tuple[int, int]) -> None:
-    """Refuse a picture of another size than the others.
+    """Require the common image size.
 
     Raises:
         FileFormatError: naming the file.

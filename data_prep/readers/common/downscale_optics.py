@@ -1,7 +1,7 @@
-"""Optics of pictures whose blocks of pixels became one: only the times of lines change.
+"""Optics of downscaled images: only the read-out time changes.
 
-Line r of H is read at t + (r / (H − 1) − ½) readout. A line of blocks stands for the mean of its n
-lines, so that from the first to the last of H / n it takes readout · (H − n) / (H − 1).
+Line r of H is read at t + (r / (H − 1) − ½) readout. A downscaled line has the mean time of its
+n lines, so the read-out of H / n lines takes readout · (H − n) / (H − 1).
 """
 
 from dataclasses import replace
@@ -11,7 +11,7 @@ from diff4splat.geometry.optics import Optics
 
 
 def downscale_optics(optics: Optics, size_px: tuple[int, int], factor: int, name: str) -> Optics:
-    """The optics of pictures of ``size_px`` that became ``factor`` times smaller.
+    """The optics of images of ``size_px``, downscaled by ``factor``.
 
     Raises:
         ConfigError: lines would be left over, or times are those of the first line, which is then

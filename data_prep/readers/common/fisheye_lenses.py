@@ -1,9 +1,9 @@
-"""Lenses whose pictures stay as they are: fisheyes and whole spheres, which no pinhole can show.
+"""Lenses without undistortion: fisheye and equirectangular images, which exceed a pinhole.
 
 A fisheye is OpenCV's, θ_d = θ (1 + k₁ θ² + k₂ θ⁴ + k₃ θ⁶ + k₄ θ⁸), in COLMAP's and nerfstudio's
 files alike; COLMAP's radial ones are those with the last coefficients 0
 (https://colmap.github.io/cameras.html). All cameras of a capture share the lens; focal lengths and
-centres are each frame's own.
+centres may differ per frame.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from diff4splat.io.lens_json import as_file_error
 _SMALLEST_CIRCLE = 0.5
 """Diameter of what a fisheye sees, in shorter sides of the picture; real ones fill more."""
 _ALMOST = 0.999
-"""How much of the way to its turning point a polynomial is followed: there it is flat."""
+"""Share of the range up to the turning point of the polynomial that is used."""
 
 LENS_NOTES = {
     "fisheye": (
@@ -37,7 +37,7 @@ LENS_NOTES = {
 
 
 def require_fisheye(lens: Intrinsics, where: str) -> Intrinsics:
-    """``lens`` itself, a fisheye.
+    """Return ``lens`` if it is a valid fisheye.
 
     Raises:
         FileFormatError: coefficients are not finite, or the polynomial turns back so early that
@@ -57,7 +57,7 @@ def require_fisheye(lens: Intrinsics, where: str) -> Intrinsics:
 
 
 def require_shared_optics(shots: Sequence[Shot]) -> Optics | None:
-    """The lens that all shots were taken through; None where pictures are those of pinholes.
+    """The lens that all shots share; None for pinhole images.
 
     Raises:
         FileFormatError: two of them differ; names both.

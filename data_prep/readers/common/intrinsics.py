@@ -1,12 +1,12 @@
-"""A camera's intrinsics as files give them: pinhole, skew, and what bends.
+"""Intrinsics as stored in files: pinhole, skew and distortion.
 
-With (x, y) = (X/Z, Y/Z) in OpenCV camera axes and r² = x² + y², a point is seen at
+With (x, y) = (X/Z, Y/Z) in OpenCV camera axes and r² = x² + y², a point projects to
 
     x' = x (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + 2 p₁ x y + p₂ (r² + 2 x²)     u = f_x x' + s y' + c_x
     y' = y (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + p₁ (r² + 2 y²) + 2 p₂ x y     v = f_y y' + c_y
 
-(OpenCV, calib3d; COLMAP's and Nerfies' cameras are the same). Pixel centres are at +0.5. Fisheyes
-and spheres have formulas of their own, see ``angular``.
+(OpenCV, calib3d; COLMAP's and Nerfies' cameras are the same). Pixel centres are at +0.5. Fisheye
+and equirectangular lenses: see ``fisheye_lenses``.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ _OUTSIDE = -2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intrinsics:
-    """Intrinsics in pixels of a picture of ``size_px``."""
+    """Intrinsics in pixels of an image of ``size_px``."""
 
     focal_px: tuple[float, float]
     center_px: tuple[float, float]
@@ -42,16 +42,16 @@ class Intrinsics:
 
     @property
     def keeps_projection(self) -> bool:
-        """Whether its pictures stay as they are."""
+        """Whether images keep their projection instead of becoming pinhole images."""
         return self.model != "pinhole"
 
     @property
     def is_distorted(self) -> bool:
-        """Whether its pictures are straightened."""
+        """Whether images need undistortion."""
         return not self.keeps_projection and any((self.skew_px, *self.radial, *self.tangential))
 
     def scaled_to(self, size_px: tuple[int, int], where: str) -> "Intrinsics":
-        """The same lens for a picture of another size and the same shape.
+        """The intrinsics for an image of another size and the same aspect ratio.
 
         Raises:
             FileFormatError: the shape differs by more than rounding to whole pixels.
@@ -72,7 +72,7 @@ class Intrinsics:
         )
 
     def downscaled(self, factor: int) -> "Intrinsics":
-        """For pictures whose blocks of ``factor`` by ``factor`` pixels became one."""
+        """The intrinsics for images downscaled by ``factor``."""
         return replace(
             self,
             focal_px=(self.focal_px[0] / factor, self.focal_px[1] / factor),
@@ -96,7 +96,7 @@ def distort(
 
 
 def undistortion_map(lens: Intrinsics) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
-    """Where a pinhole camera of the same focal lengths finds its pixels in the bent picture.
+    """Where a pinhole camera of the same focal lengths finds its pixels in the distorted image.
 
     (column, row) as OpenCV's ``remap`` wants them: float32, pixel centres at whole numbers. Where
     the formula bends back on itself there is nothing to find, and both lie outside the picture.

@@ -1,4 +1,4 @@
-"""Depth and masks beside a picture; axes ``h w``, depth is z with 0 for "nothing there"."""
+"""Depth and mask files of an image; axes ``h w``, depth is z with 0 for no depth."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from diff4splat.errors import FileFormatError
 from diff4splat.io.existing import require_file
 
 MILLIMETRE = 1e-3
-"""What one level of whole-number depth is where the file does not say."""
+"""Default unit of integer depth, in metres."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +25,7 @@ class DepthFile:
     """Scene units per level; None is a millimetre for whole numbers and 1 for others."""
 
     def read(self, size_px: tuple[int, int]) -> Float32[np.ndarray, "h w"]:
-        """Depth for a picture of ``size_px``; a coarser map is repeated, not blended.
+        """Depth for an image of ``size_px``; a smaller map is repeated, not interpolated.
 
         Raises:
             FileFormatError: missing, damaged, not of one channel, or of another shape.
@@ -59,7 +59,7 @@ class DepthFile:
 
 
 def read_mask(file: Path, size_px: tuple[int, int]) -> Bool[np.ndarray, "h w"]:
-    """True where the mask is not black: there the picture counts.
+    """True for valid pixels, which are not black in the mask.
 
     Raises:
         FileFormatError: missing, damaged, of another size, or black everywhere.

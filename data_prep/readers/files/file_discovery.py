@@ -1,4 +1,4 @@
-"""Where the files of a capture lie: names out of data are never followed out of its folder."""
+"""Finds the files of a capture; names in data files never lead outside its folder."""
 
 import os
 import re
@@ -16,15 +16,15 @@ _VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaptureLocation:
-    """What a person pointed at."""
+    """The folder of a capture, and the file in it if a file was given."""
 
     folder: Path
     file: Path | None = None
-    """When it was a file of the folder."""
+    """The given file, if any."""
 
     @property
     def name(self) -> str:
-        """What the capture is called."""
+        """Name of the capture."""
         return self.folder.resolve().name
 
 
@@ -45,7 +45,7 @@ def locate_capture(path: Path | str) -> CaptureLocation:
 
 
 def resolve_inside(folder: Path, name: str, where: str) -> Path:
-    """The path called ``name`` in ``folder``.
+    """The path ``name`` inside ``folder``.
 
     Raises:
         FileFormatError: it is empty, absolute, or leaves the folder.
@@ -60,7 +60,7 @@ def resolve_inside(folder: Path, name: str, where: str) -> Path:
 
 
 def find_image(folder: Path, name: str, where: str) -> Path:
-    """The picture called ``name``, whose suffix may be left away as in D-NeRF.
+    """The image ``name``; its suffix may be omitted, as in D-NeRF.
 
     Raises:
         FileFormatError: there is none, or the name leaves the folder.
@@ -79,7 +79,7 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
 
 
 def images_in(folder: Path) -> list[Path]:
-    """Every picture directly in ``folder``, in natural order; hidden files do not count."""
+    """Every image directly in ``folder``, in natural order; without hidden files."""
     files = [
         file
         for file in folder.iterdir()
@@ -89,14 +89,14 @@ def images_in(folder: Path) -> list[Path]:
 
 
 def images_below(folder: Path) -> list[Path]:
-    """Every picture in ``folder`` and the folders in it, in natural order of their paths."""
+    """Every image in ``folder`` and its subfolders, in natural order of their paths."""
     folders = [folder, *(path for path in folder.rglob("*") if path.is_dir())]
     files = [file for one in folders for file in images_in(one)]
     return sorted(files, key=lambda file: natural_key(file.relative_to(folder).as_posix()))
 
 
 def camera_folders(folder: Path) -> dict[str, Path]:
-    """``cam00``, ``cam01`` and so on, by name, with the folder their pictures lie in."""
+    """``cam00``, ``cam01`` and so on, by name, with the folder of their images."""
     found = {}
     for path in folder.iterdir():
         if path.is_dir() and _CAMERA.fullmatch(path.name):

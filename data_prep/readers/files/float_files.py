@@ -1,4 +1,4 @@
-"""Pictures and depth that are stored as numbers: OpenEXR and NumPy files; axes ``h w c``."""
+"""Floating-point images and depth in OpenEXR and NumPy files; axes ``h w c``."""
 
 import io
 from contextlib import redirect_stdout
@@ -18,7 +18,7 @@ _PRINTING = Lock()
 
 
 def npy_array(file: Path) -> np.ndarray:
-    """The numbers of a NumPy file, read from disk when they are used.
+    """The array of a NumPy file, memory mapped.
 
     Raises:
         FileFormatError: missing, damaged, cut off, or not of numbers.

@@ -1,7 +1,7 @@
-"""One picture in a file: 8-bit PNG, JPEG and so on, or numbers in OpenEXR or NumPy files.
+"""Image files: 8-bit formats such as PNG and JPEG, or floating-point OpenEXR and NumPy files.
 
-Pictures are taken as stored: EXIF orientation is not applied, since structure from motion does not
-either. Numbers are taken as RGB in [0, 1]; NaN means that a pixel says nothing.
+EXIF orientation is not applied, since structure from motion does not apply it either. Floating
+point values are RGB in [0, 1]; NaN marks an invalid pixel.
 """
 
 import warnings
@@ -27,7 +27,7 @@ from diff4splat.io.existing import require_file
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pixels:
-    """What a picture holds, before anything is made of it."""
+    """Decoded pixels of an image."""
 
     rgb: Float32[np.ndarray, "h w 3"]
     """NaN where the file has NaN."""
@@ -39,18 +39,18 @@ class Pixels:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageFile:
-    """A picture that is read when it is asked for."""
+    """An image, decoded on demand."""
 
     file: Path
 
     @property
     def where(self) -> str:
-        """For messages."""
+        """Name for error messages."""
         return str(self.file)
 
     @property
     def is_float(self) -> bool:
-        """Stored as numbers, where NaN may stand."""
+        """Whether values are floating point, possibly NaN."""
         return self.file.suffix.lower() in FLOAT_SUFFIXES
 
     def size_px(self) -> tuple[int, int]:
@@ -77,7 +77,7 @@ class ImageFile:
             return image.has_transparency_data
 
     def read(self) -> Pixels:
-        """The whole picture.
+        """Decode the image.
 
         Raises:
             FileFormatError: missing, damaged, or with channels that are no colours.

@@ -1,4 +1,4 @@
-"""A store that forgets what was not used for longest when it grows too large."""
+"""A least-recently-used cache with a memory limit."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class LruCache:
-    """Arrays by key, of at most ``max_bytes`` together; safe between threads."""
+    """Arrays by key, at most ``max_bytes`` in total; thread-safe."""
 
     def __init__(self, max_bytes: int) -> None:
         self._most_bytes = max_bytes
@@ -17,15 +17,15 @@ class LruCache:
         self._lock = Lock()
 
     def get(self, key: Hashable) -> tuple[np.ndarray, ...] | None:
-        """What was put there, if it is still known."""
+        """The cached arrays; None if absent."""
         with self._lock:
-            found = self._arrays.get(key)
-            if found is not None:
+            arrays = self._arrays.get(key)
+            if arrays is not None:
                 self._arrays.move_to_end(key)
-            return found
+            return arrays
 
     def put(self, key: Hashable, arrays: tuple[np.ndarray, ...]) -> None:
-        """Keep ``arrays`` and forget others where needed."""
+        """Cache ``arrays`` and evict the least recently used ones beyond the limit."""
         with self._lock:
             self._bytes += _size(arrays) - _size(self._arrays.pop(key, ()))
             self._arrays[key] = arrays

@@ -1,6 +1,6 @@
-"""Point clouds to start from: PLY files of any program, and plain NumPy arrays.
+"""Point clouds from PLY files and NumPy arrays.
 
-Axes: ``p`` points. Points that are not finite are dropped; a cloud without points is none.
+Axes: ``p`` points. Non-finite points are dropped; an empty cloud is None.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ DEFAULT_GREY = 0.5
 """For points without colours."""
 
 CloudWithNotes = tuple[PointCloud | None, tuple[str, ...]]
-"""The cloud and what to say about it."""
+"""The cloud and notes about it."""
 
 
 def cloud_from_arrays(

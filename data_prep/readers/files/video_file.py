@@ -1,7 +1,7 @@
-"""Frames of a video, decoded in order; what was passed lately is kept, in a bounded store.
+"""Frames of a video, decoded in order, with a bounded cache of recent frames.
 
-Asking for an earlier frame than the last one starts the video again: seeking is inexact in common
-codecs. So going through a video in order is fast, and jumping about in a long one is not.
+Reading an earlier frame restarts the video, since seeking is inexact in common codecs. Sequential
+access is therefore fast, and random access in a long video is slow.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ CACHE_BYTES = 1 << 30
 
 
 class VideoFile:
-    """One video; ``shrink`` makes each so many by so many pixels their mean, in 8 bits."""
+    """One video, downscaled by ``shrink`` to 8-bit block means."""
 
     def __init__(self, file: Path, shrink: int, cache: LruCache) -> None:
         """Look at the head of the file.
@@ -100,7 +100,7 @@ class VideoFrame:
 
     @property
     def where(self) -> str:
-        """For messages."""
+        """Name for error messages."""
         return f"{self.video.file}: frame {self.frame}"
 
     @property

@@ -1,4 +1,4 @@
-"""Which folders hold ``camera.json``: one camera, several, or data sets of effects."""
+"""Folders with ``camera.json``: one camera, several, or data sets of effects."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +10,15 @@ from diff4splat.paths.names import unknown_name
 
 DATASET, DATASET_FORMAT = "dataset.json", "diff4splat-camera-dataset"
 _HEAD_BYTES = 256
-"""Where the mark of a format stands."""
+"""Length of the file start that contains the format name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFolders:
-    """What was found."""
+    """The camera folders inside a folder."""
 
     folder: Path
-    """Where it was looked for."""
+    """The searched folder."""
     plain: tuple[Path, ...] = ()
     """One per camera."""
     sets: tuple[Path, ...] = ()
@@ -26,10 +26,10 @@ class CameraFolders:
 
     @property
     def found(self) -> bool:
-        """Whether there is anything."""
+        """Whether there is any camera."""
         return bool(self.plain or self.sets)
 
-    def chosen(self, effect: str | None, name: str) -> tuple[Path, ...]:
+    def select(self, effect: str | None, name: str) -> tuple[Path, ...]:
         """One folder per camera.
 
         Raises:
@@ -52,7 +52,7 @@ class CameraFolders:
 
 
 def camera_folders(folder: Path) -> CameraFolders:
-    """What lies in ``folder``; a camera of its own goes before those below."""
+    """Search ``folder``; a camera in it has priority over subfolders."""
     if _is_marked(folder / FILE, FORMAT):
         return CameraFolders(folder=folder, plain=(folder,))
     if _is_marked(folder / DATASET, DATASET_FORMAT):
@@ -76,7 +76,7 @@ def _folders_in(folder: Path) -> list[Path]:
 
 
 def _is_marked(file: Path, mark: str) -> bool:
-    """A glance: what is damaged further on is told by whoever reads the file."""
+    """Check the start of the file only; the reader reports later damage."""
     try:
         with file.open("rb") as stream:
             return f'"{mark}"'.encode() in stream.read(_HEAD_BYTES)

@@ -1,4 +1,4 @@
-"""Our own physical cameras: ``camera.json`` beside its pictures, of one camera or of several.
+"""Physical cameras of this library: ``camera.json`` and images of one or several cameras.
 
     folder/camera.json                      one camera
     folder/<camera>/camera.json             several
@@ -36,22 +36,22 @@ EXPECTED_FILES = (
 )
 
 _ROUNDING = 1e-4
-"""How far a frame may be from the way of its camera, in rotation entries and shares of distance."""
+"""Largest deviation of a frame from the track, in rotation entries and shares of distance."""
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     return camera_folders(folder).found
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> Capture:
-    """What the files say.
+    """Read the capture.
 
     Raises:
         FileFormatError: naming the file and value, or what differs between the cameras.
         ConfigError: no such effect or camera, or a downscale that the shutter does not allow.
     """
-    folders = camera_folders(location.folder).chosen(options.clip, location.name)
+    folders = camera_folders(location.folder).select(options.clip, location.name)
     records = [read_camera_record(folder / FILE) for folder in folders]
     _require_same_optics(records, folders)
     shots = [
@@ -71,14 +71,14 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
         background=options.background,
         notes=(*_notes(records, folders), *repeated),
     )
-    made = replace(assemble_capture(draft, options), license=_licenses(records))
+    capture = replace(assemble_capture(draft, options), license=_licenses(records))
     optics = first.filmed.optics
     if optics_json(optics) == optics_json(Optics()):
-        return made
+        return capture
     height, width = first.filmed.path.cameras.size_px
     tracks = {number: record.filmed.track for number, record in enumerate(records)}
     return replace(
-        made,
+        capture,
         optics=downscale_optics(optics, (height, width), options.downscale, location.name),
         tracks={number: track for number, track in tracks.items() if track is not None},
     )
@@ -87,10 +87,10 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
 def _shots(record: CameraRecord, folder: Path, number: int) -> list[Shot]:
     _require_frames_on_track(record, folder / FILE)
     path, where = record.filmed.path, str(folder / FILE)
-    mask = None if record.valid is None else _there(folder, record.valid, where)
+    mask = None if record.valid is None else _existing(folder, record.valid, where)
     return [
         Shot(
-            image=ImageFile(file=_there(folder, taken.picture, where)),
+            image=ImageFile(file=_existing(folder, taken.picture, where)),
             lens=Intrinsics(
                 focal_px=tuple(path.cameras.focal_px[index].tolist()),
                 center_px=tuple(path.cameras.center_px[index].tolist()),
@@ -102,13 +102,13 @@ def _shots(record: CameraRecord, folder: Path, number: int) -> list[Shot]:
             mask=mask,
             depth=None
             if taken.geometry is None or record.geometry != "depth"
-            else DepthFile(file=_there(folder, taken.geometry, where)),
+            else DepthFile(file=_existing(folder, taken.geometry, where)),
         )
         for index, taken in enumerate(record.frames)
     ]
 
 
-def _there(folder: Path, name: str, where: str) -> Path:
+def _existing(folder: Path, name: str, where: str) -> Path:
     file = resolve_inside(folder, name, where)
     if not file.is_file():
         raise FileFormatError(f"{where}: expected the file {file}, got no such file; copy it again")
@@ -116,7 +116,7 @@ def _there(folder: Path, name: str, where: str) -> Path:
 
 
 def _require_frames_on_track(record: CameraRecord, file: Path) -> None:
-    """Frames are where the camera's way has them.
+    """Require frame poses that agree with the camera track.
 
     Raises:
         FileFormatError: naming the first that is not.
@@ -136,7 +136,7 @@ def _require_frames_on_track(record: CameraRecord, file: Path) -> None:
 
 
 def _require_same_optics(records: Sequence[CameraRecord], folders: Sequence[Path]) -> None:
-    """One capture has one lens, aperture, shutter and exposure.
+    """Require one lens, aperture, shutter and exposure for all cameras.
 
     Raises:
         FileFormatError: naming what differs, and where.
@@ -155,7 +155,7 @@ def _require_same_optics(records: Sequence[CameraRecord], folders: Sequence[Path
 
 
 def _flat(value: object, name: str = "optics") -> dict[str, object]:
-    """Values by dotted names; formulas follow from the model."""
+    """Values by dotted names, without the redundant formulas."""
     if not isinstance(value, dict):
         return {name: value}
     own = ((key, inner) for key, inner in value.items() if key != "formula")
@@ -163,15 +163,15 @@ def _flat(value: object, name: str = "optics") -> dict[str, object]:
 
 
 def _without_repeats(shots: list[Shot]) -> tuple[list[Shot], tuple[str, ...]]:
-    """Without held-out pictures whose view and time are learnt from; paths often share a start."""
-    learnt = {_moment(shot) for shot in shots if not shot.held_out}
-    kept = [shot for shot in shots if not (shot.held_out and _moment(shot) in learnt)]
+    """Drop held-out frames whose view and time are in training; paths often share a start."""
+    training = {_view_key(shot) for shot in shots if not shot.held_out}
+    kept = [shot for shot in shots if not (shot.held_out and _view_key(shot) in training)]
     left = len(shots) - len(kept)
     note = f"{left} held-out pictures were left out: training sees the same view at the same time"
     return kept, (note,) if left else ()
 
 
-def _moment(shot: Shot) -> tuple[float, ...]:
+def _view_key(shot: Shot) -> tuple[float, ...]:
     return (shot.time_s, *shot.world_from_camera.flatten().tolist())
 
 

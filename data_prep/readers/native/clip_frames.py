@@ -1,6 +1,6 @@
-"""Pictures of a clip that lies in memory, with depth and flow.
+"""Frames of a clip in memory, with depth and flow.
 
-Axes: ``h w`` pixels. Frames count view by view, in each the times in order.
+Axes: ``h w`` pixels. Frames are ordered by view, then by time.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from diff4splat.io.pixels import unit_rgb
 
 
 class ClipFrames:
-    """Frames of all views; blocks of ``factor`` by ``factor`` pixels become one."""
+    """Frames of all views, downscaled by ``factor``."""
 
     def __init__(self, views: Sequence[View], factor: int) -> None:
         self._views, self._factor, self._times = tuple(views), factor, len(views[0].rgb)
@@ -28,7 +28,7 @@ class ClipFrames:
         return len(self._views) * self._times
 
     def read(self, index: int) -> Frame:
-        """The picture of frame ``index``.
+        """Read frame ``index``.
 
         Raises:
             InputError: there is no such frame.

@@ -1,7 +1,7 @@
-"""Our own clips: one out of a folder of shards; every view is a camera, with depth and flow.
+"""One clip of a clip folder of this library; every view is a camera, with depth and flow.
 
-Tracks are not read: a capture has no place for them. The last view is held out unless a person
-says otherwise; of a clip with one view, every eighth time is.
+Tracks are not read, since a capture has none. By default the last view is held out, or every eighth
+time of a clip with one view.
 """
 
 from dataclasses import replace
@@ -36,7 +36,7 @@ _LISTED = 5
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     try:
         return read_object(folder / MANIFEST).get("format") == "diff4splat-clips"
     except FileFormatError:
@@ -44,7 +44,7 @@ def matches(folder: Path) -> bool:
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> Capture:
-    """The capture of one clip, whose pictures stay in memory as bytes.
+    """The capture of one clip; its images stay in memory as bytes.
 
     Raises:
         ConfigError: no such clip, several and none is named, or no such camera.
@@ -53,7 +53,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
     clips = ClipFolder(location.folder)
     position = _position(clips, options.clip, location.name)
     taken = range(0, clips.entries[position].frames, options.frame_step)
-    # Flow goes to the next frame; where that is not taken, there is none.
+    # Flow refers to the next frame, which a frame step skips.
     with_flow = options.frame_step == 1
     part = ClipPart(frames=tuple(taken), flow=with_flow, instances=False, tracks=False)
     clip = clips.clip(position, part)

@@ -1,8 +1,7 @@
-"""What a folder of Nerfies or HyperNeRF says of all its pictures: world, sizes and roles.
+"""Files that all images of a Nerfies or HyperNeRF folder share: world, sizes and split.
 
-``scene.json`` has the centre and scale that carry the world of the files into that of the capture,
-position' = scale · (position − centre); ``rgb/2x`` has pictures of half the size, and so on;
-``dataset.json`` says which pictures are for what.
+``scene.json`` has the centre and scale of the capture, position' = scale · (position − centre);
+``rgb/2x`` has images of half the size, and so on; ``dataset.json`` has the split.
 """
 
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from diff4splat.errors import FileFormatError
 from diff4splat.paths.formats.json_fields import numbers, optional_number
 
 _EVERY, _AFTER = 4, 2
-"""Without val_ids: every fourth picture is learnt from, the second after each is held out."""
+"""Without val_ids: every fourth image is for training, the second after each is held out."""
 _USUAL = (
     "no val_ids in dataset.json: as is usual then, every 4th picture is learnt from, the 2nd after "
     "each is held out, and those between are left out"
@@ -26,18 +25,18 @@ _USUAL = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldTransform:
-    """From the world of the files to that of the capture."""
+    """Maps the world of the files to that of the capture."""
 
     center: Float[Tensor, "3"]
     scale: float
 
     def carried(self, positions: Float[Tensor, "n 3"]) -> Float[Tensor, "n 3"]:
-        """Positions in the capture."""
+        """Positions in the world of the capture."""
         return (positions - self.center) * self.scale
 
 
 def read_world_transform(folder: Path) -> WorldTransform:
-    """What ``scene.json`` says; without one, nothing is changed.
+    """Read ``scene.json``; the identity without one.
 
     Raises:
         FileFormatError: it is damaged.
@@ -57,7 +56,7 @@ def read_world_transform(folder: Path) -> WorldTransform:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageFolder:
-    """The one that is read."""
+    """The image folder in use."""
 
     folder: Path
     size: int

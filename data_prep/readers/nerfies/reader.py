@@ -1,4 +1,4 @@
-"""Nerfies and HyperNeRF: pictures with a camera file each, and JSON that says which is what.
+"""Nerfies and HyperNeRF: images with one camera file each, and JSON metadata.
 
 ``metadata.json`` gives each picture a camera and a ``warp_id`` that counts times; ``points.npy``
 has points in the world of the cameras' files (https://github.com/google/nerfies#datasets).
@@ -46,13 +46,13 @@ DEFAULT_FPS = 15.0
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     names = ("dataset.json", "metadata.json")
     return (folder / "camera").is_dir() and all((folder / name).is_file() for name in names)
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
-    """What the files say.
+    """Read the capture.
 
     Raises:
         FileFormatError: naming the file and picture.

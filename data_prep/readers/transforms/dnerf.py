@@ -1,8 +1,8 @@
 """D-NeRF: ``transforms_train.json``, ``transforms_val.json`` and ``transforms_test.json``.
 
 Poses have OpenGL camera axes; ``camera_angle_x`` is the horizontal field of view in radians;
-``time`` runs from 0 to 1 and is kept; transparency lies over white (Pumarola et al., CVPR 2021).
-The files are what is counted when cameras are held out: 0 is train, 1 is val, 2 is test.
+``time`` runs from 0 to 1 and is kept; the background is white (Pumarola et al., CVPR 2021).
+``hold_out`` counts the files: 0 is train, 1 is val, 2 is test.
 """
 
 from collections.abc import Sequence
@@ -35,12 +35,12 @@ _LEGO = (
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     return _file(folder, "train").is_file()
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
-    """What the files say.
+    """Read the capture.
 
     Raises:
         ConfigError: a file that is not there is to be held out, or train is.
@@ -134,5 +134,5 @@ def _file(folder: Path, split: str) -> Path:
 
 
 def _there(location: CaptureLocation) -> list[str]:
-    """Splits that could be held out; the data set's own is first."""
+    """Splits that can be held out; the test split of the data set is first."""
     return [split for split in ("test", "val") if _file(location.folder, split).is_file()]

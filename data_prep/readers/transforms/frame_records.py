@@ -1,7 +1,7 @@
 """Frames of ``transforms*.json``: poses, times and files, for D-NeRF and nerfstudio alike.
 
 Axes: ``f`` frames. ``transform_matrix`` is world_from_camera with OpenGL camera axes (x right,
-y up, z back); a frame's own value goes before the one given for all.
+y up, z back); a value of a frame overrides the one given for all.
 """
 
 from collections import ChainMap
@@ -27,7 +27,7 @@ from diff4splat.paths.formats.transforms_json import pose_matrix
 
 
 def load_frames(file: Path) -> tuple[dict[str, object], list[FrameRecord]]:
-    """The file's object and its frames, each with what is given for all mixed in.
+    """The top-level object and the frames, each merged with the values given for all.
 
     Raises:
         FileFormatError: missing, not JSON, or without frames.

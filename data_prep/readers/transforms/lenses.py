@@ -1,4 +1,4 @@
-"""Lenses of ``transforms*.json``: pinholes that bend a little, fisheyes and whole spheres.
+"""Lenses of ``transforms*.json``: distorted pinholes, fisheyes and equirectangular images.
 
 ``camera_model`` is that of nerfstudio; instant-ngp's ``is_fisheye`` means the same fisheye. Of a
 sphere ``fl_x`` is half the width and ``fl_y`` the height: longitude is π (x − c_x) / fl_x, latitude
@@ -34,17 +34,17 @@ def record_intrinsics(frame: FrameRecord, picture_px: tuple[int, int]) -> Intrin
     model = frame.fields.get("camera_model")
     name = model.upper() if isinstance(model, str) else ""
     if name == "EQUIRECTANGULAR":
-        return _sphere(frame, size_px)
+        return _equirectangular(frame, size_px)
     if name == "OPENCV_FISHEYE" or frame.fields.get("is_fisheye") is True:
         return _fisheye(frame, size_px)
-    return _bent(frame, size_px)
+    return _distorted(frame, size_px)
 
 
-def _bent(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics:
+def _distorted(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics:
     record, where = frame.fields, frame.where
     _require_focal(frame, (*_LENGTHS, *_ANGLES))
     k1, k2, k3, p1, p2 = (optional_number(record, key, where) or 0.0 for key in _STRAIGHTENED)
-    straight = _straight(record, where, size_px, _STRAIGHTENED)
+    straight = _undistorted(record, where, size_px, _STRAIGHTENED)
     return replace(straight, radial=(k1, k2, k3), tangential=(p1, p2))
 
 
@@ -53,11 +53,11 @@ def _fisheye(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics:
     # A field of view is a focal length by the formula of a pinhole alone.
     _require_focal(frame, _LENGTHS)
     k1, k2, k3, k4 = (optional_number(record, key, where) or 0.0 for key in _POLYNOMIAL)
-    straight = _straight(record, where, size_px, (*_POLYNOMIAL, *_ANGLES, "camera_model"))
+    straight = _undistorted(record, where, size_px, (*_POLYNOMIAL, *_ANGLES, "camera_model"))
     return require_fisheye(replace(straight, model="fisheye", fisheye=(k1, k2, k3, k4)), where)
 
 
-def _sphere(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics:
+def _equirectangular(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics:
     height, width = size_px
     whole = {"fl_x": width / 2, "fl_y": height, "cx": width / 2, "cy": height / 2}
     for key, value in whole.items():
@@ -69,7 +69,7 @@ def _sphere(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics:
                 "number"
             )
     plain = {"camera_model", *_LENGTHS, *_ANGLES, "cx", "cy"}
-    middle = _straight(frame.fields, frame.where, size_px, tuple(plain))
+    middle = _undistorted(frame.fields, frame.where, size_px, tuple(plain))
     per_radian = (width / (2 * math.pi), height / math.pi)
     return replace(middle, focal_px=per_radian, model="equirectangular")
 
@@ -81,7 +81,7 @@ def _require_focal(frame: FrameRecord, keys: tuple[str, ...]) -> None:
         )
 
 
-def _straight(
+def _undistorted(
     record: Record, where: str, size_px: tuple[int, int], known: tuple[str, ...]
 ) -> Intrinsics:
     """Without what is ``known`` to be more than a pinhole; whatever else is more is refused."""

@@ -1,7 +1,7 @@
 """nerfstudio's ``transforms.json`` with a ``time`` per frame.
 
-Poses have OpenGL camera axes. Beside each picture there may be a mask (black covers), depth, and
-the file may name points to start from and which frames are for what
+Poses have OpenGL camera axes. An image may have a mask (black is invalid) and depth, and
+the file may name initial points and a split
 (https://docs.nerf.studio/quickstart/data_conventions.html). Fisheye frames stay fisheye frames.
 """
 
@@ -36,12 +36,12 @@ _NO_TIME = "add the seconds of every picture, or give fps if the frames stand in
 
 
 def matches(folder: Path) -> bool:
-    """Whether ``folder`` looks like it."""
+    """Whether ``folder`` has this format."""
     return (folder / "transforms.json").is_file()
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
-    """What the file says.
+    """Read the capture.
 
     Raises:
         FileFormatError: naming the file and frame.
@@ -119,7 +119,7 @@ def _time_note(frames: list[FrameRecord], fps: float | None) -> tuple[str, ...]:
 
 
 def _depth_note(frames: list[FrameRecord], shot: Shot) -> tuple[str, ...]:
-    """Rays have length one in nerfstudio where pixels are angles, so depth there is distance."""
+    """Depth of fisheye and equirectangular frames is distance in nerfstudio, not z."""
     given = any(frame.fields.get("depth_file_path") is not None for frame in frames)
     if not (given and shot.lens.keeps_projection):
         return ()
@@ -162,7 +162,7 @@ def _require_known(lists: dict[str, set[str]], names: list[str], file: Path) -> 
 def _split(
     shots: list[Shot], names: list[str], lists: dict[str, set[str]]
 ) -> tuple[list[Shot], tuple[str, ...]]:
-    """Frames of the lists; where one side has no list, it is all that the other has not."""
+    """Frames of the lists; a missing list is the complement of the other."""
     learnt, held = lists[_LEARNT], lists[_HELD[0]] | lists[_HELD[1]]
     learnt, held = learnt or set(names) - held, held or set(names) - learnt
     kept = [
