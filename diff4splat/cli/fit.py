@@ -1,4 +1,4 @@
-"""``diff4splat fit``: posed, timed pictures of one scene to a scene file, with a quality card.
+"""``diff4splat fit``: fits a scene to posed, timed images and reports its quality.
 
 DATA ── read_capture ── fit_scene (coarse, fine) ── write_results
 """
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CaptureOptions:
-    """How the data are read."""
+    """How the capture is read."""
 
     format: str = "auto"
-    """dnerf, neu3d, hypernerf, colmap, transforms, clips or cameras; auto looks at the files."""
+    """dnerf, neu3d, hypernerf, colmap, transforms, clips or cameras; auto detects it."""
     hold_out: tuple[int, ...] | None = None
     """Cameras to hold out, from 0; if left out, the rule of the format."""
     downscale: int = 1
-    """Make pictures so many times smaller."""
+    """Downscale images by this factor."""
     frame_step: int = 1
-    """Take only every so manieth time."""
+    """Use every n-th time only."""
     fps: float | None = None
     """Frames per second, for formats that only count frames."""
     clip: str | None = None
@@ -40,10 +40,10 @@ class CaptureOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """Fit a scene to a video from several sides, or from a moving camera; run again to go on."""
+    """Fit a scene to multi-view or moving-camera video; the same command resumes a stopped fit."""
 
     data: Annotated[Path, tyro.conf.Positional]
-    """Folder or file with pictures, poses and times."""
+    """Folder or file with images, poses and times."""
     out: Path = Path("fit")
     """Folder for the scene, its card, a video, a comparison and the checkpoint."""
     motion: Literal["hexplane", "spacetime", "static"] = "hexplane"
@@ -54,24 +54,24 @@ class Fit:
     init: Path | None = None
     """Start from this scene file, such as a generated one, in place of points."""
     budget: int = 40_000
-    """Never more Gaussians than this."""
+    """Largest number of Gaussians."""
     steps: int | None = None
-    """Of the fine stage; if left out, the default of the motion."""
+    """Steps of the fine stage; default: 2500."""
     minutes: float | None = None
-    """Save and stop after so many minutes of this call."""
+    """Time limit of this call in minutes; the fit is saved and can be resumed."""
     no_depth: bool = False
-    """Do not use depth where the data have it."""
+    """Ignore depth in the data."""
     renderer: Literal["auto", "trace", "raster", "reference", "gsplat"] = "auto"
-    """What makes pictures; auto follows rays where cameras are more than pinholes, else draws."""
+    """Renderer; auto traces rays if cameras differ from pinholes, and rasterises otherwise."""
     learn: tuple[Literal["lens", "focus", "aperture", "readout", "focal"], ...] = ()
-    """Parts of the cameras that are recovered together with the scene, from a first guess in the
-    data: lens coefficients, focus distance, aperture radius, read-out time, focal length."""
+    """Camera parameters to optimise together with the scene, from an initial guess in the data:
+    lens coefficients, focus distance, aperture radius, read-out time, focal length."""
     seed: int = 0
-    """Points, order of frames and splits derive from it."""
+    """Seed of points, frame order and splits."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
-    """Changes such as weights.ssim=0.2 or rates.means.first=1e-3; may be given again."""
+    """Override settings, such as weights.ssim=0.2 or rates.means.first=1e-3; repeatable."""
     restart: bool = False
-    """Forget what an earlier call left in the folder."""
+    """Start again instead of resuming from the folder."""
 
     def run(self) -> None:
         """Check, read, fit, write."""
@@ -124,7 +124,7 @@ class Fit:
             note("time is up; the same command goes on")
 
     def settings(self) -> "FitSettings":
-        """Checked before anything is read."""
+        """The settings, checked before any data are read."""
         from dataclasses import replace
 
         from diff4splat.fitting.settings import FitSettings
@@ -150,13 +150,13 @@ class Fit:
         return read_capture(self.data, ReadOptions(**asdict(self.options)))
 
     def initial_scene(self) -> "Scene | None":
-        """What to start from."""
+        """The initial scene, if any."""
         from diff4splat.io.scene_file import load_scene
 
         return None if self.init is None else load_scene(self.init)
 
     def inputs(self) -> dict[str, object]:
-        """Every option as given, for the card."""
+        """All options as given, for ``card.json``."""
         given = {name: value for name, value in asdict(self).items() if name != "options"}
         given |= asdict(self.options)
         return {
@@ -165,7 +165,7 @@ class Fit:
 
 
 def recovered(learned: "Mapping[str, Mapping[str, object]]") -> list[str]:
-    """One line for each part of the cameras that was learned."""
+    """One line per learned camera parameter."""
     return [
         f"{name}: {shown(found['start'])} at the start, {shown(found['recovered'])} recovered"
         for name, found in learned.items()
@@ -173,7 +173,7 @@ def recovered(learned: "Mapping[str, Mapping[str, object]]") -> list[str]:
 
 
 def shown(value: "float | list[float]") -> str:
-    """A number, or several, in four digits."""
+    """One or several numbers with four digits."""
     values = value if isinstance(value, list) else [value]
     return ", ".join(f"{one:.4g}" for one in values)
 
