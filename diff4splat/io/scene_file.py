@@ -1,7 +1,7 @@
 """The scene file: one versioned ``.safetensors`` with Gaussians, motion, path and provenance.
 
-Axes: ``n`` Gaussians, ``k`` harmonics, ``t`` frames of the path. docs/reference/scene-format.md has every
-tensor. Only what moves is stored with keys; equal scenes give equal bytes.
+Axes: ``n`` Gaussians, ``k`` harmonics, ``t`` frames of the path. Every tensor is listed in
+docs/reference/scene-format.md. Only what moves is stored with keys; equal scenes give equal bytes.
 """
 
 from collections.abc import Mapping
