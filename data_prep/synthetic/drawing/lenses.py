@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.drawing.compiled import kernel
+from diff4splat.data_prep.synthetic.drawing.jit import kernel
 from diff4splat.geometry.camera import Camera
 
 

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.drawing.compiled import shared
 from diff4splat.data_prep.synthetic.drawing.noise import flat_octaves, fraction, hashed
 from diff4splat.data_prep.synthetic.drawing.numerics import blend, clamp, fading, held
+from diff4splat.kernels.jit import shared
 
 _LETTERS = """
 01110 10001 10001 11111 10001 10001 10001  11110 10001 10001 11110 10001 10001 11110

@@ -1,6 +1,6 @@
 """Kernel: vertex normals, each triangle weighted by its area."""
 
-from diff4splat.data_prep.synthetic.drawing.compiled import kernel
+from diff4splat.data_prep.synthetic.drawing.jit import kernel
 from diff4splat.data_prep.synthetic.drawing.numerics import cross, unit
 
 

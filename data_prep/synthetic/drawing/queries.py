@@ -8,9 +8,10 @@ looks at those in its rows only.
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from diff4splat.data_prep.synthetic.drawing.compiled import inlined, kernel
+from diff4splat.data_prep.synthetic.drawing.jit import kernel
 from diff4splat.data_prep.synthetic.drawing.lenses import Lens
 from diff4splat.data_prep.synthetic.drawing.rasterise import NEAR_M, bounds, edges, touch, within
+from diff4splat.kernels.jit import inlined
 
 _IN_FRONT = 1.0 + 1e-4
 

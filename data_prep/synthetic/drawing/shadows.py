@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.drawing.compiled import inlined, kernel, shared
 from diff4splat.data_prep.synthetic.drawing.gather import Stage
+from diff4splat.data_prep.synthetic.drawing.jit import kernel
 from diff4splat.data_prep.synthetic.drawing.lenses import Grid
 from diff4splat.data_prep.synthetic.drawing.numerics import clamp, dot
 from diff4splat.data_prep.synthetic.drawing.rasterise import blank, rasterise
+from diff4splat.kernels.jit import inlined, shared
 
 _TURN_X, _TURN_Y = -0.7373688780783197, 0.6754902942615238
 """The golden angle: points of a spiral cover a disc evenly (Vogel 1979)."""

@@ -6,11 +6,11 @@ import numpy as np
 
 from diff4splat.data_prep.synthetic.drawing import textures_made as made
 from diff4splat.data_prep.synthetic.drawing import textures_natural as natural
-from diff4splat.data_prep.synthetic.drawing.compiled import shared
 from diff4splat.data_prep.synthetic.drawing.gather import Stage
 from diff4splat.data_prep.synthetic.drawing.lettering import lettering
 from diff4splat.data_prep.synthetic.world import Texture
 from diff4splat.errors import ConfigError
+from diff4splat.kernels.jit import shared
 
 FAMILIES = (
     "plain", "noise", "wood", "brick", "checker", "leaves", "fabric", "marble", "lettering",

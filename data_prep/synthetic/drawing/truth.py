@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 
-from diff4splat.data_prep.synthetic.drawing.compiled import kernel
 from diff4splat.data_prep.synthetic.drawing.gather import Stage
+from diff4splat.data_prep.synthetic.drawing.jit import kernel
 from diff4splat.data_prep.synthetic.drawing.lenses import Lens, grid_of, to_camera
 from diff4splat.data_prep.synthetic.drawing.queries import visible
 from diff4splat.data_prep.synthetic.drawing.rasterise import NEAR_M, blank, rasterise, weights

@@ -49,9 +49,9 @@ def render(job: RenderJob) -> RenderOutput:
     """Make the pictures that ``job`` asks for."""
     # Numba is loaded with the first picture, not with the library.
     from diff4splat.render.raster.function import rasterize
-    from diff4splat.render.raster.warm import ensure_compiled
+    from diff4splat.render.raster.jit import GROUP
 
-    ensure_compiled()
+    GROUP.ensure_compiled()
     medians = "median_depth" in job.outputs
     with torch.autocast("cpu", enabled=False):
         depth, extras = _depth_and_extras(job)
@@ -68,11 +68,11 @@ def open_sequence(scene: Scene, job: RenderJob) -> Callable[[Camera, float], Ren
     """
     if not job.outputs <= _SHARED_OUTPUTS or _wants_gradient(job):
         return None
+    from diff4splat.render.raster.jit import GROUP
     from diff4splat.render.raster.plan import make_view
     from diff4splat.render.raster.sequence import Sequence
-    from diff4splat.render.raster.warm import ensure_compiled
 
-    ensure_compiled()
+    GROUP.ensure_compiled()
     medians = "median_depth" in job.outputs
     depths = "depth" in job.outputs
     plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, 2 if depths else 0)

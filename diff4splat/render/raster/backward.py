@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster.blend_backward import blend_backward, sum_slots
 from diff4splat.render.raster.canvas import Canvas, empty
 from diff4splat.render.raster.forward import (
@@ -24,7 +25,6 @@ from diff4splat.render.raster.harmonics import colors_backward
 from diff4splat.render.raster.plan import Plan
 from diff4splat.render.raster.project_backward import CAMERA_COLUMNS, POSITION, project_backward
 from diff4splat.render.raster.tables import MOMENTS, Cloud, Doubles, Floats, View
-from diff4splat.render.raster.threads import ranges, spread
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +76,7 @@ def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradi
                 grads.means, camera[part, POSITION:],
             )  # fmt: skip
 
-    spread(work, numbered(parts))
+    parallel_for(work, numbered(parts))
     return Gradients(cloud=grads, sh=sh_grads, values=value_grads, camera=camera.sum(0))
 
 
@@ -98,5 +98,5 @@ def _blend_backward(
     def add(first: int, last: int) -> None:
         sum_slots(first, last, order, filled.first_slots, slots, moments, value_grads)
 
-    spread(blend_tiles, ranges(len(tiles), TILES_PER_PART))
-    spread(add, ranges(len(order), GAUSSIANS_PER_PART))
+    parallel_for(blend_tiles, ranges(len(tiles), TILES_PER_PART))
+    parallel_for(add, ranges(len(order), GAUSSIANS_PER_PART))

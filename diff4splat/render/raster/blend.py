@@ -12,8 +12,8 @@ sixteen lanes), so that it stays in the first-level cache and every access is on
 
 import numpy as np
 
-from diff4splat.render.raster.jit import device, exact, kernel
-from diff4splat.render.raster.lanes import (
+from diff4splat.kernels.jit import contracted, inlined
+from diff4splat.kernels.simd16 import (
     LANES,
     any_of,
     count,
@@ -24,7 +24,7 @@ from diff4splat.render.raster.lanes import (
     minimum,
     select,
 )
-from diff4splat.render.raster.memory import (
+from diff4splat.kernels.simd_memory import (
     BLOCK_COLUMNS,
     BLOCK_ROWS,
     aligned_floats,
@@ -35,6 +35,7 @@ from diff4splat.render.raster.memory import (
     store,
     store_block,
 )
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.tables import (
     CENTER_X,
     CENTER_Y,
@@ -78,7 +79,7 @@ def blend(tiles, grid, lists, prints, values, rules, planes, light, stops, media
             _finish_median(state, tile, grid, lists.members, first, median)
 
 
-@device
+@contracted
 def plane_stride(grid):
     """From plane to plane of a tile's state: not a multiple of 4 KiB.
 
@@ -88,7 +89,7 @@ def plane_stride(grid):
     return grid.edge * grid.edge + 5 * LANES
 
 
-@device
+@contracted
 def _begin(state, tile, grid, channels):
     """Full light inside the picture, none in the padding; returns the number of pixels."""
     size, live = plane_stride(grid), 0
@@ -108,7 +109,7 @@ def _begin(state, tile, grid, channels):
     return live
 
 
-@device
+@contracted
 def _add(state, tile, grid, prints, values, i, rules, rank, median):
     """Blend one Gaussian into the blocks its box touches; returns how many pixels went dark."""
     left, top = corner(tile, grid)
@@ -147,7 +148,7 @@ def _add(state, tile, grid, prints, values, i, rules, rank, median):
     return stopped
 
 
-@exact
+@inlined
 def start_column(prints, i, left, top, column, block_row):
     """log2 o - u² of a column of blocks, u, and v of its block in ``block_row``.
 
@@ -161,13 +162,13 @@ def start_column(prints, i, left, top, column, block_row):
     return less_product(prints[i, LOG2_OPACITY], u, u), u, v
 
 
-@device
+@contracted
 def _note_median(state, place, before, after, rank):
     half = (before > 0.5) & (after <= 0.5)
     store(state, place, select(half, fill(np.float32(rank)), load(state, place)))
 
 
-@device
+@contracted
 def _finish(state, tile, grid, planes, light, stops):
     """Write a tile to the picture."""
     size, pitch = plane_stride(grid), grid.columns << grid.shift
@@ -182,7 +183,7 @@ def _finish(state, tile, grid, planes, light, stops):
             store_block(planes, channel * len(light) + to, pitch, value)
 
 
-@device
+@contracted
 def _finish_median(state, tile, grid, members, first, median):
     """Positions in the list to indices of Gaussians."""
     size, pitch = plane_stride(grid), grid.columns << grid.shift
@@ -195,20 +196,20 @@ def _finish_median(state, tile, grid, members, first, median):
         median[to] = members[first + rank] if rank >= 0 else -1
 
 
-@device
+@contracted
 def corner(tile, grid):
     """(left, top) pixel of a tile."""
     return (tile % grid.columns) << grid.shift, (tile // grid.columns) << grid.shift
 
 
-@device
+@contracted
 def block_corner(block, grid):
     """(x, y) of a block inside its tile; blocks run down the columns."""
     rows = grid.edge >> ROW_SHIFT
     return (block // rows) << COLUMN_SHIFT, (block % rows) << ROW_SHIFT
 
 
-@device
+@contracted
 def blocks_in_tile(prints, i, left, top, grid):
     """First and last column, first and last row of blocks that the box of a footprint touches."""
     box_left, box_top, box_right, box_bottom = pixel_box(prints, i, grid.width, grid.height)

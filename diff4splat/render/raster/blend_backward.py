@@ -13,17 +13,8 @@ column of blocks before they are weighted with u, which is the same for all of t
 
 import numpy as np
 
-from diff4splat.render.raster.blend import (
-    FIXED,
-    ROW_SHIFT,
-    block_corner,
-    blocks_in_tile,
-    corner,
-    plane_stride,
-    start_column,
-)
-from diff4splat.render.raster.jit import device, kernel
-from diff4splat.render.raster.lanes import (
+from diff4splat.kernels.jit import contracted
+from diff4splat.kernels.simd16 import (
     LANES,
     any_of,
     exp2,
@@ -35,7 +26,7 @@ from diff4splat.render.raster.lanes import (
     total,
     totals,
 )
-from diff4splat.render.raster.memory import (
+from diff4splat.kernels.simd_memory import (
     aligned_floats,
     load,
     load_block,
@@ -43,6 +34,16 @@ from diff4splat.render.raster.memory import (
     store,
     store_eight,
 )
+from diff4splat.render.raster.blend import (
+    FIXED,
+    ROW_SHIFT,
+    block_corner,
+    blocks_in_tile,
+    corner,
+    plane_stride,
+    start_column,
+)
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.tables import MOMENTS, WHITEN_Y
 
 _AHEAD = 8
@@ -76,7 +77,7 @@ def blend_backward(tiles, grid, lists, prints, values, rules, light, stops, grad
                     slots[slot, column] = 0
 
 
-@device
+@contracted
 def _begin(state, tile, grid, light, stops, grads):
     """Load the end state of a tile; returns how many entries of its list any pixel looked at."""
     size, pitch = plane_stride(grid), grid.columns << grid.shift
@@ -104,7 +105,7 @@ def _begin(state, tile, grid, light, stops, grads):
     return seen
 
 
-@device
+@contracted
 def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, slot):
     """Take one Gaussian out of the blocks its box touches, and write its gradient."""
     left, top = corner(tile, grid)
@@ -177,7 +178,7 @@ def sum_slots(first, last, order, first_slots, slots, moments, value_grads):
             value_grads[index, channel] += _column_sum(slots, MOMENTS + channel, start, stop)
 
 
-@device
+@contracted
 def _column_sum(slots, column, start, stop):
     total_so_far = 0.0
     for slot in range(start, stop):

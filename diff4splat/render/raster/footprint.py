@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.render.raster.jit import device
+from diff4splat.kernels.jit import contracted
 
 HALF_LOG2E = 0.5 / math.log(2)
 BASE = math.sqrt(HALF_LOG2E)
@@ -75,13 +75,13 @@ class Moments(NamedTuple):
     det: float
 
 
-@device
+@contracted
 def triple(rows, i):
     """Row ``i`` of three float32 values, in float64."""
     return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
 
 
-@device
+@contracted
 def quadruple(rows, i):
     """Row ``i`` of four float32 values, in float64."""
     return (
@@ -92,7 +92,7 @@ def quadruple(rows, i):
     )
 
 
-@device
+@contracted
 def camera_space(view, mean):
     """Camera coordinates of a world point; subtracting first is exact far from the origin."""
     x, y, z = view.position
@@ -105,7 +105,7 @@ def camera_space(view, mean):
     )
 
 
-@device
+@contracted
 def unit(quat):
     """A unit quaternion and the inverse length; zero is the identity of inverse length 0."""
     w, x, y, z = quat
@@ -116,7 +116,7 @@ def unit(quat):
     return w * inverse, x * inverse, y * inverse, z * inverse, inverse
 
 
-@device
+@contracted
 def principal_axes(quat, scale):
     """R S of what ``unit`` gives, and three standard deviations."""
     w, x, y, z, _ = quat
@@ -134,7 +134,7 @@ def principal_axes(quat, scale):
     )
 
 
-@device
+@contracted
 def linearize(view, local):
     """J Wᵀ at a mean, with the tangents held to the guard band."""
     inverse = 1 / local.z
@@ -154,7 +154,7 @@ def linearize(view, local):
     )
 
 
-@device
+@contracted
 def moments(slopes, axes, dilation):
     """The covariance of the footprint without a difference of large numbers."""
     s, r = slopes, axes
@@ -172,7 +172,7 @@ def moments(slopes, axes, dilation):
     return Moments(a0, a1, a2, b0, b1, b2, c0, c1, c2, xx, yy, xy, area2, det)
 
 
-@device
+@contracted
 def log2_opacity(moments, opacity, antialias):
     """Logarithm of the opacity at the centre, less what dilation added."""
     if antialias:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster.blend import FIXED, blend
 from diff4splat.render.raster.canvas import Canvas, empty
 from diff4splat.render.raster.harmonics import colors
@@ -19,7 +20,6 @@ from diff4splat.render.raster.order import nearest_first
 from diff4splat.render.raster.plan import Plan
 from diff4splat.render.raster.project import SH, project
 from diff4splat.render.raster.tables import Cloud, Doubles, Floats, Grid, Integers, Lists, View
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.raster.tiles import count_pairs, fill_lists, place_lists
 
 GAUSSIANS_PER_PART = 4096
@@ -91,7 +91,7 @@ def list_visible(
     def part_work(part: int, first: int, last: int) -> None:
         found[part] = work(first, last, visible, faults[part])
 
-    spread(part_work, numbered(parts))
+    parallel_for(part_work, numbered(parts))
     unusable += faults.sum(0)
     kept = [visible[first : first + size] for (first, _), size in zip(parts, found, strict=True)]
     return np.concatenate([visible[:0], *kept])
@@ -111,7 +111,7 @@ def channel_table(
         def work(first: int, last: int) -> None:
             colors(first, last, visible, cloud.means, sh, view.position, values)
 
-        spread(work, ranges(len(visible), GAUSSIANS_PER_PART))
+        parallel_for(work, ranges(len(visible), GAUSSIANS_PER_PART))
     return values
 
 
@@ -123,7 +123,7 @@ def bin_footprints(found: Footprints, plan: Plan) -> Binned:
     def work(piece: int, first: int, last: int) -> None:
         count_pairs(first, last, found.order, found.prints, grid, counts[piece])
 
-    spread(work, numbered(pieces))
+    parallel_for(work, numbered(pieces))
     per_tile = counts.sum(0, dtype=np.int64).reshape(grid.rows, grid.columns)
     regions = _split((0, grid.rows, 0, grid.columns), per_tile, plan.pair_limit)
     return Binned(counts=counts, regions=list(regions))
@@ -150,7 +150,7 @@ def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -
             first_slot[piece], first_slots, lists,
         )  # fmt: skip
 
-    spread(work, numbered(_pieces(found.order)))
+    parallel_for(work, numbered(_pieces(found.order)))
     return Filled(region=region, lists=lists, first_slots=first_slots)
 
 
@@ -178,7 +178,7 @@ def blend_tiles(
             canvas.light, canvas.stops, canvas.medians,
         )  # fmt: skip
 
-    spread(work, ranges(len(tiles), TILES_PER_PART))
+    parallel_for(work, ranges(len(tiles), TILES_PER_PART))
 
 
 def tiles_of(region: Region, grid: Grid) -> NDArray[np.int64]:

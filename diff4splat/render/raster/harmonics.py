@@ -8,8 +8,9 @@ import math
 
 import numpy as np
 
+from diff4splat.kernels.jit import contracted
 from diff4splat.render.raster.footprint import triple
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.render.raster.jit import kernel
 
 _C0 = 0.28209479177387814
 _C1 = 0.4886025119029199
@@ -58,7 +59,7 @@ def colors_backward(
             _turn_backward(triple(means, i), position, distance, turn, mean_grads, i, camera)
 
 
-@device
+@contracted
 def _color(basis, sh, i, channel):
     value = 0.5
     for k in range(sh.shape[1]):
@@ -66,7 +67,7 @@ def _color(basis, sh, i, channel):
     return value
 
 
-@device
+@contracted
 def _turn_backward(mean, position, distance, turn, mean_grads, i, camera):
     """Through the normalisation of the direction: only its sideways part turns it."""
     along = 0.0
@@ -79,7 +80,7 @@ def _turn_backward(mean, position, distance, turn, mean_grads, i, camera):
         camera[axis] -= gradient
 
 
-@device
+@contracted
 def evaluate(mean, position, count, basis, slopes):
     """Basis functions and their gradients in the direction of a mean; returns the distance."""
     basis[0] = _C0
@@ -99,13 +100,13 @@ def evaluate(mean, position, count, basis, slopes):
     return distance
 
 
-@device
+@contracted
 def _put(basis, slopes, k, value, along_x, along_y, along_z):
     basis[k] = value
     slopes[k, 0], slopes[k, 1], slopes[k, 2] = along_x, along_y, along_z
 
 
-@device
+@contracted
 def _second(basis, slopes, x, y, z):
     a, b, c = _C2
     _put(basis, slopes, 4, a * x * y, a * y, a * x, 0.0)
@@ -115,7 +116,7 @@ def _second(basis, slopes, x, y, z):
     _put(basis, slopes, 8, c * (x * x - y * y), 2 * c * x, -2 * c * y, 0.0)
 
 
-@device
+@contracted
 def _third(basis, slopes, x, y, z):
     a, b, c, d, e = _C3
     xx, yy, zz = x * x, y * y, z * z

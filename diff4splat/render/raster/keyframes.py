@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diff4splat.kernels.jit import contracted
 from diff4splat.render.raster.footprint import quadruple, triple, unit
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.project import is_seen
 from diff4splat.render.raster.tables import Doubles, Floats, Integers
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -99,7 +100,7 @@ def project_keyframed(
     return found
 
 
-@device
+@contracted
 def _moved(mean, place, keys, moment):
     x, y, z = mean
     for k in range(len(moment.offset_keys)):
@@ -110,7 +111,7 @@ def _moved(mean, place, keys, moment):
     return x, y, z
 
 
-@device
+@contracted
 def _turned(quat, place, keys, moment):
     """The canonical rotation, then along the arc between two keys."""
     w1, x1, y1, z1, _ = unit(quat)
@@ -132,7 +133,7 @@ def _turned(quat, place, keys, moment):
     )
 
 
-@device
+@contracted
 def _arc(cosine, weight):
     """Weights of both ends of an arc."""
     if cosine > _NEARBY:
@@ -143,7 +144,7 @@ def _arc(cosine, weight):
     )
 
 
-@device
+@contracted
 def _stretched(scales, place, keys, moment):
     lower, upper, weight = moment.lower, moment.upper, moment.weight
     x = (1 - weight) * keys.log_scales[lower, place, 0] + weight * keys.log_scales[upper, place, 0]
@@ -152,7 +153,7 @@ def _stretched(scales, place, keys, moment):
     return scales[0] * math.exp(x), scales[1] * math.exp(y), scales[2] * math.exp(z)
 
 
-@device
+@contracted
 def _key(rows, key, place):
     return (
         np.float64(rows[key, place, 0]),

@@ -4,7 +4,8 @@ Both sides are sorted, nearest first and equal depths by index, so merging them 
 would give.
 """
 
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.kernels.jit import contracted
+from diff4splat.render.raster.jit import kernel
 
 
 @kernel
@@ -39,6 +40,6 @@ def merge_lists(first, last, tiles, still, moving, depth, lists):
                 b += 1
 
 
-@device
+@contracted
 def _before(left, right, depth):
     return depth[left] < depth[right] or (depth[left] == depth[right] and left < right)

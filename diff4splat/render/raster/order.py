@@ -6,7 +6,8 @@ so one array moves; digits in which all keys agree are skipped.
 
 import numpy as np
 
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.kernels.jit import contracted
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.tables import Integers
 
 _DIGIT_BITS = 11
@@ -45,7 +46,7 @@ def sort_by_depth(visible, depth_bits, keys, spare, order):
         order[rank] = np.int32(keys[rank] & _INDEX_MASK)
 
 
-@device
+@contracted
 def _scatter(keys, spare, base, shift):
     """One pass: stable counting sort by one digit."""
     starts = np.zeros(_BUCKETS, np.int64)

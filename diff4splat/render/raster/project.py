@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from diff4splat.kernels.jit import contracted
 from diff4splat.render.raster.footprint import (
     BASE,
     LN2,
@@ -21,7 +22,7 @@ from diff4splat.render.raster.footprint import (
     triple,
     unit,
 )
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.tables import (
     CENTER_X,
     CENTER_Y,
@@ -59,7 +60,7 @@ def project(first, last, candidates, cloud, sh, view, rules, prints, depth, visi
     return found
 
 
-@device
+@contracted
 def is_seen(i, state, sh, view, rules, prints, depth, unusable):
     """Whether a Gaussian leaves a footprint; counts it where a parameter cannot be used."""
     fault = _unusable_parameter(state, sh, i)
@@ -69,7 +70,7 @@ def is_seen(i, state, sh, view, rules, prints, depth, unusable):
     return _leave_print(i, state, view, rules, prints, depth)
 
 
-@device
+@contracted
 def _unusable_parameter(state, sh, i):
     """The first parameter that is not finite or overflows when squared, or -1."""
     mean, quat, scales, opacity = state
@@ -87,7 +88,7 @@ def _unusable_parameter(state, sh, i):
     return -1 if fine else SH
 
 
-@device
+@contracted
 def _usable(values):
     fine = True
     for value in values:
@@ -95,7 +96,7 @@ def _usable(values):
     return fine
 
 
-@device
+@contracted
 def _leave_print(i, state, view, rules, prints, depth):
     """Whether a Gaussian can be seen, by its mean, quaternion, scales and opacity.
 
@@ -128,7 +129,7 @@ def _leave_print(i, state, view, rules, prints, depth):
     return True
 
 
-@device
+@contracted
 def _touches(center, extent, size):
     """Whether an interval reaches the first or the last pixel centre, or one between."""
     return center + extent >= 0.5 and center - extent <= size - 0.5

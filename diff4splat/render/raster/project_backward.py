@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from diff4splat.kernels.jit import contracted
 from diff4splat.render.raster.footprint import (
     BASE,
     LN2,
@@ -20,7 +21,7 @@ from diff4splat.render.raster.footprint import (
     triple,
     unit,
 )
-from diff4splat.render.raster.jit import device, kernel
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.tables import (
     CENTER_X,
     CENTER_Y,
@@ -41,7 +42,7 @@ def project_backward(first, last, listed, cloud, view, rules, prints, sums, grad
         _one(listed[place], cloud, view, rules, prints, sums, grads, camera)
 
 
-@device
+@contracted
 def _one(index, cloud, view, rules, prints, sums, grads, camera):
     """The way back of one Gaussian."""
     turned, scales = unit(quadruple(cloud.quats, index)), triple(cloud.scales, index)
@@ -61,7 +62,7 @@ def _one(index, cloud, view, rules, prints, sums, grads, camera):
     _mean_backward(view, (to_x, to_y, z_from_x + z_from_y), mean, grads.means, index, camera)
 
 
-@device
+@contracted
 def _shape_gradient(prints, sums, i):
     """Gradients of the first six columns of a footprint, from the moments of its pixels."""
     a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
@@ -77,7 +78,7 @@ def _shape_gradient(prints, sums, i):
     )
 
 
-@device
+@contracted
 def _moments_backward(m, grad, rules):
     """Gradients of the rows a and b of M."""
     d = rules.dilation_px2
@@ -114,7 +115,7 @@ def _moments_backward(m, grad, rules):
     return to_a, to_b
 
 
-@device
+@contracted
 def _axes_backward(slopes, a, b):
     """Gradient of R S from those of the rows of M."""
     s = slopes
@@ -131,7 +132,7 @@ def _axes_backward(slopes, a, b):
     )
 
 
-@device
+@contracted
 def _scales_backward(turn, grad, out, i):
     """Column by column, R · ∂(R S)."""
     out[i, 0] = turn.xx * grad.xx + turn.yx * grad.yx + turn.zx * grad.zx
@@ -139,7 +140,7 @@ def _scales_backward(turn, grad, out, i):
     out[i, 2] = turn.xz * grad.xz + turn.yz * grad.yz + turn.zz * grad.zz
 
 
-@device
+@contracted
 def _quat_backward(quat, scales, grad, out, i):
     """Through R(q) and the normalisation of q; a zero quaternion has no gradient."""
     w, x, y, z, inverse = quat
@@ -156,7 +157,7 @@ def _quat_backward(quat, scales, grad, out, i):
     out[i, 2], out[i, 3] = inverse * (to_y - along * y), inverse * (to_z - along * z)
 
 
-@device
+@contracted
 def _slopes_backward(axes, a, b):
     """Gradients of the two rows of J Wᵀ."""
     r = axes
@@ -174,7 +175,7 @@ def _slopes_backward(axes, a, b):
     )
 
 
-@device
+@contracted
 def _mean_backward(view, grad, mean, out, i, camera):
     """From camera to world axes, for the mean and the pose."""
     for row in range(3):
@@ -187,7 +188,7 @@ def _mean_backward(view, grad, mean, out, i, camera):
             camera[POSE + 3 * row + column] += grad[column] * away
 
 
-@device
+@contracted
 def _horizontal(view, local, slopes, to_row, to_center, camera):
     """Gradients of x and z of a mean through the x axis of the picture."""
     first, second, third = view.rotation
@@ -204,7 +205,7 @@ def _horizontal(view, local, slopes, to_row, to_center, camera):
     )
 
 
-@device
+@contracted
 def _vertical(view, local, slopes, to_row, to_center, camera):
     """The same of y and z through the y axis."""
     first, second, third = view.rotation
@@ -221,7 +222,7 @@ def _vertical(view, local, slopes, to_row, to_center, camera):
     )
 
 
-@device
+@contracted
 def _axis_backward(axis, lens, across, forward, place, to_row, to_center, camera):
     """``across`` and ``forward`` are columns of the pose, ``place`` is (x or y, z, tangent)."""
     focal, (low, high) = lens

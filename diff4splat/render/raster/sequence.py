@@ -16,6 +16,7 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from torch import Tensor
 
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster import forward as stages
 from diff4splat.render.raster.blend import FIXED
 from diff4splat.render.raster.canvas import Canvas, empty
@@ -28,7 +29,6 @@ from diff4splat.render.raster.order import nearest_first
 from diff4splat.render.raster.plan import Plan
 from diff4splat.render.raster.project import SH, project
 from diff4splat.render.raster.tables import Integers, Lists, View
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.scene.scene import Scene
 
 
@@ -131,7 +131,7 @@ class Sequence:
         def work(first: int, last: int) -> None:
             colors(first, last, visible, self._cloud.means, self._sh, position, self._values)
 
-        spread(work, ranges(len(visible), stages.GAUSSIANS_PER_PART))
+        parallel_for(work, ranges(len(visible), stages.GAUSSIANS_PER_PART))
 
     def _bin_still(self) -> bool:
         """Whether there are lists of what stands still; made when a camera is used again."""
@@ -191,7 +191,7 @@ class Sequence:
         def work(first: int, last: int) -> None:
             merge_lists(first, last, tiles, still, moving, self._depth, merged)
 
-        spread(work, ranges(len(tiles), stages.TILES_PER_PART))
+        parallel_for(work, ranges(len(tiles), stages.TILES_PER_PART))
         return merged
 
     def _tiles_in(self, rows: tuple[int, int] | None) -> NDArray[np.bool_]:

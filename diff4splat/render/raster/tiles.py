@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact, kernel
-from diff4splat.render.raster.memory import prefetch
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd_memory import prefetch
+from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.tables import (
     CENTER_X,
     CENTER_Y,
@@ -74,7 +75,7 @@ def place_lists(counts, starts):
     starts[counts.shape[1]] = running
 
 
-@exact
+@inlined
 def pixel_box(prints, i, width, height):
     """(left, top, right, bottom), inclusive, of the pixel centres in the box of a footprint."""
     x, y = prints[i, CENTER_X], prints[i, CENTER_Y]
@@ -87,7 +88,7 @@ def pixel_box(prints, i, width, height):
     )
 
 
-@exact
+@inlined
 def _columns(prints, i, tile_row, box, grid):
     """First and last column of tiles that a footprint touches in a row of tiles."""
     shift = grid.shift
@@ -102,7 +103,7 @@ def _columns(prints, i, tile_row, box, grid):
     )
 
 
-@exact
+@inlined
 def _interval(prints, i, above, below):
     """The x that the ellipse of a footprint covers between two heights."""
     a, k, b = prints[i, WHITEN_X], prints[i, SHEAR], prints[i, WHITEN_Y]
@@ -115,7 +116,7 @@ def _interval(prints, i, above, below):
     return x + left, x + right
 
 
-@exact
+@inlined
 def _edge(dy, a, k, b, level, side):
     """The dx where (a dx)² + (b dy - k dx)² is ``level``, on one side."""
     whole = a * a + k * k

@@ -86,9 +86,9 @@ def _backend(name: str, gaussians: Gaussians):
         return reference.look
     # Numba is loaded with the first rays, not with the library.
     from diff4splat.render.trace.function import look
-    from diff4splat.render.trace.warm import ensure_compiled
+    from diff4splat.render.trace.jit import GROUP
 
-    ensure_compiled()
+    GROUP.ensure_compiled()
     return look
 
 

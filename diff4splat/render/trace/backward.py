@@ -10,8 +10,8 @@ from queue import SimpleQueue
 
 import numpy as np
 
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster.canvas import empty
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART
 from diff4splat.render.trace.forward import PACKETS_PER_PART
 from diff4splat.render.trace.gradients import add_rows, finish, finish_motion
@@ -58,7 +58,7 @@ def gradients(
         if len(motion.velocities):
             finish_motion(first, last, sight.world.primitives, totals, motion_grads)
 
-    spread(work, ranges(count, PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(count, PRIMITIVES_PER_PART))
     return Gradients(
         cloud=grads,
         motion=motion_grads,
@@ -84,7 +84,7 @@ def _rewound(
             made[part] = rewind(first, last, sight, seen_grads, *lists, to_rays)
             pool.put(lists)
 
-        spread(work, ((number, *part) for number, part in enumerate(block)))
+        parallel_for(work, ((number, *part) for number, part in enumerate(block)))
         parts = [part for part in made if part is not None]
         yield parts
         largest = max(largest, *(sum(array.nbytes for array in part) for part in parts))
@@ -107,4 +107,4 @@ def _add(parts: list[Part], totals: Doubles, lobes: Floats) -> None:
             if len(lobes):
                 add_rows(low, high, listed, own_lobes, lobes)
 
-    spread(work, ranges(len(totals), max(PRIMITIVES_PER_PART, -(-len(totals) // 8))))
+    parallel_for(work, ranges(len(totals), max(PRIMITIVES_PER_PART, -(-len(totals) // 8))))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.render.raster.threads import ranges, spread
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.trace.primitives import box
 from diff4splat.render.trace.tables import Doubles
 
@@ -31,7 +31,7 @@ def boxes_between(primitives: Doubles, reach: Doubles, earliest: float, latest: 
     def work(first: int, last: int) -> None:
         box(first, last, primitives, reach, (float(earliest), float(latest)), *made)
 
-    spread(work, ranges(count, PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(count, PRIMITIVES_PER_PART))
     return made
 
 

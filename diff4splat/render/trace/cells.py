@@ -23,10 +23,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.raster.footprint import triple
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.trace.compiled import kernel
 from diff4splat.render.trace.frame import PACKET
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.tables import Doubles, Floats
 
 _MOST_PARTS = 1 << 8
@@ -132,7 +132,7 @@ def map_directions(directions, picked, looks):
         looks[place] = octahedral(triple(directions, picked[place]))
 
 
-@exact
+@inlined
 def cell_of(cells, origin):
     """Number of an origin's cell; what lies outside the box belongs to the nearest.
 
@@ -143,7 +143,7 @@ def cell_of(cells, origin):
     return rank * cells.counts[2] + (cells.counts[2] - 1 - place if rank & 1 else place)
 
 
-@exact
+@inlined
 def _part(cells, origin, axis):
     """Which part of the box along one axis."""
     x, y, z = origin[0] - cells.base[0], origin[1] - cells.base[1], origin[2] - cells.base[2]
@@ -152,7 +152,7 @@ def _part(cells, origin, axis):
     return int(min(max(part, 0.0), float(cells.counts[axis] - 1)))
 
 
-@exact
+@inlined
 def octahedral(direction):
     """A unit direction to the unit square: the octahedron |x| + |y| + |z| = 1, folded out."""
     x, y, z = direction

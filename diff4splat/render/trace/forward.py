@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster.canvas import empty
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART, boxes_between
 from diff4splat.render.trace.leaves import gather_leaves
 from diff4splat.render.trace.packets import bundle_rays
@@ -70,7 +70,7 @@ def make_primitives(cloud: Cloud, motion: Motion, rules: Rules) -> tuple[Doubles
     def work(first: int, last: int) -> None:
         prepare(first, last, cloud, motion, rules, primitives, reach)
 
-    spread(work, ranges(count, PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(count, PRIMITIVES_PER_PART))
     return primitives, reach
 
 
@@ -102,7 +102,7 @@ def see(sight: Sight) -> tuple[Floats, Integers]:
     def work(first: int, last: int) -> None:
         shade(first, last, sight, seen, hits)
 
-    spread(work, ranges(len(sight.rays.starts) - 1, PACKETS_PER_PART))
+    parallel_for(work, ranges(len(sight.rays.starts) - 1, PACKETS_PER_PART))
     return seen, hits
 
 

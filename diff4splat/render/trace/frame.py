@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.raster.footprint import triple
-from diff4splat.render.raster.jit import exact
 
 PACKET = 64
 """Rays in a packet at most."""
@@ -43,13 +43,13 @@ class Frame(NamedTuple):
     late: float
 
 
-@exact
+@inlined
 def dot(a, b):
     """Dot product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@exact
+@inlined
 def cross(a, b):
     """Cross product."""
     return (
@@ -59,26 +59,26 @@ def cross(a, b):
     )
 
 
-@exact
+@inlined
 def minus(a, b):
     """The difference."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@exact
+@inlined
 def plus(a, b, factor):
     """The sum of a and ``factor`` times b."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
-@exact
+@inlined
 def scaled_to_one(a):
     """The unit vector along a."""
     length = math.sqrt(dot(a, a))
     return a[0] / length, a[1] / length, a[2] / length
 
 
-@exact
+@inlined
 def make_frame(rays, first, last):
     """The frame of the rays at ``first`` to ``last`` of the bundle's order."""
     ahead, origin, time = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
@@ -106,7 +106,7 @@ def make_frame(rays, first, last):
     )
 
 
-@exact
+@inlined
 def _across(ahead, rays, first, last):
     """Along the step between the first two rays: of pixels, an axis of the picture."""
     step = triple(rays.directions, rays.order[min(first + 1, last - 1)])
@@ -123,7 +123,7 @@ def _across(ahead, rays, first, last):
     return scaled_to_one(cross(ahead, (0.0, 0.0, 1.0)))
 
 
-@exact
+@inlined
 def place_rays(rays, first, last, frame, numbers):
     """Fill ``numbers`` (`LAST` values) with the rays in the axes of ``frame``."""
     numbers[:] = 0.0
@@ -143,7 +143,7 @@ def place_rays(rays, first, last, frame, numbers):
         numbers[FARTHEST + lane] = np.inf
 
 
-@exact
+@inlined
 def make_beam(numbers, count, frame, anchor, planes, rows):
     """Planes around all rays: normal (3) and offset each, relative to the tree's anchor.
 
@@ -162,7 +162,7 @@ def make_beam(numbers, count, frame, anchor, planes, rows):
         planes[4 * side + 3] = offset
 
 
-@exact
+@inlined
 def _plane(side, numbers, count, frame):
     """Normal and offset from the frame's origin of one side."""
     if side == PLANES - 1:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn.functional import pad
 
-from diff4splat.render.raster.lanes import LANES
+from diff4splat.kernels.simd16 import LANES
 from diff4splat.render.trace.backward import Gradients, gradients
 from diff4splat.render.trace.forward import make_rules, make_sight, make_world, see
 from diff4splat.render.trace.moving import MovingCloud

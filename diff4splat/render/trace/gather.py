@@ -8,9 +8,9 @@ at candidates one after another knows how near what follows can be.
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES, fill, fma, minimum, select
-from diff4splat.render.raster.memory import load, store
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES, fill, fma, minimum, select
+from diff4splat.kernels.simd_memory import load, store
 from diff4splat.render.trace.frame import PLANES, ROUNDING
 from diff4splat.render.trace.scratch import BUCKETS
 from diff4splat.render.trace.tables import (
@@ -35,7 +35,7 @@ LATER = np.float32(1.03)
 """How much further than its least z a candidate may stand in the order."""
 
 
-@exact
+@inlined
 def gather(world, frame, scratch):
     """List candidates in ``scratch.members`` by ``scratch.depths``; returns how many there are.
 
@@ -68,7 +68,7 @@ def gather(world, frame, scratch):
     return found
 
 
-@exact
+@inlined
 def _boxes_inside(nodes, at, planes, rows):
     """Which of sixteen boxes have their innermost corner inside of every plane."""
     inside = _corner(nodes, at, planes, rows, 0) <= planes[3]
@@ -77,7 +77,7 @@ def _boxes_inside(nodes, at, planes, rows):
     return inside
 
 
-@exact
+@inlined
 def _corner(nodes, at, planes, rows, side):
     x, y, z = rows[3 * side], rows[3 * side + 1], rows[3 * side + 2]
     return fma(
@@ -87,7 +87,7 @@ def _corner(nodes, at, planes, rows, side):
     )
 
 
-@exact
+@inlined
 def _leaf(world, leaves, group, frame, planes, scratch, found):
     """Add the primitives of a group that reach into the beam."""
     at, front = group * world.leaves.shape[1] * LANES, PLANES - 1
@@ -117,7 +117,7 @@ def _leaf(world, leaves, group, frame, planes, scratch, found):
     return found
 
 
-@exact
+@inlined
 def _distances(world, leaves, at, frame, planes, side):
     """The least and the largest distance of means outside a plane while the packet looks."""
     distance = _along(leaves, at + LEAF_MEAN * LANES, planes, side) - planes[4 * side + 3]
@@ -130,7 +130,7 @@ def _distances(world, leaves, at, frame, planes, side):
     return minimum(early, late), early + late - minimum(early, late)
 
 
-@exact
+@inlined
 def _along(leaves, at, planes, side):
     """Components of three rows along a normal."""
     return fma(
@@ -144,7 +144,7 @@ def _along(leaves, at, planes, side):
     )
 
 
-@exact
+@inlined
 def _squared_extent(leaves, at, planes, side):
     """|reach · S Rᵀ n|²."""
     axes = at + LEAF_AXES * LANES
@@ -154,7 +154,7 @@ def _squared_extent(leaves, at, planes, side):
     return fma(x, x, fma(y, y, z * z))
 
 
-@exact
+@inlined
 def _sort(scratch, found):
     """Candidates by the leading bits of their depth, equal ones as they were found."""
     keys, spare, starts = scratch.keys, scratch.spare_keys, scratch.starts
@@ -174,7 +174,7 @@ def _sort(scratch, found):
         scratch.members[rank] = scratch.found[np.int64(key & _INDEX_MASK)]
 
 
-@exact
+@inlined
 def _scatter(keys, spare, starts, found, base, shift):
     """One pass: stable counting sort by one digit."""
     starts[:] = 0

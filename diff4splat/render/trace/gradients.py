@@ -7,9 +7,9 @@ so on around. A quaternion q turns by ω as q ⊗ (1, ω / 2).
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.raster.footprint import quadruple, triple, unit
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.response import THINNEST
 from diff4splat.render.trace.sums import (
     DIRECT,
@@ -47,7 +47,7 @@ def finish(first, last, cloud, primitives, totals, grads):
             grads.opacities[i] = totals[i, E] / np.float64(cloud.opacities[i])
 
 
-@exact
+@inlined
 def _transposed(primitives, i, totals, column, axis):
     """A component of Wᵀ times three sums."""
     pull = 0.0
@@ -56,7 +56,7 @@ def _transposed(primitives, i, totals, column, axis):
     return pull
 
 
-@exact
+@inlined
 def _finish_scales(i, cloud, totals, grads):
     scales = triple(cloud.scales, i)
     diagonal = (totals[i, B], totals[i, B + 3], totals[i, B + 5])
@@ -65,7 +65,7 @@ def _finish_scales(i, cloud, totals, grads):
             grads.scales[i, axis] = -diagonal[axis] / scales[axis]
 
 
-@exact
+@inlined
 def _finish_quat(i, cloud, primitives, totals, grads):
     """Through R(q) and the normalisation of q; a zero quaternion has no gradient."""
     w, x, y, z, inverse = unit(quadruple(cloud.quats, i))

@@ -6,7 +6,7 @@ that overlap, a heap bounds the time, and is left when no light is.
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.trace.vectors import (
     float_at,
     int_at,
@@ -20,7 +20,7 @@ _MOVES_PER_HIT = 16
 """How many places a hit may move on average before a heap is used."""
 
 
-@exact
+@inlined
 def swap(at, one, other):
     """Exchange two hits."""
     distance, alpha, rank = _hit(at, one)
@@ -28,7 +28,7 @@ def swap(at, one, other):
     _put(at, other, (distance, alpha, rank))
 
 
-@exact
+@inlined
 def put_in_order(at, ray, dark):
     """Sort the hits of a ray, and forget those behind the one that leaves it ``dark``."""
     first, count = ray * at.room, word_at(at.counts, ray)
@@ -42,7 +42,7 @@ def put_in_order(at, ray, dark):
         light -= np.float64(float_at(at.alphas, place)) * light
 
 
-@exact
+@inlined
 def _insert_all(at, first, count):
     """Sort by insertion; False if it takes too many moves."""
     moves = 0
@@ -60,7 +60,7 @@ def _insert_all(at, first, count):
     return True
 
 
-@exact
+@inlined
 def _take_nearest(at, first, count, dark):
     """Take one nearest hit after another off a heap until no light is left.
 
@@ -78,7 +78,7 @@ def _take_nearest(at, first, count, dark):
         light -= np.float64(float_at(at.alphas, nearest)) * light
 
 
-@exact
+@inlined
 def _sink(at, root, node, size):
     """Let the hit of a node sink until it comes before both below it."""
     hit = _hit(at, root - node)
@@ -94,7 +94,7 @@ def _sink(at, root, node, size):
     _put(at, root - node, hit)
 
 
-@exact
+@inlined
 def _hit(at, place):
     return (
         float_at(at.distances, place),
@@ -103,14 +103,14 @@ def _hit(at, place):
     )
 
 
-@exact
+@inlined
 def _put(at, place, hit):
     put_float(at.distances, place, hit[0])
     put_float(at.alphas, place, hit[1])
     put_int(at.ranks, place, hit[2])
 
 
-@exact
+@inlined
 def _before(at, one, other):
     """By distance, then by the index of the primitive."""
     if one[0] != other[0]:

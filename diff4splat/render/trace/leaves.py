@@ -6,11 +6,11 @@ exceeds |reach · S Rᵀ n|: the exact extent of the ellipsoid along n.
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.parallel import parallel_for, ranges
+from diff4splat.kernels.simd16 import LANES
 from diff4splat.render.raster.canvas import empty
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES
-from diff4splat.render.raster.threads import ranges, spread
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.tables import (
     CENTER,
     LEAF_AXES,
@@ -44,7 +44,7 @@ def gather_leaves(tree: Tree, primitives: Doubles, reach: Doubles, moment: float
     def work(first: int, last: int) -> None:
         fill_leaves(first, last, tree, primitives, reach, moment, leaves)
 
-    spread(work, ranges(groups, _GROUPS_PER_PART))
+    parallel_for(work, ranges(groups, _GROUPS_PER_PART))
     return leaves
 
 
@@ -63,7 +63,7 @@ def fill_leaves(first, last, tree, primitives, reach, moment, leaves):
                 leaves[group, :, lane] = np.nan
 
 
-@exact
+@inlined
 def _fill(leaves, group, lane, tree, primitives, reach, moment):
     i = tree.order[group * LANES + lane]
     size, largest = 0.0, 0.0

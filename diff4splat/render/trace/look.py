@@ -1,6 +1,6 @@
 """What the packets of a bundle hit: the part that the way forward and the way back share."""
 
-from diff4splat.render.trace.compiled import shared
+from diff4splat.kernels.jit import shared
 from diff4splat.render.trace.frame import make_beam, make_frame, place_rays
 from diff4splat.render.trace.gather import gather
 from diff4splat.render.trace.meet import meet_all

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES, any_of, exp2, fill, fma, less_product, minimum
 from diff4splat.render.raster.footprint import HALF_LOG2E
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES, any_of, exp2, fill, fma, less_product, minimum
 from diff4splat.render.trace.frame import (
     FARTHEST,
     SHIFT_X,
@@ -98,7 +98,7 @@ class Places(NamedTuple):
     """Hits that fit per ray."""
 
 
-@exact
+@inlined
 def places_of(scratch, rays):
     """Where a packet of so many ``rays`` keeps things."""
     return Places(
@@ -119,7 +119,7 @@ def places_of(scratch, rays):
     )
 
 
-@exact
+@inlined
 def meet_all(world, frame, rules, scratch, found, rays):
     """Meet ``found`` candidates until all of ``rays`` are dark; False if hits do not fit.
 
@@ -162,7 +162,7 @@ def meet_all(world, frame, rules, scratch, found, rays):
     return True
 
 
-@exact
+@inlined
 def _meet(at, shape, lane, moving, rules):
     """Sixteen rays from ``lane`` on meet a shape; returns a bit for each that hits it.
 
@@ -206,7 +206,7 @@ def _meet(at, shape, lane, moving, rules):
     return left
 
 
-@exact
+@inlined
 def _exponent(level, squared, rules):
     """log2 of α before it is held to the largest."""
     if rules.quartic:
@@ -214,7 +214,7 @@ def _exponent(level, squared, rules):
     return less_product(level, squared, np.float32(HALF_LOG2E))
 
 
-@exact
+@inlined
 def _append(at, lane, bit, rank):
     """Put a hit behind the others of its ray; False if it does not fit."""
     count = word_at(at.counts, lane + bit)
@@ -229,7 +229,7 @@ def _append(at, lane, bit, rank):
     return True
 
 
-@exact
+@inlined
 def _goes_dark(at, rules, following, ray):
     """Whether the hits that nothing can come before any more leave a ray no light.
 

@@ -10,17 +10,17 @@ from torch import Tensor
 from diff4splat.render.trace.boxes import Boxes, boxes_between, nothing, united
 from diff4splat.render.trace.forward import make_primitives, make_rules
 from diff4splat.render.trace.hierarchy import State
+from diff4splat.render.trace.jit import GROUP
 from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.settings import TraceSettings
 from diff4splat.render.trace.support import usable
 from diff4splat.render.trace.tables import Cloud, Floats, Integers, Motion
 from diff4splat.render.trace.tree import build
-from diff4splat.render.trace.warm import ensure_compiled
 
 
 def neighbours(states: Sequence[State], settings: TraceSettings) -> Integers:
     """Indices of all Gaussians that can be seen in any state, by the boxes around all states."""
-    ensure_compiled()
+    GROUP.ensure_compiled()
     return build(united([_boxes(state, settings) for state in states])).order
 
 

@@ -7,12 +7,12 @@ because float32 is relative to the size of a packet.
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster.footprint import triple
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.trace.cells import cell_of, choose_cells, octahedral
-from diff4splat.render.trace.compiled import kernel
 from diff4splat.render.trace.frame import PACKET, dot, minus
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.sorting import hilbert, sorted_order
 from diff4splat.render.trace.tables import Bundle, Floats
 
@@ -40,7 +40,7 @@ def bundle_rays(
     def work(first: int, last: int) -> None:
         ray_keys(first, last, origins, directions, cells, keys)
 
-    spread(work, ranges(count, _RAYS_PER_PART))
+    parallel_for(work, ranges(count, _RAYS_PER_PART))
     order = sorted_order(keys)
     starts = np.empty(count + 1, np.int64)
     packets = cut(order, origins, directions, (_APART * largest) ** 2, starts)
@@ -78,7 +78,7 @@ def cut(order, origins, directions, squared_apart, starts):
     return count
 
 
-@exact
+@inlined
 def _parts(origins, directions, one, other, squared_apart):
     """Whether two rays look too different ways, or from places too far apart."""
     away = minus(triple(origins, one), triple(origins, other))

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.raster.footprint import (
     LN2,
     principal_axes,
@@ -16,8 +17,7 @@ from diff4splat.render.raster.footprint import (
     triple,
     unit,
 )
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.response import THINNEST
 from diff4splat.render.trace.tables import (
     CENTER,
@@ -44,13 +44,13 @@ def prepare(first, last, cloud, motion, rules, primitives, reach):
                 _fill_motion(primitives, i, motion)
 
 
-@exact
+@inlined
 def _reach(level, rules):
     drop = min((level - rules.log2_cutoff) * LN2, rules.least_drop)
     return math.sqrt(math.sqrt(18 * drop)) if rules.quartic else math.sqrt(2 * drop)
 
 
-@exact
+@inlined
 def _fill(primitives, i, cloud, level):
     mean, scales = triple(cloud.means, i), triple(cloud.scales, i)
     turn = principal_axes(unit(quadruple(cloud.quats, i)), (1.0, 1.0, 1.0))
@@ -64,7 +64,7 @@ def _fill(primitives, i, cloud, level):
     primitives[i, LEVEL] = level
 
 
-@exact
+@inlined
 def _fill_motion(primitives, i, motion):
     velocity = triple(motion.velocities, i)
     for axis in range(3):
@@ -92,7 +92,7 @@ def box(first, last, primitives, reach, interval, lower, upper):
                 lower[i, axis], upper[i, axis] = min(begin, end) - half, max(begin, end) + half
 
 
-@exact
+@inlined
 def _deviation(primitives, i, axis):
     """√Σ_jj: the standard deviation along a world axis."""
     total = 0.0

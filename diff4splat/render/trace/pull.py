@@ -12,7 +12,7 @@ Sums of A, B and e over rays are all that a primitive needs.
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.trace.frame import dot, minus, plus
 from diff4splat.render.trace.sums import (
     LATE_A,
@@ -33,7 +33,7 @@ from diff4splat.render.trace.tint import triple_at
 from diff4splat.render.trace.vectors import double_at, float_at
 
 
-@exact
+@inlined
 def pull(tint, quartic, i, ray, slopes, row, ray_row):
     """Add what primitive ``i`` and ``ray`` do to a meeting with ``slopes`` (e, f) to their rows."""
     e, f = slopes
@@ -66,7 +66,7 @@ def pull(tint, quartic, i, ray, slopes, row, ray_row):
         add(ray_row, TO_TIME, -dot(three_at(table, VELOCITY), to_origin) - e * since * hurry**2)
 
 
-@exact
+@inlined
 def _since(tint, table, ray):
     """Time of a ray since the centre of a pulse."""
     if tint.columns < MOVING_COLUMNS:
@@ -74,7 +74,7 @@ def _since(tint, table, ray):
     return np.float64(float_at(tint.times, ray)) - double_at(table, CENTER)
 
 
-@exact
+@inlined
 def _transposed(w1, w2, w3, v):
     """Wᵀ v."""
     return (
@@ -84,7 +84,7 @@ def _transposed(w1, w2, w3, v):
     )
 
 
-@exact
+@inlined
 def _add_shape(row, a, slope, share, p, g):
     """A and B of one meeting."""
     add_three(row, A, a, 1.0)

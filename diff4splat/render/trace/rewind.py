@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES, fill
-from diff4splat.render.raster.memory import aligned_floats
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES, fill
+from diff4splat.kernels.simd_memory import aligned_floats
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.look import begin, look_on
 from diff4splat.render.trace.meet import places_of
 from diff4splat.render.trace.pull import pull
@@ -93,7 +93,7 @@ def rewind(first, last, sight, seen_grads, where, listed, ray_grads):
     return listed[:count].copy(), sums[:count], lobes[: count if curved else 0]
 
 
-@exact
+@inlined
 def _list(at, rays, where, listed, count):
     """Give every primitive that is hit for the first time the next row."""
     for lane in range(rays):
@@ -106,7 +106,7 @@ def _list(at, rays, where, listed, count):
     return count
 
 
-@exact
+@inlined
 def _grown(rows, count):
     """Room for at least ``count`` rows, zeros behind those there were."""
     if count <= len(rows):
@@ -118,7 +118,7 @@ def _grown(rows, count):
     return larger
 
 
-@exact
+@inlined
 def _rewind(at, tint, rules, desk, lane, ray):
     """One ray, back to front."""
     first, stop = lane * at.room, lane * at.room + word_at(at.counts, lane)
@@ -156,7 +156,7 @@ def _rewind(at, tint, rules, desk, lane, ray):
         turn_backward(tint, desk.basis_grad, desk.ray_row)
 
 
-@exact
+@inlined
 def _lights(at, first, stop, lights):
     """The light in front of every hit; returns what is left behind the last."""
     light = 1.0
@@ -166,7 +166,7 @@ def _lights(at, first, stop, lights):
     return light
 
 
-@exact
+@inlined
 def _worth(tint, i, color_grad, weight):
     """Colour times its gradient, and the gradient of the colour before it is held above 0."""
     red, green, blue = color(tint, i, 0), color(tint, i, 1), color(tint, i, 2)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES
-from diff4splat.render.raster.memory import aligned_floats
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES
+from diff4splat.kernels.simd_memory import aligned_floats
 from diff4splat.render.trace.frame import LAST, PACKET, PLANES, ROUNDING
 from diff4splat.render.trace.tables import Floats, Integers
 
@@ -57,7 +57,7 @@ class Scratch(NamedTuple):
     """What is left behind those that are settled."""
 
 
-@exact
+@inlined
 def make_scratch(candidates, hits):
     """Room for so many candidates and hits of a packet."""
     lane_depths, depths = aligned_floats(LANES), np.empty(candidates, np.float32)

@@ -5,8 +5,8 @@ Per ray, over its hits nearest first: w = α T, T ← (1 - α) T; sums are in fl
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.kernels.jit import inlined
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.look import begin, look_on
 from diff4splat.render.trace.meet import places_of
 from diff4splat.render.trace.tint import begin_tint, color, tint_of, turn
@@ -35,7 +35,7 @@ def shade(first, last, sight, seen, hits):
             place = end
 
 
-@exact
+@inlined
 def _blend(at, tint, lane, ray):
     """What one ray sees, front to back."""
     red = green = blue = far = weights = median = 0.0

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
+from diff4splat.kernels.jit import inlined
 from diff4splat.render.trace.frame import cross, dot
 from diff4splat.render.trace.tables import CENTER, HURRY, MEAN, SPREAD, VELOCITY, WHITEN
 from diff4splat.render.trace.tables import LEVEL as LEVEL_COLUMN
@@ -20,7 +20,7 @@ VX, VY, VZ, LATE, HURRIED = range(13, 18)
 """Velocity (3), deviations since the centre of the pulse, and deviations per second."""
 
 
-@exact
+@inlined
 def put_shape(shape, row, moving, frame):
     """Write the shape at the frame's time of the primitive at ``row``; both are addresses."""
     offset = (
@@ -56,12 +56,12 @@ def put_shape(shape, row, moving, frame):
     _put(shape, LEVEL, double_at(row, LEVEL_COLUMN))
 
 
-@exact
+@inlined
 def _put(shape, column, value):
     put_float(shape, column, np.float32(value))
 
 
-@exact
+@inlined
 def _whitened(row, v):
     """W v."""
     return (
@@ -71,12 +71,12 @@ def _whitened(row, v):
     )
 
 
-@exact
+@inlined
 def _component(row, at, v):
     return double_at(row, at) * v[0] + double_at(row, at + 1) * v[1] + double_at(row, at + 2) * v[2]
 
 
-@exact
+@inlined
 def _put_motion(shape, row, frame, offset):
     """The offset of the mean at the frame's time; velocity and pulse go to the shape."""
     since, hurry = frame.time - double_at(row, CENTER), double_at(row, HURRY)

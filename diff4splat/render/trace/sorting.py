@@ -6,8 +6,8 @@ Neighbours on Hilbert's curve are neighbours in space, so runs of it are compact
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.kernels.jit import inlined
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.tables import Integers
 
 _DIGIT_BITS = np.uint64(11)
@@ -40,7 +40,7 @@ def sort_keys(keys, order, spare_keys, spare_order):
     return order
 
 
-@exact
+@inlined
 def _scatter(keys, order, to_keys, to_order, shift):
     """One pass: stable counting sort by one digit."""
     starts = np.zeros(_BUCKETS, np.int64)
@@ -58,7 +58,7 @@ def _scatter(keys, order, to_keys, to_order, shift):
         starts[bucket] += 1
 
 
-@exact
+@inlined
 def hilbert(corner, dimensions, depth):
     """Place of a cell along the curve; ``corner`` (whole numbers below 2^depth) is overwritten."""
     bit = 1 << (depth - 1)

@@ -3,8 +3,8 @@
 Rows are float64 and known by their addresses.
 """
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES
 from diff4splat.render.trace.vectors import double_at, put_double
 
 A, B, E, LATE_A, LATE_E, LATER_E, COLOR, DIRECT, LATE_DIRECT, COLUMNS = (
@@ -20,13 +20,13 @@ TO_ORIGIN, TO_DIRECTION, TO_TIME, TO_RAY = 0, 3, 6, 7
 """Columns of a ray."""
 
 
-@exact
+@inlined
 def add(row, column, value):
     """Add to one column."""
     put_double(row, column, double_at(row, column) + value)
 
 
-@exact
+@inlined
 def add_three(row, column, values, factor):
     """Add to three columns."""
     add(row, column, factor * values[0])
@@ -34,7 +34,7 @@ def add_three(row, column, values, factor):
     add(row, column + 2, factor * values[2])
 
 
-@exact
+@inlined
 def three_at(row, column):
     """Three neighbouring columns."""
     return double_at(row, column), double_at(row, column + 1), double_at(row, column + 2)

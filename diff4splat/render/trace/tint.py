@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES, total
+from diff4splat.kernels.simd_memory import aligned_floats
 from diff4splat.render.raster.harmonics import evaluate as evaluate_harmonics
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES, total
-from diff4splat.render.raster.memory import aligned_floats
 from diff4splat.render.trace.tables import CENTER, MEAN, MOVING_COLUMNS, VELOCITY, Doubles, Floats
 from diff4splat.render.trace.vectors import address, double_at, float_at, lanes_at
 
@@ -43,7 +43,7 @@ class Tint(NamedTuple):
     brush: Brush
 
 
-@exact
+@inlined
 def begin_tint():
     """Memory for one thread."""
     basis = aligned_floats(LANES)
@@ -51,7 +51,7 @@ def begin_tint():
     return Brush(basis, np.zeros(16), np.zeros((16, 3)))
 
 
-@exact
+@inlined
 def tint_of(sight, brush):
     """How the rays of ``sight`` see its world."""
     world, rays = sight.world, sight.rays
@@ -69,7 +69,7 @@ def tint_of(sight, brush):
     )
 
 
-@exact
+@inlined
 def turn(tint, i, ray):
     """Evaluate the harmonics for primitive ``i`` seen by ``ray``."""
     if tint.bands > 1:
@@ -80,7 +80,7 @@ def turn(tint, i, ray):
             tint.brush.basis[k] = values[k]
 
 
-@exact
+@inlined
 def toward(tint, i, ray):
     """From the origin of a ray to a mean at the ray's time; not of unit length."""
     x, y, z = triple_at(tint.origins, ray)
@@ -94,7 +94,7 @@ def toward(tint, i, ray):
     return x, y, z
 
 
-@exact
+@inlined
 def triple_at(place, row):
     """Three float32 of a row, in float64."""
     return (
@@ -104,7 +104,7 @@ def triple_at(place, row):
     )
 
 
-@exact
+@inlined
 def color(tint, i, channel):
     """One channel of a primitive before it is held above 0."""
     if tint.bands == 1:

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES, fill, fma
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import LANES, fill, fma
 from diff4splat.render.trace.frame import dot
 from diff4splat.render.trace.sums import (
     COLOR,
@@ -24,13 +24,13 @@ from diff4splat.render.trace.tint import toward
 from diff4splat.render.trace.vectors import double_at, float_at, lanes_at, put_lanes
 
 
-@exact
+@inlined
 def plain_backward(row, pulls):
     """Add the gradient of a colour without harmonics to the row of its primitive."""
     add_three(row, COLOR, pulls, 1.0)
 
 
-@exact
+@inlined
 def lobes_backward(tint, i, lobes, pulls):
     """Add to the row of harmonics of primitive ``i``; returns the gradient of the basis by lane."""
     basis, own = lanes_at(tint.basis, 0), fill(0.0)
@@ -41,13 +41,13 @@ def lobes_backward(tint, i, lobes, pulls):
     return own
 
 
-@exact
+@inlined
 def turn_backward(tint, basis_grad, ray_row):
     """From the gradient of the basis (an address of sixteen) to the direction of the ray."""
     add_three(ray_row, TO_DIRECTION, _turned(tint, basis_grad), 1.0)
 
 
-@exact
+@inlined
 def toward_backward(tint, i, ray, basis_grad, row, ray_row):
     """The same to origin and mean, between which the direction lies."""
     away = toward(tint, i, ray)
@@ -69,7 +69,7 @@ def toward_backward(tint, i, ray, basis_grad, row, ray_row):
         add(ray_row, TO_TIME, dot(three_at(table, VELOCITY), pull))
 
 
-@exact
+@inlined
 def _turned(tint, basis_grad):
     """Gradient of the direction from that of the basis."""
     x = y = z = 0.0

@@ -9,12 +9,12 @@ import math
 
 import numpy as np
 
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.parallel import parallel_for, ranges
+from diff4splat.kernels.simd16 import LANES
 from diff4splat.render.raster.canvas import empty
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import LANES
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART, Boxes
-from diff4splat.render.trace.compiled import kernel
+from diff4splat.render.trace.jit import kernel
 from diff4splat.render.trace.sorting import hilbert, sorted_order
 from diff4splat.render.trace.tables import NODE_ROWS, Integers, Tree
 
@@ -44,7 +44,7 @@ def build(boxes: Boxes, known: Integers = NOTHING_KNOWN) -> Tree:
         fit_groups(first, last, tree, boxes)
 
     # Whole nodes to a part, so that no two of them write into one.
-    spread(work, ranges(groups, PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(groups, PRIMITIVES_PER_PART))
     fit_nodes(tree.nodes, tree.levels, groups)
     return tree
 
@@ -58,7 +58,7 @@ def _neighbours(
     def work(first: int, last: int) -> None:
         place_keys(first, last, listed, boxes, anchor, extent, keys)
 
-    spread(work, ranges(len(listed), PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(len(listed), PRIMITIVES_PER_PART))
     return listed[sorted_order(keys)]
 
 
@@ -131,7 +131,7 @@ def fit_groups(first, last, tree, boxes):
             nodes[node, axis + 3, child] = _outward(high - tree.anchor[axis], 1.0)
 
 
-@exact
+@inlined
 def _outward(corner, sign):
     # Where nothing is, infinity must not meet infinity.
     return np.float32(corner + sign * ROOM * abs(corner) if abs(corner) < np.inf else corner)

@@ -11,8 +11,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from diff4splat.render.raster.jit import exact
-from diff4splat.render.raster.lanes import FLOATS, LANES, lanes
+from diff4splat.kernels.jit import inlined
+from diff4splat.kernels.simd16 import FLOATS, LANES, lanes
 
 _WORD = ir.IntType(64)
 
@@ -65,7 +65,7 @@ def root(typing_context, x):
     return lanes(x), emit
 
 
-@exact
+@inlined
 def address(array):
     """Where a C-contiguous array begins."""
     return array.ctypes.data

@@ -7,7 +7,7 @@ import oracles_drawing as oracle
 import pytest
 
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
-from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS, kernel
+from diff4splat.data_prep.synthetic.drawing.jit import GROUP, kernel
 from diff4splat.data_prep.synthetic.drawing.lenses import lens_of
 from diff4splat.data_prep.synthetic.drawing.queries import visible
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
@@ -30,8 +30,8 @@ def light_on(points, normal, heights, chart, shares):
         shares[at] = lit(x, y, z, normal, heights, chart, 0.0, 1.0, 0.0)
 
 
-KERNELS.remove(bytes_of)
-KERNELS.remove(light_on)
+GROUP.kernels.remove(bytes_of)
+GROUP.kernels.remove(light_on)
 TEXEL_M = 0.1
 
 

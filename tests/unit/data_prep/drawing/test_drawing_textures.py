@@ -4,8 +4,8 @@ import numpy as np
 import oracles_drawing as oracle
 import pytest
 
-from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS, kernel
 from diff4splat.data_prep.synthetic.drawing.gather import gather
+from diff4splat.data_prep.synthetic.drawing.jit import GROUP, kernel
 from diff4splat.data_prep.synthetic.drawing.lettering import FONT
 from diff4splat.data_prep.synthetic.drawing.textures import FAMILIES, materials_of, pattern
 from diff4splat.errors import ConfigError
@@ -22,7 +22,7 @@ def sampled(family, places, footprint, seed, values):
             values[index, at] = found[at]
 
 
-KERNELS.remove(sampled)
+GROUP.kernels.remove(sampled)
 
 
 def values_of(family: str, places: np.ndarray, footprint: float = 0.01, seed: int = 5):

@@ -18,7 +18,7 @@ from diff4splat.render.api import render
 from diff4splat.render.raster import function
 from diff4splat.render.raster.backward import Drawn
 from diff4splat.render.raster.canvas import Canvas
-from diff4splat.render.raster.warm import ensure_compiled
+from diff4splat.render.raster.jit import GROUP
 from diff4splat.render.settings import RenderSettings
 
 SUPPORT = Path(__file__).parents[3] / "support"
@@ -42,7 +42,7 @@ def arrays_in(thing: object) -> list[np.ndarray]:
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> list[Drawn]:
     """What pictures keep for the way back."""
-    ensure_compiled()
+    GROUP.ensure_compiled()
     made = []
 
     def make(**parts: object) -> Drawn:

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diff4splat.render.trace.cells import choose_cells
+from diff4splat.render.trace.jit import GROUP
 from diff4splat.render.trace.packets import bundle_rays
 from diff4splat.render.trace.tables import Bundle, Floats
-from diff4splat.render.trace.warm import ensure_compiled
 
 NONE = np.empty(0, np.float32)
 DISTANCE, SIZE = 3.0, 250.0
@@ -18,7 +18,7 @@ DISTANCE, SIZE = 3.0, 250.0
 
 @pytest.fixture(autouse=True, scope="module")
 def _compiled() -> None:
-    ensure_compiled()
+    GROUP.ensure_compiled()
 
 
 def turn(seed: int) -> np.ndarray:

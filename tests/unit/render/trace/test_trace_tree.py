@@ -12,13 +12,13 @@ from oracles_trace import as_array, bundle, covariance, motion, picture, scene
 
 from diff4splat.render.trace.boxes import Boxes, boxes_between, united
 from diff4splat.render.trace.forward import make_rules, make_sight, make_world, see
+from diff4splat.render.trace.jit import GROUP
 from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.settings import TraceSettings
 from diff4splat.render.trace.sorting import hilbert, sorted_order
 from diff4splat.render.trace.tables import Cloud, Motion, Rules, Sight, World
 from diff4splat.render.trace.tree import build
-from diff4splat.render.trace.warm import ensure_compiled
 from diff4splat.scene.gaussians import Gaussians
 
 NONE = np.empty(0, np.float32)
@@ -26,7 +26,7 @@ NONE = np.empty(0, np.float32)
 
 @pytest.fixture(autouse=True, scope="module")
 def _compiled() -> None:
-    ensure_compiled()
+    GROUP.ensure_compiled()
 
 
 def world_of(

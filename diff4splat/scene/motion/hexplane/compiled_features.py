@@ -12,9 +12,9 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from diff4splat.scene.motion.hexplane.jit import spread
+from diff4splat.kernels.parallel import parallel_for
+from diff4splat.kernels.simd16 import LANES
 from diff4splat.scene.motion.hexplane.kernels import Floats, Planes, Shape, accumulate, read
-from diff4splat.scene.motion.hexplane.lanes import LANES
 
 POINTS_AT_ONCE = 2048
 
@@ -40,7 +40,7 @@ class _Features(torch.autograd.Function):
             for first in range(0, len(unit), POINTS_AT_ONCE)
             for k, shape in _numbered(shapes, tables)
         ]
-        spread(read, parts)
+        parallel_for(read, parts)
         return made
 
     @staticmethod
@@ -56,7 +56,7 @@ class _Features(torch.autograd.Function):
             (places, values[k], shape, given, out[k], _flat(part))
             for (k, shape), part in zip(_numbered(shapes, tables), to_unit, strict=True)
         ]
-        spread(accumulate, parts)
+        parallel_for(accumulate, parts)
         return to_unit.sum(0), *made
 
 

@@ -1,24 +1,14 @@
-"""Compilation ahead of use: visible, once per machine.
+"""Warm-up of the rasteriser's kernels: a tiny scene with every output, forward and backward."""
 
-Kernels compile when they are first called and are then loaded from disk. A tiny scene, drawn
-forwards and backwards with everything that can be asked for, calls each of them once.
-"""
-
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
-from threading import Lock
 
 import torch
 from jaxtyping import Int
 from torch import Tensor
 
-from diff4splat import jit
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath
-from diff4splat.render.compiling import compile_aloud, warmed
 from diff4splat.render.raster.function import rasterize
-from diff4splat.render.raster.jit import KERNELS
 from diff4splat.render.raster.plan import make_plan, make_view
 from diff4splat.render.raster.sequence import Sequence
 from diff4splat.render.settings import RenderSettings
@@ -26,41 +16,9 @@ from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.scene import Provenance, Scene
 
-_ONE_AT_A_TIME = Lock()
 
-
-def is_ready() -> bool:
-    """Whether every kernel was compiled before, in this process or on this machine."""
-    return all(map(jit.is_ready, KERNELS))
-
-
-def kernel_count() -> int:
-    """How many kernels `warm` goes through."""
-    return len(KERNELS)
-
-
-def warm(advance: Callable[[str], None] = lambda name: None) -> float:
-    """Load or compile every kernel; ``advance`` hears the names of compiled ones.
-
-    Returns the seconds.
-    """
-    return warmed(KERNELS, advance, _draw_tiny_scene)
-
-
-def ensure_compiled() -> None:
-    """Before the first picture of a process: say so if kernels must be compiled, and do it."""
-    with _ONE_AT_A_TIME:
-        _compile_once()
-
-
-@cache
-def _compile_once() -> None:
-    if not is_ready():
-        compile_aloud("the CPU renderer", warm)
-
-
-def _draw_tiny_scene() -> None:
-    """One picture with its gradients, then two of a sequence."""
+def warm_up() -> None:
+    """Call every kernel of the rasteriser once: one image with gradients, then a sequence."""
     gaussians = _gaussian()
     camera = pinhole(8.0, (8, 8))
     plan = make_plan(camera, RenderSettings(), colors=True, medians=True)

@@ -1,8 +1,8 @@
-"""Sixteen float32 lanes as one value inside kernels, on any processor.
+"""SIMD values of sixteen float32 lanes inside kernels, on any processor.
 
-LLVM lowers ``<16 x float>`` to what the machine has: one register of AVX-512, two of AVX, four of
-SSE or NEON. Kernels read as scalar arithmetic, and nothing is left to an auto-vectoriser. Scalars
-are spread over the lanes where they meet them.
+LLVM lowers ``<16 x float>`` to the registers of the machine: one of AVX-512, two of AVX, four of
+SSE or NEON. Kernels read as scalar arithmetic and need no auto-vectoriser. In an operation with
+lanes, a scalar is broadcast to all lanes.
 """
 
 import operator
@@ -61,8 +61,8 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(manager, kind, _BITS)
 
 
-def _spread(context: Any, builder: Any, value: Any, kind: types.Type) -> Any:
-    """A scalar in all lanes; lanes as they are."""
+def _broadcast(context: Any, builder: Any, value: Any, kind: types.Type) -> Any:
+    """A scalar in all lanes; lanes unchanged."""
     if isinstance(kind, LanesType):
         return value
     scalar = context.cast(builder, value, kind, types.float32)
@@ -70,12 +70,12 @@ def _spread(context: Any, builder: Any, value: Any, kind: types.Type) -> Any:
     return builder.shuffle_vector(first, first, ir.Constant(INDICES, [0] * LANES))
 
 
-def _spread_all(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
-    return [_spread(context, builder, a, k) for a, k in zip(args, sig.args, strict=True)]
+def _broadcast_all(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
+    return [_broadcast(context, builder, a, k) for a, k in zip(args, sig.args, strict=True)]
 
 
-def _teach(symbol: Any, result: types.Type, emit: Callable[..., Any]) -> None:
-    """Make ``symbol`` an operation on lanes with lanes or scalars."""
+def _register_operator(symbol: Any, result: types.Type, emit: Callable[..., Any]) -> None:
+    """Define ``symbol`` for lanes with lanes or scalars."""
 
     @infer_global(symbol)
     class _Typing(AbstractTemplate):
@@ -86,21 +86,21 @@ def _teach(symbol: Any, result: types.Type, emit: Callable[..., Any]) -> None:
             return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return emit(builder, *_spread_all(context, builder, sig, args))
+        return emit(builder, *_broadcast_all(context, builder, sig, args))
 
     lower_builtin(symbol, LanesType, LanesType)(lower)
     lower_builtin(symbol, LanesType, types.Float)(lower)
     lower_builtin(symbol, types.Float, LanesType)(lower)
 
 
-_teach(operator.add, lanes, lambda b, x, y: b.fadd(x, y))
-_teach(operator.sub, lanes, lambda b, x, y: b.fsub(x, y))
-_teach(operator.mul, lanes, lambda b, x, y: b.fmul(x, y))
-_teach(operator.truediv, lanes, lambda b, x, y: b.fdiv(x, y))
-_teach(operator.lt, mask, lambda b, x, y: b.fcmp_ordered("<", x, y))
-_teach(operator.le, mask, lambda b, x, y: b.fcmp_ordered("<=", x, y))
-_teach(operator.gt, mask, lambda b, x, y: b.fcmp_ordered(">", x, y))
-_teach(operator.ge, mask, lambda b, x, y: b.fcmp_ordered(">=", x, y))
+_register_operator(operator.add, lanes, lambda b, x, y: b.fadd(x, y))
+_register_operator(operator.sub, lanes, lambda b, x, y: b.fsub(x, y))
+_register_operator(operator.mul, lanes, lambda b, x, y: b.fmul(x, y))
+_register_operator(operator.truediv, lanes, lambda b, x, y: b.fdiv(x, y))
+_register_operator(operator.lt, mask, lambda b, x, y: b.fcmp_ordered("<", x, y))
+_register_operator(operator.le, mask, lambda b, x, y: b.fcmp_ordered("<=", x, y))
+_register_operator(operator.gt, mask, lambda b, x, y: b.fcmp_ordered(">", x, y))
+_register_operator(operator.ge, mask, lambda b, x, y: b.fcmp_ordered(">=", x, y))
 
 
 @infer_global(operator.and_)
@@ -126,7 +126,7 @@ def _bits(builder: Any, where: Any) -> Any:
 @intrinsic
 def fill(typing_context, value):
     """A scalar in all lanes."""
-    return lanes(value), lambda c, b, sig, args: _spread(c, b, args[0], sig.args[0])
+    return lanes(value), lambda c, b, sig, args: _broadcast(c, b, args[0], sig.args[0])
 
 
 @intrinsic
@@ -134,7 +134,7 @@ def fma(typing_context, x, y, z):
     """X y + z, rounded once."""
 
     def emit(context, builder, sig, args):
-        return _call(builder, "llvm.fma.v16f32", _spread_all(context, builder, sig, args))
+        return _call(builder, "llvm.fma.v16f32", _broadcast_all(context, builder, sig, args))
 
     return lanes(x, y, z), emit
 
@@ -144,7 +144,7 @@ def less_product(typing_context, x, y, z):
     """X - y z, rounded once."""
 
     def emit(context, builder, sig, args):
-        x, y, z = _spread_all(context, builder, sig, args)
+        x, y, z = _broadcast_all(context, builder, sig, args)
         return _call(builder, "llvm.fma.v16f32", [builder.fneg(y), z, x])
 
     return lanes(x, y, z), emit
@@ -155,7 +155,7 @@ def minimum(typing_context, x, y):
     """The smaller one, lane by lane."""
 
     def emit(context, builder, sig, args):
-        x, y = _spread_all(context, builder, sig, args)
+        x, y = _broadcast_all(context, builder, sig, args)
         return builder.select(builder.fcmp_ordered("<", x, y), x, y)
 
     return lanes(x, y), emit
@@ -167,7 +167,7 @@ def select(typing_context, where, yes, no):
 
     def emit(context, builder, sig, args):
         choices = zip(args[1:], sig.args[1:], strict=True)
-        return builder.select(args[0], *(_spread(context, builder, a, k) for a, k in choices))
+        return builder.select(args[0], *(_broadcast(context, builder, a, k) for a, k in choices))
 
     return lanes(where, yes, no), emit
 

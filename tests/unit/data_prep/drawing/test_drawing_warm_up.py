@@ -9,19 +9,20 @@ import oracles_drawing as oracle
 import pytest
 
 from diff4splat.data_prep import writing
-from diff4splat.data_prep.synthetic.drawing import compiled, warm
 from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
+from diff4splat.data_prep.synthetic.drawing.jit import GROUP
 from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.data_prep.writing import WorldJob, write_worlds
 from diff4splat.errors import OutputError
 from diff4splat.progress.phases import Phases
+from diff4splat.progress.precompile import ensure_precompiled
 
 TINY = WorldRecipe(frames=2, views=1, size_px=(16, 16))
 
 
 def signatures() -> dict[str, int]:
-    return {kernel.py_func.__name__: len(kernel.signatures) for kernel in compiled.KERNELS}
+    return {kernel.py_func.__name__: len(kernel.signatures) for kernel in GROUP.kernels}
 
 
 def job(folder: Path, clips: int = 1) -> WorldJob:
@@ -45,18 +46,18 @@ def cold(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return drawn(*asked)
 
     drawn = writing._draw
-    monkeypatch.setattr(warm, "is_ready", lambda: "compile" in happened)
-    monkeypatch.setattr(warm, "kernel_count", lambda: 2)
-    monkeypatch.setattr(warm, "warm", compile_all)
+    monkeypatch.setattr(GROUP, "is_ready", lambda: "compile" in happened)
+    monkeypatch.setattr(GROUP, "kernel_count", lambda: 2)
+    monkeypatch.setattr(GROUP, "precompile", compile_all)
     monkeypatch.setattr(writing, "_draw", draw)
     return happened
 
 
 def test_warming_up_compiles_everything_that_worlds_need() -> None:
-    warm.warm()
+    GROUP.precompile()
     before = signatures()
-    assert warm.is_ready()
-    assert warm.kernel_count() == len(before) > 8
+    assert GROUP.is_ready()
+    assert GROUP.kernel_count() == len(before) > 8
     assert set(before.values()) == {1}
     settings = DrawSettings(samples_per_side=2, tracks=20, shadow_px=32, threads=2)
     draw_clip(make_world(TINY, 0), settings)
@@ -66,12 +67,12 @@ def test_warming_up_compiles_everything_that_worlds_need() -> None:
 
 
 def test_what_is_compiled_has_nothing_to_report() -> None:
-    warm.warm()
+    GROUP.precompile()
     heard = []
-    assert warm.warm(heard.append) >= 0
+    assert GROUP.precompile(heard.append) >= 0
     assert heard == []
     phases = Phases()
-    warm.prepare_drawing(phases)
+    ensure_precompiled(GROUP, phases)
     assert phases.seconds == {}
 
 
@@ -92,12 +93,12 @@ def test_nothing_compiles_where_nothing_is_drawn(cold: list[str], tmp_path: Path
 
 
 FRESH = """
-from diff4splat.data_prep.synthetic.drawing import warm
+from diff4splat.data_prep.synthetic.drawing.jit import GROUP
 if __name__ == "__main__":
     heard = []
-    print(warm.is_ready())
-    warm.warm(heard.append)
-    print(len(heard) == warm.kernel_count(), warm.is_ready(), warm.KERNELS[0].stats.cache_path)
+    print(GROUP.is_ready())
+    GROUP.precompile(heard.append)
+    print(len(heard) == GROUP.kernel_count(), GROUP.is_ready(), GROUP.kernels[0].stats.cache_path)
 """
 
 

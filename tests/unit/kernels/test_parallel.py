@@ -6,7 +6,7 @@ import time
 import pytest
 import torch
 
-from diff4splat.render.raster.threads import ranges, spread
+from diff4splat.kernels.parallel import parallel_for, ranges
 
 
 @pytest.fixture(params=[1, 3], autouse=True)
@@ -25,7 +25,7 @@ def test_every_part_is_done_once(count: int) -> None:
         with lock:
             done.append((number, double))
 
-    spread(work, ((number, 2 * number) for number in range(count)))
+    parallel_for(work, ((number, 2 * number) for number in range(count)))
     assert sorted(done) == [(number, 2 * number) for number in range(count)]
 
 
@@ -44,7 +44,7 @@ def test_an_error_comes_back_when_nobody_works_any_more() -> None:
             working.discard(number)
 
     with pytest.raises(ValueError, match="part 0"):
-        spread(work, ((number,) for number in range(100)))
+        parallel_for(work, ((number,) for number in range(100)))
     assert not working
     assert len(begun) < 10, "the parts that nobody had begun are left out"
 
@@ -59,10 +59,10 @@ def test_an_error_of_a_helper_ends_the_work_of_the_caller_too() -> None:
             raise ValueError("a helper")
 
     with pytest.raises(ValueError, match="a helper"):
-        spread(work, ((number,) for number in range(100)))
+        parallel_for(work, ((number,) for number in range(100)))
     assert len(begun) < 20
     done = []
-    spread(done.append, ((number,) for number in range(20)))
+    parallel_for(done.append, ((number,) for number in range(20)))
     assert sorted(done) == list(range(20))
 
 
@@ -74,7 +74,7 @@ def test_the_caller_works_and_all_threads_help() -> None:
         meeting.wait()
         seen.add(threading.current_thread())
 
-    spread(work, ((number,) for number in range(count)))
+    parallel_for(work, ((number,) for number in range(count)))
     assert len(seen) == count
     assert threading.current_thread() in seen
 
@@ -84,7 +84,7 @@ def test_two_callers_at_once() -> None:
 
     def call(own: list[int]) -> None:
         for _ in range(20):
-            spread(own.append, ((number,) for number in range(10)))
+            parallel_for(own.append, ((number,) for number in range(10)))
 
     callers = [threading.Thread(target=call, args=(own,)) for own in done]
     for caller in callers:
@@ -99,7 +99,7 @@ def test_no_more_threads_are_started_than_are_allowed() -> None:
     torch.set_num_threads(7)
     before = threading.active_count()
     for count in range(2, 20):
-        spread(lambda _: time.sleep(1e-3), ((number,) for number in range(count)))
+        parallel_for(lambda _: time.sleep(1e-3), ((number,) for number in range(count)))
     assert threading.active_count() - before <= 6
 
 

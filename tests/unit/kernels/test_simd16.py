@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numba import njit
 
-from diff4splat.render.raster import lanes as ops
-from diff4splat.render.raster.memory import (
+from diff4splat.kernels import simd16 as ops
+from diff4splat.kernels.simd_memory import (
     aligned_floats,
     block_columns,
     block_rows,

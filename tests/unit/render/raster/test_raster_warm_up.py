@@ -9,22 +9,21 @@ import pytest
 import torch
 from oracles_raster import cloud, leaves, lens_leaves, render_raster, wide_camera
 
-from diff4splat.render.raster import jit
-from diff4splat.render.raster.warm import is_ready, kernel_count, warm
+from diff4splat.render.raster.jit import GROUP
 from diff4splat.render.settings import OUTPUTS
 
 SUPPORT = Path(__file__).parents[3] / "support"
 
 
 def compiled() -> dict[str, int]:
-    return {kernel.py_func.__name__: len(kernel.signatures) for kernel in jit.KERNELS}
+    return {kernel.py_func.__name__: len(kernel.signatures) for kernel in GROUP.kernels}
 
 
 def test_warming_up_compiles_everything_that_pictures_need() -> None:
-    warm()
+    GROUP.precompile()
     before = compiled()
-    assert is_ready()
-    assert kernel_count() == len(before)
+    assert GROUP.is_ready()
+    assert GROUP.kernel_count() == len(before)
     assert set(before.values()) == {1}
     camera = lens_leaves(wide_camera((30, 40)), torch.float32)
     for bands in (1, 16):
@@ -41,18 +40,18 @@ def test_warming_up_compiles_everything_that_pictures_need() -> None:
 
 
 def test_what_is_compiled_has_nothing_to_report() -> None:
-    warm()
+    GROUP.precompile()
     heard = []
-    assert warm(heard.append) >= 0
+    assert GROUP.precompile(heard.append) >= 0
     assert heard == []
 
 
 PICTURE = """
 from oracles_raster import cloud, render_raster, wide_camera
-from diff4splat.render.raster.warm import is_ready
-print(is_ready())
+from diff4splat.render.raster.jit import GROUP
+print(GROUP.is_ready())
 render_raster(cloud(3), wide_camera((8, 8)), "rgb")
-print(is_ready())
+print(GROUP.is_ready())
 render_raster(cloud(3), wide_camera((8, 8)), "rgb")
 """
 

@@ -1,5 +1,8 @@
 """Compiled features against the PyTorch ones: equal to rounding, whatever the sizes."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -31,9 +34,9 @@ def made_by(which: str, planes: HexPlanes, points: Tensor, times: tuple) -> list
     ]
     unit = ((points - BOX[0]) / (BOX[1] - BOX[0])).requires_grad_()
     if which == "compiled":
-        from diff4splat.scene.motion.hexplane import compiled
+        from diff4splat.scene.motion.hexplane.compiled_features import features
 
-        out = compiled.features(unit, tables)
+        out = features(unit, tables)
     else:
         out = sampling.plain_features(unit, tables)
     seed = torch.randn(out.shape, generator=torch.Generator().manual_seed(5))
@@ -118,3 +121,24 @@ def test_differentiating_twice_is_refused() -> None:
     (slope,) = torch.autograd.grad(made, points, create_graph=True)
     with pytest.raises(RuntimeError, match="once_differentiable"):
         slope.sum().backward()
+
+
+def test_numba_is_loaded_by_the_first_compiled_features_and_not_before() -> None:
+    code = (
+        "import sys, torch\n"
+        "from diff4splat.scene.motion.hexplane import motion, planes, regularisers\n"
+        "from diff4splat.scene.motion import bake\n"
+        "made = planes.make_planes(planes.HexPlaneSize(), torch.eye(3)[:2], (0.0, 1.0))\n"
+        "made.to(torch.float64).features(torch.zeros(1, 3, dtype=torch.float64), 0.5)\n"
+        "assert 'numba' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env=dict(os.environ))
+
+
+def test_precompilation_reaches_both_kernels() -> None:
+    from diff4splat.scene.motion.hexplane.jit import GROUP
+
+    assert GROUP.precompile() >= 0
+    assert GROUP.is_ready()
+    assert GROUP.kernel_count() == 2
+    assert all(kernel.signatures for kernel in GROUP.kernels)

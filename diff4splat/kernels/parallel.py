@@ -1,7 +1,7 @@
-"""Parts of a kernel's work on as many threads as PyTorch uses.
+"""A loop over parts of a kernel's work, on as many threads as PyTorch uses.
 
-Kernels release Python's lock, so plain threads do. Each takes the next part when it is free; the
-parts never depend on the number of threads, so neither does any result.
+Kernels release Python's lock, so plain threads suffice. Each thread takes the next part when it is
+free. The parts never depend on the number of threads, so neither does any result.
 """
 
 import os
@@ -13,13 +13,13 @@ from threading import Lock
 import torch
 
 
-def spread(work: Callable[..., None], parts: Iterable[tuple]) -> None:
-    """Call ``work(*part)`` for every part; returns when no thread works any more.
+def parallel_for(work: Callable[..., None], parts: Iterable[tuple]) -> None:
+    """Call ``work(*part)`` for every part; returns when all threads are idle.
 
-    ``work`` must not call it again: all threads might wait for each other.
+    ``work`` must not call `parallel_for`: all threads might wait for each other.
 
     Raises:
-        Exception: what any of the calls raised; parts that nobody has begun are left out then.
+        Exception: that of the first failed call; parts that have not started are skipped.
     """
     waiting, lock = list(parts)[::-1], Lock()
 
@@ -28,7 +28,7 @@ def spread(work: Callable[..., None], parts: Iterable[tuple]) -> None:
             while part := _next(waiting, lock):
                 work(*part)
         finally:
-            # Nothing is left but after an error: then nobody begins another part.
+            # After an error no thread must start another part; otherwise the list is empty.
             with lock:
                 waiting.clear()
 
@@ -38,7 +38,7 @@ def spread(work: Callable[..., None], parts: Iterable[tuple]) -> None:
     try:
         take()
     finally:
-        # Those that are queued behind another picture have nothing left to do.
+        # A helper still queued, because another call occupies the pool, has nothing left to do.
         started = [helper for helper in running if not helper.cancel()]
         wait(started)
     for helper in started:
@@ -53,11 +53,11 @@ def _next(waiting: list[tuple], lock: Lock) -> tuple:
 
 @cache
 def _pool(threads: int, process: int) -> ThreadPoolExecutor:
-    """Threads that live as long as the process; a forked one starts its own."""
+    """Threads that live as long as the process; a forked process starts new ones."""
     del process
-    return ThreadPoolExecutor(threads, thread_name_prefix="diff4splat-raster")
+    return ThreadPoolExecutor(threads, thread_name_prefix="diff4splat-kernels")
 
 
 def ranges(count: int, size: int) -> list[tuple[int, int]]:
-    """(first, one past last) of pieces of at most ``size``."""
+    """(first, last + 1) of consecutive pieces of at most ``size``."""
     return [(first, min(first + size, count)) for first in range(0, count, size)]

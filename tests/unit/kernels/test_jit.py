@@ -1,30 +1,30 @@
-"""Kernels are compiled once per machine and kept on disk, as far as the disk allows it."""
+"""Kernels compile once per machine and are cached on disk, as far as the disk allows it."""
 
 import importlib.util
 import os
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
-from diff4splat import jit
-from diff4splat.data_prep.synthetic.drawing import compiled as drawing
-from diff4splat.render.raster import jit as raster
-from diff4splat.render.trace import compiled as trace
-from diff4splat.scene.motion.hexplane import jit as hexplane
+from diff4splat.data_prep.synthetic.drawing.jit import GROUP as DRAWING
+from diff4splat.kernels import jit
+from diff4splat.kernels.group import KernelGroup
+from diff4splat.render.raster.jit import GROUP as RASTER
+from diff4splat.render.trace.jit import GROUP as TRACE
+from diff4splat.scene.motion.hexplane.jit import GROUP as HEXPLANE
 
-PACKAGES = pytest.mark.parametrize(
-    "package", [raster, trace, hexplane, drawing], ids=lambda package: package.__name__
+GROUPS = pytest.mark.parametrize(
+    "group", [RASTER, TRACE, HEXPLANE, DRAWING], ids=lambda group: group.title
 )
 
 
-@pytest.fixture
-def nothing_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kernels made here are not those that `doctor --warm` goes through."""
-    for package in (raster, trace, drawing):
-        monkeypatch.setattr(package, "KERNELS", [])
+@pytest.fixture(autouse=True)
+def empty_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels of these tests are not those that `doctor --warm` precompiles."""
+    for group in (RASTER, TRACE, HEXPLANE, DRAWING):
+        monkeypatch.setattr(group, "_listed", [])
 
 
 @pytest.fixture
@@ -44,39 +44,37 @@ def twice(tmp_path: Path) -> Callable[[], Any]:
     return load
 
 
-@PACKAGES
-@pytest.mark.usefixtures("nothing_listed")
+@GROUPS
 def test_a_kernel_is_ready_once_it_was_compiled_anywhere(
-    package: ModuleType,
+    group: KernelGroup,
     twice: Callable[[], Any],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(jit, "cache_folder", lambda *sources: tmp_path / "kernels")
-    first = package.kernel(twice())
-    assert not jit.is_ready(first)
+    first = group.kernel(twice())
+    assert not jit.is_compiled(first)
     assert first(21.0) == 42.0
     assert list((tmp_path / "kernels").rglob("*.nbi"))
-    assert jit.is_ready(first)
-    again = package.kernel(twice())
-    assert jit.is_ready(again)
+    assert jit.is_compiled(first)
+    again = group.kernel(twice())
+    assert jit.is_compiled(again)
     assert again(21.0) == 42.0
     assert sum(again.stats.cache_hits.values()) == 1
 
 
-@PACKAGES
-@pytest.mark.usefixtures("nothing_listed")
+@GROUPS
 def test_without_a_folder_to_write_to_kernels_compile_all_the_same(
-    package: ModuleType, twice: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
+    group: KernelGroup, twice: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def nowhere(*sources: Path) -> Path:
         raise PermissionError("read only")
 
     monkeypatch.setattr(jit, "cache_folder", nowhere)
-    kernel = package.kernel(twice())
-    assert not jit.is_ready(kernel)
+    kernel = group.kernel(twice())
+    assert not jit.is_compiled(kernel)
     assert kernel(21.0) == 42.0
-    assert jit.is_ready(kernel)
+    assert jit.is_compiled(kernel)
 
 
 def test_a_full_disk_costs_time_and_not_the_run(
@@ -87,12 +85,12 @@ def test_a_full_disk_costs_time_and_not_the_run(
 
     monkeypatch.setattr(jit, "cache_folder", lambda *sources: tmp_path / "kernels")
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._save_data", full)
-    assert jit.kept(twice(), {})(21.0) == 42.0
+    assert jit.cached_njit(twice(), {})(21.0) == 42.0
     monkeypatch.undo()
     monkeypatch.setattr(jit, "cache_folder", lambda *sources: tmp_path / "kernels")
     # What it left behind does not stop the next run, which finds room.
-    assert jit.kept(twice(), {})(21.0) == 42.0
-    third = jit.kept(twice(), {})
+    assert jit.cached_njit(twice(), {})(21.0) == 42.0
+    third = jit.cached_njit(twice(), {})
     assert third(21.0) == 42.0
     assert sum(third.stats.cache_hits.values()) == 1
 
@@ -102,11 +100,11 @@ def test_kernels_lie_under_a_digest_of_their_sources(
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     for name in ("own", "others"):
-        (tmp_path / name).mkdir()
+        (tmp_path / name / "deeper").mkdir(parents=True)
     folders = []
     for own, other in (("1", "1"), ("2", "1"), ("1", "2"), ("1", "1")):
         (tmp_path / "own" / "footprint.py").write_text(f"a = {own}")
-        (tmp_path / "others" / "vectors.py").write_text(f"b = {other}")
+        (tmp_path / "others" / "deeper" / "vectors.py").write_text(f"b = {other}")
         folders.append(jit.cache_folder.__wrapped__(tmp_path / "own", tmp_path / "others"))
     assert folders[0] == folders[3]
     assert len(set(folders)) == 3
