@@ -63,7 +63,7 @@ def precompile_all() -> None:
     """
     precompile_group(WORLDS)
     precompile_group(HEXPLANE)
-    if (reason := installation.refusal(RASTER, "cpu")) is not None:
+    if (reason := installation.unsupported_reason(RASTER, "cpu")) is not None:
         raise Diff4SplatError(f"renderer {RASTER}: {reason}")
     precompile_group(RASTERIZER)
     precompile_group(TRACER)
@@ -132,7 +132,7 @@ def backend_rows() -> Rows:
     devices = ("cpu", "cuda") if torch.cuda.is_available() else ("cpu",)
     for name in BACKENDS:
         for device in devices:
-            reason = installation.refusal(name, device)
+            reason = installation.unsupported_reason(name, device)
             state = installation.backend_readiness(name) if reason is None else f"refuses: {reason}"
             yield f"renderer {name}", state if len(devices) == 1 else f"{device}: {state}"
 

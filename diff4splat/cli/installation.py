@@ -62,12 +62,12 @@ def load_libraries() -> None:
         ) from error
 
 
-def refusal(backend: str, device: str) -> str | None:
+def unsupported_reason(backend: str, device: str) -> str | None:
     """Why a back end does not draw float32 on a device."""
     from diff4splat.cli.precompile import small_job
     from diff4splat.render.backends import BACKENDS
 
-    return import_module(BACKENDS[backend]).refusal(small_job(speck(device)))
+    return import_module(BACKENDS[backend]).unsupported_reason(small_job(speck(device)))
 
 
 def backend_readiness(backend: str) -> str:
@@ -80,9 +80,9 @@ def backend_readiness(backend: str) -> str:
 def tracer_readiness() -> str:
     """Whether rays can be traced at once, or at all."""
     from diff4splat.cli.precompile import TRACER, readiness
-    from diff4splat.render.trace.support import refusal as tracer_refusal
+    from diff4splat.render.trace.support import unsupported_reason as tracer_reason
 
-    if (reason := tracer_refusal(speck("cpu"))) is not None:
+    if (reason := tracer_reason(speck("cpu"))) is not None:
         return f"refuses: {reason}"
     return readiness(TRACER)
 
@@ -98,7 +98,7 @@ def self_test() -> str:
     from diff4splat.cli.precompile import RASTER, RASTERIZER, kernel_group, small_job
     from diff4splat.render.api import render
 
-    ready = refusal(RASTER, "cpu") is None and kernel_group(RASTERIZER).is_ready()
+    ready = unsupported_reason(RASTER, "cpu") is None and kernel_group(RASTERIZER).is_ready()
     backend = RASTER if ready else "reference"
     scene = speck("cpu")
     camera = small_job(scene).camera

@@ -18,7 +18,7 @@ from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.physical.api import photograph
 from diff4splat.render.physical.settings import Photograph, PhotoSettings
-from diff4splat.render.physical.viewer import viewer_of
+from diff4splat.render.physical.view_cone import view_cone
 from diff4splat.render.settings import RenderSettings
 from diff4splat.render.trace.settings import TraceSettings
 from diff4splat.scene.gaussians import Gaussians
@@ -148,10 +148,10 @@ def half_pictures(
     total = places.new_zeros(len(places))
     for camera in cameras:
         own = camera.to(places.dtype)
-        viewer = viewer_of(own, time_s)
-        away = places - viewer.place
+        cone = view_cone(own, time_s)
+        away = places - cone.position
         distance = away.norm(dim=-1)
-        ahead = away @ viewer.ahead >= min(viewer.least_cosine, 0.0) * distance
-        half = 0.5 * own.camera.size_px[1] / viewer.pixels_per_radian
+        ahead = away @ cone.ahead >= min(cone.least_cosine, 0.0) * distance
+        half = 0.5 * own.camera.size_px[1] / cone.pixels_per_radian
         total = total + torch.where(ahead, distance * half, 0.0)
     return total / len(cameras)

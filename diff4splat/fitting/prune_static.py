@@ -14,7 +14,7 @@ from diff4splat.fitting.motions.still import Still
 from diff4splat.fitting.settings import FitSettings
 from diff4splat.fitting.static_detection import proved_still
 from diff4splat.progress.skipped import SkippedWork
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 
 MOST_TIMES = 16
 

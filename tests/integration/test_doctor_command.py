@@ -152,7 +152,9 @@ def test_what_is_not_compiled_is_said_and_not_compiled(
 def test_a_back_end_that_refuses_says_why(
     cold_drawing: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr(backend, "refusal", lambda job: "expected a fast CPU, got a slow one")
+    monkeypatch.setattr(
+        backend, "unsupported_reason", lambda job: "expected a fast CPU, got a slow one"
+    )
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
     assert table["renderer raster"] == "refuses: expected a fast CPU, got a slow one"
@@ -167,7 +169,7 @@ def test_with_a_gpu_every_back_end_is_asked_twice(
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "a fast one")
     refusals = {"cpu": None, "cuda": "expected CPU tensors, got cuda"}
-    monkeypatch.setattr(installation, "refusal", lambda name, device: refusals[device])
+    monkeypatch.setattr(installation, "unsupported_reason", lambda name, device: refusals[device])
     monkeypatch.setattr(installation, "self_test", lambda: "fine")
     assert run(["doctor"]) == 0
     shown = capsys.readouterr().out
@@ -263,7 +265,9 @@ def test_warm_says_when_there_was_nothing_to_do(
 def test_a_tracer_that_refuses_says_why(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr(support, "refusal", lambda gaussians: "expected the package numba")
+    monkeypatch.setattr(
+        support, "unsupported_reason", lambda gaussians: "expected the package numba"
+    )
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
     assert table["renderer trace"] == "refuses: expected the package numba"

@@ -14,7 +14,7 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.physical.effects import find_effects
 from diff4splat.render.physical.exposure import Exposure
-from diff4splat.render.physical.pinhole import drawn
+from diff4splat.render.physical.pinhole import rasterize_pinhole
 from diff4splat.render.physical.settings import OUTPUTS, Photograph, PhotoSettings
 from diff4splat.render.settings import require_outputs
 from diff4splat.scene.gaussians import Gaussians
@@ -46,7 +46,7 @@ def photograph(
     own = scene_or_gaussians
     means = (own if isinstance(own, Gaussians) else own.gaussians).means
     camera = _usable(camera, time_s).to(means.dtype).to(means.device)
-    settings = made_for(own, settings)
+    settings = with_default_smoothing(own, settings)
     effects = find_effects(own, camera, time_s, settings)
     if backend == "trace" or effects.any:
         if backend not in ("trace", "auto"):
@@ -57,10 +57,10 @@ def photograph(
             subject=own, camera=camera, time_s=time_s, settings=settings, effects=effects
         )
         return exposure.take(wanted)
-    return drawn(own, camera, time_s, wanted, settings, effects, backend)
+    return rasterize_pinhole(own, camera, time_s, wanted, settings, effects, backend)
 
 
-def made_for(subject: Scene | Gaussians, settings: PhotoSettings) -> PhotoSettings:
+def with_default_smoothing(subject: Scene | Gaussians, settings: PhotoSettings) -> PhotoSettings:
     """The settings with what the subject itself asks for, where they leave it open."""
     if settings.smoothing_px2 is not None:
         return settings

@@ -9,7 +9,7 @@ from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.api import render
 from diff4splat.render.physical.effects import Effects
-from diff4splat.render.physical.exposing import middle_s
+from diff4splat.render.physical.ray_batches import middle_s
 from diff4splat.render.physical.settings import Photograph, PhotoSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
@@ -17,7 +17,7 @@ from diff4splat.scene.scene import Scene
 _SAME = frozenset({"rgb", "alpha", "depth", "median_depth"})
 
 
-def drawn(
+def rasterize_pinhole(
     subject: Scene | Gaussians,
     camera: PhysicalCamera,
     time_s: float,

@@ -15,7 +15,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera
 from diff4splat.render.channels import extra_channels, name_outputs
 from diff4splat.render.projection import camera_space, to_pixels
-from diff4splat.render.raster.plan import TILE_SIZES_PX, make_plan
+from diff4splat.render.raster.raster_settings import TILE_SIZES_PX, make_raster_settings
 from diff4splat.render.settings import RenderJob, RenderOutput
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
@@ -29,7 +29,7 @@ _MOST_GAUSSIANS = 1 << 24
 """Beyond it float32 cannot number the entries of a list."""
 
 
-def refusal(job: RenderJob) -> str | None:
+def unsupported_reason(job: RenderJob) -> str | None:
     """Why ``job`` cannot be done here, or None."""
     means = job.gaussians.means
     if means.device.type != "cpu":
@@ -55,7 +55,9 @@ def render(job: RenderJob) -> RenderOutput:
     medians = "median_depth" in job.outputs
     with torch.autocast("cpu", enabled=False):
         depth, extras = _depth_and_extras(job)
-        plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, extras.shape[1])
+        plan = make_raster_settings(
+            job.camera, job.settings, "rgb" in job.outputs, medians, extras.shape[1]
+        )
         made = rasterize(plan, job.gaussians, extras, job.camera)
         median_depth = _median_depth(depth, made.medians[0]) if medians else None
         return _named(job, made, median_depth)
@@ -69,13 +71,15 @@ def open_sequence(scene: Scene, job: RenderJob) -> Callable[[Camera, float], Ren
     if not job.outputs <= _SHARED_OUTPUTS or _wants_gradient(job):
         return None
     from diff4splat.render.raster.jit import GROUP
-    from diff4splat.render.raster.plan import make_view
+    from diff4splat.render.raster.raster_settings import make_view
     from diff4splat.render.raster.sequence import Sequence
 
     GROUP.ensure_compiled()
     medians = "median_depth" in job.outputs
     depths = "depth" in job.outputs
-    plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, 2 if depths else 0)
+    plan = make_raster_settings(
+        job.camera, job.settings, "rgb" in job.outputs, medians, 2 if depths else 0
+    )
     sequence = Sequence(scene, plan, depths)
 
     def draw(camera: Camera, time_s: float) -> RenderOutput:

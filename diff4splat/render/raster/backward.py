@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diff4splat.kernels.parallel import parallel_for, ranges
-from diff4splat.render.raster.blend_backward import blend_backward, sum_slots
-from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.render.raster.blending.blend_backward import blend_backward, sum_slots
 from diff4splat.render.raster.forward import (
     GAUSSIANS_PER_PART,
     TILES_PER_PART,
@@ -21,9 +20,14 @@ from diff4splat.render.raster.forward import (
     numbered,
     tiles_of,
 )
-from diff4splat.render.raster.harmonics import colors_backward
-from diff4splat.render.raster.plan import Plan
-from diff4splat.render.raster.project_backward import CAMERA_COLUMNS, POSITION, project_backward
+from diff4splat.render.raster.padded_image import PaddedImage, empty
+from diff4splat.render.raster.projection.harmonics import colors_backward
+from diff4splat.render.raster.projection.project_backward import (
+    CAMERA_COLUMNS,
+    POSITION,
+    project_backward,
+)
+from diff4splat.render.raster.raster_settings import RasterSettings
 from diff4splat.render.raster.tables import MOMENTS, Cloud, Doubles, Floats, View
 
 
@@ -31,11 +35,11 @@ from diff4splat.render.raster.tables import MOMENTS, Cloud, Doubles, Floats, Vie
 class Drawn:
     """What the way back needs of the way forward."""
 
-    plan: Plan
+    plan: RasterSettings
     view: View
     found: Footprints
     values: Floats
-    canvas: Canvas
+    canvas: PaddedImage
     binned: Binned
     filled: Filled | None
     """The lists, unless there were several regions; then they are made again."""

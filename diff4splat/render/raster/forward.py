@@ -13,14 +13,14 @@ import torch
 from numpy.typing import NDArray
 
 from diff4splat.kernels.parallel import parallel_for, ranges
-from diff4splat.render.raster.blend import FIXED, blend
-from diff4splat.render.raster.canvas import Canvas, empty
-from diff4splat.render.raster.harmonics import colors
-from diff4splat.render.raster.order import nearest_first
-from diff4splat.render.raster.plan import Plan
-from diff4splat.render.raster.project import SH, project
+from diff4splat.render.raster.blending.blend import FIXED, blend
+from diff4splat.render.raster.blending.depth_sort import depth_sort
+from diff4splat.render.raster.blending.tiles import count_pairs, fill_lists, place_lists
+from diff4splat.render.raster.padded_image import PaddedImage, empty
+from diff4splat.render.raster.projection.harmonics import colors
+from diff4splat.render.raster.projection.project import SH, project
+from diff4splat.render.raster.raster_settings import RasterSettings
 from diff4splat.render.raster.tables import Cloud, Doubles, Floats, Grid, Integers, Lists, View
-from diff4splat.render.raster.tiles import count_pairs, fill_lists, place_lists
 
 GAUSSIANS_PER_PART = 4096
 TILES_PER_PART = 4
@@ -64,7 +64,7 @@ class Filled:
     """First slot of every rank, and one more: how many slots there are."""
 
 
-def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
+def footprints(cloud: Cloud, sh: Floats, view: View, plan: RasterSettings) -> Footprints:
     """Project all Gaussians and sort the visible ones."""
     count = len(cloud.means)
     prints, depth = empty(count, 8, dtype=torch.float64), empty(count)
@@ -77,7 +77,7 @@ def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
         )
 
     visible = list_visible(count, work, unusable)
-    order = nearest_first(visible, depth)
+    order = depth_sort(visible, depth)
     return Footprints(prints=prints, depth=depth, visible=visible, order=order, unusable=unusable)
 
 
@@ -98,7 +98,7 @@ def list_visible(
 
 
 def channel_table(
-    plan: Plan, cloud: Cloud, sh: Floats, extras: Floats, view: View, visible: Integers
+    plan: RasterSettings, cloud: Cloud, sh: Floats, extras: Floats, view: View, visible: Integers
 ) -> Floats:
     """Per Gaussian: RGB if it is asked for, the extra channels, zeros up to the fixed number."""
     start = 3 if plan.colors else 0
@@ -115,7 +115,7 @@ def channel_table(
     return values
 
 
-def bin_footprints(found: Footprints, plan: Plan) -> Binned:
+def bin_footprints(found: Footprints, plan: RasterSettings) -> Binned:
     """Count pairs, and cut the picture into regions of few enough of them or one tile."""
     grid, pieces = plan.grid, _pieces(found.order)
     counts = np.zeros((len(pieces), grid.rows * grid.columns), np.int32)
@@ -155,7 +155,7 @@ def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -
 
 
 def blend_region(
-    plan: Plan, filled: Filled, found: Footprints, values: Floats, canvas: Canvas
+    plan: RasterSettings, filled: Filled, found: Footprints, values: Floats, canvas: PaddedImage
 ) -> None:
     """Blend the tiles of a region into ``canvas``."""
     tiles = tiles_of(filled.region, plan.grid)
@@ -163,12 +163,12 @@ def blend_region(
 
 
 def blend_tiles(
-    plan: Plan,
+    plan: RasterSettings,
     tiles: NDArray[np.int64],
     lists: Lists,
     prints: Doubles,
     values: Floats,
-    canvas: Canvas,
+    canvas: PaddedImage,
 ) -> None:
     """Blend some tiles into ``canvas``."""
 

@@ -14,8 +14,8 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera
 from diff4splat.render.raster import forward as stages
 from diff4splat.render.raster.backward import Drawn, gradients
-from diff4splat.render.raster.canvas import Canvas
-from diff4splat.render.raster.plan import Plan, make_view
+from diff4splat.render.raster.padded_image import PaddedImage
+from diff4splat.render.raster.raster_settings import RasterSettings, make_view
 from diff4splat.render.raster.tables import Cloud
 from diff4splat.scene.gaussians import Gaussians
 
@@ -34,7 +34,7 @@ class Raster:
 
 
 def rasterize(
-    plan: Plan, gaussians: Gaussians, extras: Float[Tensor, "n e"], camera: Camera
+    plan: RasterSettings, gaussians: Gaussians, extras: Float[Tensor, "n e"], camera: Camera
 ) -> Raster:
     """Blend colours and ``extras`` of Gaussians; gradients reach all tensors."""
     unusable: list[int] = []
@@ -62,13 +62,15 @@ def rasterize(
 
 class _Rasterize(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, plan: Plan, unusable: list[int], *tensors: Tensor) -> tuple[Tensor, ...]:
+    def forward(
+        ctx: Any, plan: RasterSettings, unusable: list[int], *tensors: Tensor
+    ) -> tuple[Tensor, ...]:
         cloud, sh, extras, pose, focal_px, center_px = _unpack(tensors)
         view = make_view(plan.grid, pose, focal_px, center_px)
         found = stages.footprints(cloud, sh, view, plan)
         unusable.extend(found.unusable.tolist())
         values = stages.channel_table(plan, cloud, sh, extras, view, found.visible)
-        canvas = Canvas(plan.grid, values.shape[1], plan.medians)
+        canvas = PaddedImage(plan.grid, values.shape[1], plan.medians)
         binned = stages.bin_footprints(found, plan)
         for region in binned.regions:
             filled = stages.fill_region(found, plan.grid, binned, region)

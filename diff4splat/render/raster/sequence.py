@@ -18,16 +18,16 @@ from torch import Tensor
 
 from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster import forward as stages
-from diff4splat.render.raster.blend import FIXED
-from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.render.raster.blending.blend import FIXED
+from diff4splat.render.raster.blending.depth_sort import depth_sort
+from diff4splat.render.raster.blending.merge import merge_lists, merge_orders
 from diff4splat.render.raster.forward import Footprints
 from diff4splat.render.raster.function import Raster
-from diff4splat.render.raster.harmonics import colors
-from diff4splat.render.raster.merge import merge_lists, merge_orders
-from diff4splat.render.raster.moving import Moving
-from diff4splat.render.raster.order import nearest_first
-from diff4splat.render.raster.plan import Plan
-from diff4splat.render.raster.project import SH, project
+from diff4splat.render.raster.padded_image import PaddedImage, empty
+from diff4splat.render.raster.projection.harmonics import colors
+from diff4splat.render.raster.projection.moving import Moving
+from diff4splat.render.raster.projection.project import SH, project
+from diff4splat.render.raster.raster_settings import RasterSettings
 from diff4splat.render.raster.tables import Integers, Lists, View
 from diff4splat.scene.scene import Scene
 
@@ -47,7 +47,7 @@ class _Still:
 class Sequence:
     """A scene to be drawn many times, by one plan; ``depths`` blends z and 1 behind the colours."""
 
-    def __init__(self, scene: Scene, plan: Plan, depths: bool) -> None:
+    def __init__(self, scene: Scene, plan: RasterSettings, depths: bool) -> None:
         gaussians = scene.gaussians
         self._plan, self._depths = plan, depths
         self._moving = Moving(scene)
@@ -61,7 +61,7 @@ class Sequence:
         channels = (3 if plan.colors else 0) + (2 if depths else 0)
         self._values = np.zeros((count, max(channels, FIXED)), np.float32)
         self._used = channels
-        self._canvas = Canvas(plan.grid, self._values.shape[1], plan.medians)
+        self._canvas = PaddedImage(plan.grid, self._values.shape[1], plan.medians)
         self._still: _Still | None = None
         # Plain colours look the same from everywhere.
         self._colors_change = plan.colors and (self._moving.recolors or self._sh.shape[1] > 1)
@@ -107,7 +107,7 @@ class Sequence:
             )  # fmt: skip
 
         visible = stages.list_visible(len(index), work, unusable)
-        self._still = _Still(view, nearest_first(visible, self._depth), unusable)
+        self._still = _Still(view, depth_sort(visible, self._depth), unusable)
         self._fill_values(view, visible)
 
     def _see_moving(self, view: View, time_s: float) -> tuple[Integers, NDArray[np.int64]]:
@@ -117,7 +117,7 @@ class Sequence:
             self._plan, view, time_s, self._prints, self._depth, unusable
         )
         self._fill_values(view, visible)
-        return nearest_first(visible, self._depth), unusable
+        return depth_sort(visible, self._depth), unusable
 
     def _fill_values(self, view: View, visible: Integers) -> None:
         """Colours and depth channels of some Gaussians."""

@@ -9,7 +9,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.raster.function import rasterize
-from diff4splat.render.raster.plan import make_plan, make_view
+from diff4splat.render.raster.raster_settings import make_raster_settings, make_view
 from diff4splat.render.raster.sequence import Sequence
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
@@ -21,7 +21,7 @@ def warm_up() -> None:
     """Call every kernel of the rasteriser once: one image with gradients, then a sequence."""
     gaussians = _gaussian()
     camera = pinhole(8.0, (8, 8))
-    plan = make_plan(camera, RenderSettings(), colors=True, medians=True)
+    plan = make_raster_settings(camera, RenderSettings(), colors=True, medians=True)
     rasterize(plan, gaussians, gaussians.means.new_zeros(1, 0), camera).light.sum().backward()
     view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
     for index in (torch.zeros(1, dtype=torch.long), torch.zeros(0, dtype=torch.long)):

@@ -14,15 +14,15 @@ from torch.nn.functional import pad
 
 from diff4splat.kernels.simd16 import LANES
 from diff4splat.render.trace.backward import Gradients, gradients
-from diff4splat.render.trace.forward import make_rules, make_sight, make_world, see
+from diff4splat.render.trace.bvh.tree import NO_ORDER
+from diff4splat.render.trace.forward import make_inputs, make_rules, make_scene, shade_rays
 from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.rays import Rays
-from diff4splat.render.trace.reference import Seen
+from diff4splat.render.trace.reference import RayOutputs
 from diff4splat.render.trace.settings import TraceSettings
-from diff4splat.render.trace.shade import DISTANCE, LIGHT, MEDIAN, RGB, WEIGHT
-from diff4splat.render.trace.tables import Cloud, Floats, Integers, Motion, Sight
-from diff4splat.render.trace.tint import PLAIN_COLUMNS
-from diff4splat.render.trace.tree import NOTHING_KNOWN
+from diff4splat.render.trace.shading.sh_color import PLAIN_COLUMNS
+from diff4splat.render.trace.shading.shade import DISTANCE, LIGHT, MEDIAN, RGB, WEIGHT
+from diff4splat.render.trace.tables import Cloud, Floats, Integers, MotionArrays, TraceInputs
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import DEGREE_ZERO
 
@@ -33,22 +33,22 @@ class _Arrays:
 
     cloud: Cloud
     sh: Tensor
-    motion: Motion
+    motion: MotionArrays
     origins: Floats
     directions: Floats
     times: Floats
 
 
-def look(
+def trace_compiled(
     gaussians: Gaussians,
     rays: Rays,
     settings: TraceSettings,
     moving: MovingCloud | None,
-    known: Integers = NOTHING_KNOWN,
-) -> Seen:
+    order: Integers = NO_ORDER,
+) -> RayOutputs:
     """What ``rays``, all of them valid, see of ``gaussians``, all of them usable.
 
-    ``known`` is an order of Gaussians that may suit the search tree.
+    ``order`` is an order of the Gaussians in which neighbours follow each other.
     """
     means = gaussians.means
     motion = (means.new_empty(0, 3), means.new_empty(0), means.new_empty(0))
@@ -59,12 +59,12 @@ def look(
     table, hits = _Trace.apply(
         settings,
         gate,
-        known,
+        order,
         *(means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh),
         *motion,
         *(rays.origins, rays.directions, times),
     )
-    return Seen(
+    return RayOutputs(
         rgb=table[:, RGB : RGB + 3],
         distance_sum=table[:, DISTANCE],
         weight=table[:, WEIGHT],
@@ -80,14 +80,14 @@ class _Trace(torch.autograd.Function):
         ctx: Any,
         settings: TraceSettings,
         squared_gate: float | None,
-        known: Integers,
+        order: Integers,
         *tensors: Tensor,
     ) -> tuple[Tensor, Tensor]:
-        sight = _sight(_unpack(tensors), settings, squared_gate, known)
-        seen, hits = see(sight)
+        inputs = _inputs(_unpack(tensors), settings, squared_gate, order)
+        seen, hits = shade_rays(inputs)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
-            ctx.sight, ctx.memory_bytes = sight, settings.memory_bytes
+            ctx.inputs, ctx.memory_bytes = inputs, settings.memory_bytes
         counts = torch.from_numpy(hits).long()
         ctx.mark_non_differentiable(counts)
         return torch.from_numpy(seen), counts
@@ -101,7 +101,7 @@ class _Trace(torch.autograd.Function):
             )
         own = _unpack(ctx.saved_tensors)
         made = gradients(
-            ctx.sight, own.cloud, own.motion, table.contiguous().numpy(), ctx.memory_bytes
+            ctx.inputs, own.cloud, own.motion, table.contiguous().numpy(), ctx.memory_bytes
         )
         to_rays = torch.from_numpy(made.rays)
         return (
@@ -121,20 +121,20 @@ def _unpack(tensors: tuple[Tensor, ...]) -> _Arrays:
     return _Arrays(
         cloud=Cloud(*arrays[:4]),
         sh=plain[4],
-        motion=Motion(*arrays[5:8]),
+        motion=MotionArrays(*arrays[5:8]),
         origins=arrays[8],
         directions=arrays[9],
         times=arrays[10],
     )
 
 
-def _sight(
-    own: _Arrays, settings: TraceSettings, squared_gate: float | None, known: Integers
-) -> Sight:
+def _inputs(
+    own: _Arrays, settings: TraceSettings, squared_gate: float | None, order: Integers
+) -> TraceInputs:
     rules = make_rules(settings, np.inf if squared_gate is None else squared_gate)
-    world = make_world(own.cloud, own.motion, _color_table(own.sh), own.times, rules, known)
-    return make_sight(
-        world, (own.origins, own.directions, own.times), settings, rules, own.sh.shape[1]
+    scene = make_scene(own.cloud, own.motion, _color_table(own.sh), own.times, rules, order)
+    return make_inputs(
+        scene, (own.origins, own.directions, own.times), settings, rules, own.sh.shape[1]
     )
 
 

@@ -58,7 +58,7 @@ class MovingCloud:
 
 
 @torch.no_grad()
-def usable_motion(
+def valid_motion(
     moving: MovingCloud, usable: Bool[Tensor, " n"]
 ) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
     """Those of the ``usable`` that are finite, can be squared, and have a deviation above 0.

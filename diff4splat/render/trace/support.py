@@ -10,13 +10,13 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from diff4splat.render.support import usable_gaussians
-from diff4splat.render.trace.moving import MovingCloud, usable_motion
+from diff4splat.render.trace.moving import MovingCloud, valid_motion
 from diff4splat.scene.gaussians import Gaussians
 
 _MOST_GAUSSIANS = 1 << 24
 
 
-def refusal(gaussians: Gaussians) -> str | None:
+def unsupported_reason(gaussians: Gaussians) -> str | None:
     """Why the compiled tracer cannot take ``gaussians``, or None."""
     means = gaussians.means
     if means.device.type != "cpu":
@@ -30,12 +30,12 @@ def refusal(gaussians: Gaussians) -> str | None:
     return None
 
 
-def usable(
+def valid_gaussians(
     gaussians: Gaussians, moving: MovingCloud | None
 ) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
     """Which Gaussians can be drawn, and counts of the others by their first bad parameter."""
     kept, dropped = usable_gaussians(gaussians)
     if moving is not None:
-        own, more = usable_motion(moving, kept)
+        own, more = valid_motion(moving, kept)
         kept, dropped = kept & own, dropped | more
     return kept, dropped

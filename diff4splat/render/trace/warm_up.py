@@ -2,7 +2,7 @@
 
 import torch
 
-from diff4splat.render.trace.function import look
+from diff4splat.render.trace.function import trace_compiled
 from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.settings import TraceSettings
@@ -23,4 +23,4 @@ def warm_up() -> None:
     apart = torch.tensor([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]], device="cpu")
     rays = Rays(origins=apart, directions=ahead.expand(2, 3), time_s=now.expand(2))
     moving = MovingCloud(velocities=zero, time_centers_s=now, time_deviations_s=now + 1)
-    look(gaussian, rays, TraceSettings(), moving).light.sum().backward()
+    trace_compiled(gaussian, rays, TraceSettings(), moving).light.sum().backward()

@@ -64,7 +64,7 @@ def test_other_devices_are_refused() -> None:
         flow_gaussians=cloud(5),
         flow_camera=CAMERA,
     )
-    assert backend.refusal(job) == "expected CPU tensors, got meta"
+    assert backend.unsupported_reason(job) == "expected CPU tensors, got meta"
 
 
 def test_what_it_can_do_is_not_refused() -> None:
