@@ -1,4 +1,6 @@
-"""The unit square on the unit disc, areas and neighbourhoods kept: points on a lens.
+"""Concentric map of the unit square to the unit disc: points on a lens.
+
+It preserves areas and neighbourhoods.
 
 Concentric squares become concentric circles (Shirley and Chiu, A Low Distortion Map Between Disk
 and Square, JGT 1997): with (a, b) = 2 u - 1 and |a| > |b| the point has radius a and angle

@@ -146,14 +146,14 @@ class _Measure:
             return 0.0
         early, late = self._end(earliest_s), self._end(latest_s)
         straight = Straight(early, late)
-        found = max(
+        largest = max(
             straight.error_px(early, 0.0, self._cone), straight.error_px(late, 1.0, self._cone)
         )
         for part in _PROBES:
             at_s = earliest_s + part * (latest_s - earliest_s)
             state = self._scene.state_at(self._time_s + at_s)
-            found = max(found, straight.error_px(state, part, self._cone))
-        return found
+            largest = max(largest, straight.error_px(state, part, self._cone))
+        return largest
 
     def _end(self, at_s: float) -> Gaussians:
         if at_s not in self._ends:
@@ -164,31 +164,35 @@ class _Measure:
 
 
 class Straight:
-    """What stands for Gaussians between two states, to be held against them."""
+    """The linear approximation between two states, compared with the true states."""
 
     def __init__(self, early: Gaussians, late: Gaussians) -> None:
         self._early, self._late = early.means, late.means
-        self._made = midpoint(early, late)
-        self._shape = _root(self._made)
+        self._midpoint = midpoint(early, late)
+        self._shape = _root(self._midpoint)
 
     def error_px(self, true: Gaussians, part: float, cone: ViewCone) -> float:
-        """How far anything that is seen is from where, or how, it should be; 0 where nothing is.
+        """Largest visible error of position, shape and brightness in pixels; 0 if none is visible.
 
-        ``true`` is what stands at ``part`` of the way.
+        ``true`` is the state at ``part`` of the interval.
         """
-        made = self._made
-        seen = cone.contains(true) | cone.contains(made)
-        if not bool(seen.any()):
+        approximate = self._midpoint
+        visible = cone.contains(true) | cone.contains(approximate)
+        if not bool(visible.any()):
             return 0.0
         place = (true.means - torch.lerp(self._early, self._late, part)).norm(dim=-1)
         shape = (_root(true) - self._shape).norm(dim=-1).amax(-1)
-        return float((cone.pixels(place + shape, true) + _brightness(true, made))[seen].max())
+        return float(
+            (cone.pixels(place + shape, true) + _brightness(true, approximate))[visible].max()
+        )
 
 
-def _brightness(true: Gaussians, made: Gaussians) -> Float[Tensor, " n"]:
+def _brightness(true: Gaussians, approximate: Gaussians) -> Float[Tensor, " n"]:
     """How much opacity and colour are off; |Σ_k a_k Y_k| ≤ |a| √(K / 4π) for all K of a degree."""
-    colors = (true.sh - made.sh).square().sum(1).amax(-1) * (true.sh.shape[1] / (4 * math.pi))
-    return (true.opacities - made.opacities).abs() + made.opacities * colors.sqrt()
+    colors = (true.sh - approximate.sh).square().sum(1).amax(-1) * (
+        true.sh.shape[1] / (4 * math.pi)
+    )
+    return (true.opacities - approximate.opacities).abs() + approximate.opacities * colors.sqrt()
 
 
 def _root(gaussians: Gaussians) -> Float[Tensor, "n 3 3"]:

@@ -123,26 +123,26 @@ class MovingScene:
         if index in self._cached:
             self._cached.move_to_end(index)
             return self._cached[index]
-        made = self._make(*self.intervals.spans()[index])
-        self._cached[index] = made
-        if len(self._cached) > _STATES and not made.gaussians.means.requires_grad:
+        new = self._make(*self.intervals.spans()[index])
+        self._cached[index] = new
+        if len(self._cached) > _STATES and not new.gaussians.means.requires_grad:
             self._cached.popitem(last=False)
-        return made
+        return new
 
     def _make(self, earliest_s: float, latest_s: float) -> LinearSegment:
         scene, base_s = self.scene, self.time_s
         if isinstance(scene, Gaussians):
-            made = static_segment(scene, earliest_s, latest_s)
+            new = static_segment(scene, earliest_s, latest_s)
         elif not self.moves:
             # Motion that is not visible: the image is of the middle.
             middle_s = base_s + 0.5 * (earliest_s + latest_s)
-            made = static_segment(scene.state_at(middle_s), earliest_s, latest_s)
+            new = static_segment(scene.state_at(middle_s), earliest_s, latest_s)
         elif isinstance(scene.motion, SpacetimeMotion):
-            made = native_segment(scene, earliest_s, latest_s, base_s)
+            new = native_segment(scene, earliest_s, latest_s, base_s)
         else:
             states = (self._end(scene, at) for at in (earliest_s, latest_s))
-            made = segment_between(*states, earliest_s, latest_s)
-        return self._smoothed(made)
+            new = segment_between(*states, earliest_s, latest_s)
+        return self._smoothed(new)
 
     def _end(self, scene: Scene, at_s: float) -> Gaussians:
         """The state at an end of a segment, which it shares with its neighbour."""

@@ -1,8 +1,8 @@
-"""Lines of a sensor and when they are read.
+"""Rows or columns of a sensor, and when they are read.
 
 Axes: ``l`` lines, ``p`` pixels (flat indices, row by row). Line r of H is read at r / (H − 1) of
 the read-out, at (H − 1 − r) / (H − 1) in the reverse directions, and a lone line in the middle.
-Pixels are told apart by their index, so that no order of reading can put them into a wrong place.
+Pixels are identified by their index, so the order of reading cannot misplace them.
 """
 
 import torch

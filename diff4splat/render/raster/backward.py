@@ -1,4 +1,4 @@
-"""The way back: blend → sums per Gaussian → colours → Gaussians and camera.
+"""The backward pass: blend → sums per Gaussian → colours → Gaussians and camera.
 
 Sums over the picture run in the order of the tiles, sums over Gaussians part by part in float64, so
 gradients have the same bits whatever the number of threads.
@@ -33,16 +33,16 @@ from diff4splat.render.raster.tables import MOMENTS, Cloud, Doubles, Floats, Vie
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """What the way back needs of the way forward."""
+    """What the backward pass needs of the forward pass."""
 
     plan: RasterSettings
     view: View
     found: Footprints
     values: Floats
-    canvas: PaddedImage
+    image: PaddedImage
     binned: Binned
     filled: Filled | None
-    """The lists, unless there were several regions; then they are made again."""
+    """The lists; None if there were several regions, whose lists are built again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,7 @@ def _blend_backward(
     drawn: Drawn, filled: Filled, incoming: Floats, moments: Floats, value_grads: Floats
 ) -> None:
     """Add the gradients of the tiles of a region."""
-    order, canvas = drawn.found.order, drawn.canvas
+    order, image = drawn.found.order, drawn.image
     slots = empty(len(filled.lists.members), MOMENTS + drawn.values.shape[1])
 
     tiles = tiles_of(filled.region, drawn.plan.grid)
@@ -96,7 +96,7 @@ def _blend_backward(
     def blend_tiles(first: int, last: int) -> None:
         blend_backward(
             tiles[first:last], drawn.plan.grid, filled.lists, drawn.found.prints, drawn.values,
-            drawn.plan.rules, canvas.light, canvas.stops, incoming, slots,
+            drawn.plan.rules, image.light, image.stops, incoming, slots,
         )  # fmt: skip
 
     def add(first: int, last: int) -> None:

@@ -1,4 +1,4 @@
-"""The way forward: project → sort by depth → colours → lists of tiles → blend.
+"""The forward pass: project → sort by depth → colours → lists of tiles → blend.
 
 Every stage is spread over threads in parts whose results do not depend on which thread does them.
 A picture with more pairs (tile, Gaussian) than may be kept is cut into regions of tiles that are
@@ -155,11 +155,11 @@ def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -
 
 
 def blend_region(
-    plan: RasterSettings, filled: Filled, found: Footprints, values: Floats, canvas: PaddedImage
+    plan: RasterSettings, filled: Filled, found: Footprints, values: Floats, image: PaddedImage
 ) -> None:
-    """Blend the tiles of a region into ``canvas``."""
+    """Blend the tiles of a region into ``image``."""
     tiles = tiles_of(filled.region, plan.grid)
-    blend_tiles(plan, tiles, filled.lists, found.prints, values, canvas)
+    blend_tiles(plan, tiles, filled.lists, found.prints, values, image)
 
 
 def blend_tiles(
@@ -168,14 +168,14 @@ def blend_tiles(
     lists: Lists,
     prints: Doubles,
     values: Floats,
-    canvas: PaddedImage,
+    image: PaddedImage,
 ) -> None:
-    """Blend some tiles into ``canvas``."""
+    """Blend some tiles into ``image``."""
 
     def work(first: int, last: int) -> None:
         blend(
-            tiles[first:last], plan.grid, lists, prints, values, plan.rules, canvas.planes,
-            canvas.light, canvas.stops, canvas.medians,
+            tiles[first:last], plan.grid, lists, prints, values, plan.rules, image.planes,
+            image.light, image.stops, image.medians,
         )  # fmt: skip
 
     parallel_for(work, ranges(len(tiles), TILES_PER_PART))

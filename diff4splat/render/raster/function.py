@@ -70,22 +70,22 @@ class _Rasterize(torch.autograd.Function):
         found = stages.footprints(cloud, sh, view, plan)
         unusable.extend(found.unusable.tolist())
         values = stages.channel_table(plan, cloud, sh, extras, view, found.visible)
-        canvas = PaddedImage(plan.grid, values.shape[1], plan.medians)
+        image = PaddedImage(plan.grid, values.shape[1], plan.medians)
         binned = stages.bin_footprints(found, plan)
         for region in binned.regions:
             filled = stages.fill_region(found, plan.grid, binned, region)
-            stages.blend_region(plan, filled, found, values, canvas)
+            stages.blend_region(plan, filled, found, values, image)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
             kept = filled if len(binned.regions) == 1 else None
             ctx.drawn = Drawn(
-                plan=plan, view=view, found=found, values=values, canvas=canvas, binned=binned,
+                plan=plan, view=view, found=found, values=values, image=image, binned=binned,
                 filled=kept,
             )  # fmt: skip
-        medians = canvas.whole(canvas.medians)
+        medians = image.padded(image.medians)
         ctx.mark_non_differentiable(medians)
         # Whole planes, because views of several results could not be changed in place.
-        return canvas.whole(canvas.planes), canvas.whole(canvas.light), medians
+        return image.padded(image.planes), image.padded(image.light), medians
 
     @staticmethod
     def backward(ctx: Any, planes: Tensor, light: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:

@@ -1,4 +1,4 @@
-"""Flat planes of a picture, padded to whole tiles so that no kernel meets an edge."""
+"""Flat planes of an image, padded to full tiles so that kernels need no edge case."""
 
 import numpy as np
 import torch
@@ -14,7 +14,7 @@ def empty(*shape: int, dtype: torch.dtype = torch.float32) -> np.ndarray:
 
 
 class PaddedImage:
-    """What blending writes. Every pixel of it is written, so it starts with any content."""
+    """Output planes of blending. Every pixel is written, so they start uninitialised."""
 
     def __init__(self, grid: Grid, channels: int, medians: bool) -> None:
         self.grid = grid
@@ -26,10 +26,10 @@ class PaddedImage:
         """How many entries of its tile's list a pixel looked at before it went dark."""
         self.medians = empty(pixels if medians else 0, dtype=torch.int32)
 
-    def whole(self, planes: np.ndarray) -> Shaped[Tensor, "c p q"]:
+    def padded(self, planes: np.ndarray) -> Shaped[Tensor, "c p q"]:
         """Planes with their padding; shares memory."""
         return torch.from_numpy(planes.reshape(-1, *self.shape))
 
-    def pictures(self, planes: np.ndarray) -> Shaped[Tensor, "c h w"]:
+    def cropped(self, planes: np.ndarray) -> Shaped[Tensor, "c h w"]:
         """Planes without the padding; shares memory."""
-        return self.whole(planes)[:, : self.grid.height, : self.grid.width]
+        return self.padded(planes)[:, : self.grid.height, : self.grid.width]

@@ -1,4 +1,4 @@
-"""What to draw and how, from the settings that people write to what kernels read."""
+"""Settings of one image as kernels read them, from `RenderSettings` and the camera."""
 
 import math
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ _MOST_PAIRS = (1 << 31) - 1
 _LEAST_EXPONENT = -125.0
 """Smaller powers of 2 are no normal numbers in float32."""
 _LARGEST_ALPHA = 1 - 2.0**-24
-"""In float32; light is divided by 1 - alpha on the way back."""
+"""In float32; the backward pass divides light by 1 - alpha."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RasterSettings:
-    """One picture."""
+    """Settings of one image."""
 
     grid: Grid
     rules: Rules
@@ -38,11 +38,11 @@ class RasterSettings:
 def make_raster_settings(
     camera: Camera, settings: RenderSettings, colors: bool, medians: bool, extras: int = 0
 ) -> RasterSettings:
-    """The plan of a picture of ``camera``'s size, with ``extras`` channels beside the colours."""
+    """Settings of an image of ``camera``'s size, with ``extras`` channels after the colours."""
     bytes_per_pair = _BYTES_PER_PAIR + _BYTES_PER_CHANNEL * extras
     return RasterSettings(
         grid=_grid(camera.size_px, settings.tile_px or DEFAULT_TILE_PX),
-        # Whole numbers would compile every kernel again.
+        # Integers would compile every kernel again.
         rules=Rules(
             dilation_px2=float(settings.added_px2),
             antialias=bool(settings.antialias),

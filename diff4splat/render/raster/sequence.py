@@ -1,11 +1,12 @@
-"""Many pictures of one scene: what is still valid from the picture before is not made again.
+"""Many images of one scene; what is still valid from the previous image is reused.
 
-- What stands still is projected, sorted and binned once per camera.
+- Static Gaussians are projected, sorted and binned once per camera.
 - What moves is projected straight from its motion; no state of the scene is stored.
-- While the camera stands, only tiles that something moving touches, or touched before, are blended.
+- While the camera is static, only tiles that a moving Gaussian overlaps, or overlapped in the
+  previous image, are blended.
 - The large arrays live as long as the sequence.
 
-Pictures are those of ``render`` without gradients, up to the rounding of states to float32.
+Images are those of ``render`` without gradients, up to the rounding of states to float32.
 """
 
 from dataclasses import dataclass
@@ -34,13 +35,13 @@ from diff4splat.scene.scene import Scene
 
 @dataclass(slots=True)
 class _Still:
-    """What the camera sees of the Gaussians that do not move."""
+    """Projection of the static Gaussians."""
 
     view: View
     order: Integers
     unusable: NDArray[np.int64]
     lists: Lists | None = None
-    """Made when the camera is used again; None while they are not made or do not fit."""
+    """Built when the camera is used again; None before, or if they do not fit."""
     too_large: bool = False
 
 
@@ -61,9 +62,9 @@ class Sequence:
         channels = (3 if plan.colors else 0) + (2 if depths else 0)
         self._values = np.zeros((count, max(channels, FIXED)), np.float32)
         self._used = channels
-        self._canvas = PaddedImage(plan.grid, self._values.shape[1], plan.medians)
+        self._image = PaddedImage(plan.grid, self._values.shape[1], plan.medians)
         self._still: _Still | None = None
-        # Plain colours look the same from everywhere.
+        # Colours without harmonics do not depend on the view.
         self._colors_change = plan.colors and (self._moving.recolors or self._sh.shape[1] > 1)
         if plan.colors:
             self._color(np.arange(count, dtype=np.int32), (0.0, 0.0, 0.0))
@@ -134,7 +135,7 @@ class Sequence:
         parallel_for(work, ranges(len(visible), stages.GAUSSIANS_PER_PART))
 
     def _bin_still(self) -> bool:
-        """Whether there are lists of what stands still; made when a camera is used again."""
+        """Whether there are lists of the static Gaussians; built when a camera is used again."""
         still = self._still
         if still.lists is None and not still.too_large:
             found = self._footprints(still.order)
@@ -155,7 +156,7 @@ class Sequence:
             lists = stages.fill_region(found, self._plan.grid, binned, region).lists
             tiles = stages.tiles_of(region, self._plan.grid)
             tiles = tiles[wanted[tiles]]
-            stages.blend_tiles(self._plan, tiles, lists, self._prints, self._values, self._canvas)
+            stages.blend_tiles(self._plan, tiles, lists, self._prints, self._values, self._image)
 
     def _draw_stale(self, moving: Integers, wanted: NDArray[np.bool_]) -> bool:
         """Blend the ``wanted`` tiles that show, or are to show, something that moves.
@@ -173,7 +174,7 @@ class Sequence:
         merged = self._merged_lists(lists, tiles)
         if merged is None:
             return False
-        stages.blend_tiles(self._plan, tiles, merged, self._prints, self._values, self._canvas)
+        stages.blend_tiles(self._plan, tiles, merged, self._prints, self._values, self._image)
         self._stale[tiles] = touched[tiles]
         return True
 
@@ -208,11 +209,11 @@ class Sequence:
         )
 
     def _picture(self, unusable: NDArray[np.int64]) -> Raster:
-        """Copies: the canvas is drawn over."""
-        canvas = self._canvas
+        """Copies, because the next image overwrites the planes."""
+        image = self._image
         return Raster(
-            planes=canvas.pictures(canvas.planes)[: self._used].clone(),
-            light=canvas.pictures(canvas.light)[0].clone(),
-            medians=canvas.pictures(canvas.medians).clone(),
+            planes=image.cropped(image.planes)[: self._used].clone(),
+            light=image.cropped(image.light)[0].clone(),
+            medians=image.cropped(image.medians).clone(),
             unusable=tuple(unusable.tolist()),
         )

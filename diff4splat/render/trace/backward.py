@@ -1,6 +1,6 @@
-"""The way back: packets look again, their rays are rewound, sums go to Gaussians.
+"""The backward pass: packets are traversed again, and sums over rays go to Gaussians.
 
-Nothing but the inputs is kept from the way forward. Sums over rays run in the order of the parts of
+Only the inputs are saved from the forward pass. Sums over rays run in the order of the parts of
 packets, so gradients have the same bits whatever the number of threads.
 """
 
@@ -50,7 +50,7 @@ class Gradients:
 def gradients(
     inputs: TraceInputs, cloud: Cloud, motion: MotionArrays, output_grads: Floats, memory_bytes: int
 ) -> Gradients:
-    """From gradients of what every ray sees (r × 7)."""
+    """Gradients of all inputs from those of the outputs (r × 7)."""
     count = len(cloud.means)
     totals = np.zeros((count, COLUMNS))
     lobes = np.zeros((count if inputs.bands > 1 else 0, LOBES), np.float32)
@@ -84,15 +84,15 @@ def _backward_parts(
     size, largest = _LEAST_PARTS, 1
     while todo:
         block, todo = todo[:size], todo[size:]
-        made: list[Part | None] = [None] * len(block)
+        results: list[Part | None] = [None] * len(block)
 
-        def work(part: int, first: int, last: int, made: list[Part | None] = made) -> None:
+        def work(part: int, first: int, last: int, results: list[Part | None] = results) -> None:
             lists = _lists(pool, len(inputs.scene.primitives))
-            made[part] = shade_backward(first, last, inputs, output_grads, *lists, to_rays)
+            results[part] = shade_backward(first, last, inputs, output_grads, *lists, to_rays)
             pool.put(lists)
 
         parallel_for(work, ((number, *part) for number, part in enumerate(block)))
-        parts = [part for part in made if part is not None]
+        parts = [part for part in results if part is not None]
         yield parts
         largest = max(largest, *(sum(array.nbytes for array in part) for part in parts))
         size = min(max(memory_bytes // largest, 1), _MOST_PARTS)

@@ -1,4 +1,4 @@
-"""The way forward: primitives → tree → packets → hits → what rays see.
+"""The forward pass: primitives → tree → packets → hits → outputs per ray.
 
 Every stage is spread over threads in parts whose results do not depend on which thread does them.
 """
@@ -32,22 +32,22 @@ from diff4splat.render.trace.tables import (
 from diff4splat.render.trace.traversal.packets import bundle_rays
 
 PACKETS_PER_PART = 16
-_ASKED = 1024
-"""Gaussians that tell how far away the scene is."""
+_SAMPLED = 1024
+"""Gaussians from which the distance of the scene is estimated."""
 _LEAST_SIZE = 1e-30
 _BYTES_PER_HIT, _SHARES = 12, 16
 """A packet may use a sixteenth of the memory, whatever the threads: that says where it is cut."""
 _LEAST_EXPONENT = -125.0
 """Smaller powers of 2 are no normal numbers in float32."""
 _LARGEST_ALPHA = 1 - 2.0**-24
-"""In float32; light is divided by 1 - alpha on the way back."""
+"""In float32; the backward pass divides light by 1 - alpha."""
 
 
 def make_rules(settings: TraceSettings, squared_gate: float) -> TraceRules:
     """What of the settings the kernels need."""
     drop = math.inf if settings.min_response is None else -math.log(settings.min_response)
     quartic = settings.kernel_degree == 4
-    # Whole numbers would compile every kernel again.
+    # Integers would compile every kernel again.
     return TraceRules(
         log2_cutoff=max(math.log2(settings.alpha_cutoff), _LEAST_EXPONENT),
         alpha_max=min(float(settings.alpha_max), _LARGEST_ALPHA),
@@ -64,7 +64,7 @@ def make_rules(settings: TraceSettings, squared_gate: float) -> TraceRules:
 def make_primitives(
     cloud: Cloud, motion: MotionArrays, rules: TraceRules
 ) -> tuple[Doubles, Doubles]:
-    """What rays meet (n × 16, or 24 if it moves), and how many deviations it reaches (n)."""
+    """Primitives (n × 16, or 24 if they move), and their reach in deviations (n)."""
     count, moves = len(cloud.means), len(motion.velocities) > 0
     primitives = np.zeros((count, MOVING_COLUMNS if moves else STATIC_COLUMNS))
     reach = np.empty(count)
@@ -84,7 +84,7 @@ def make_scene(
     rules: TraceRules,
     order: Integers = NO_ORDER,
 ) -> TraceScene:
-    """What rays between the earliest and the latest of ``times`` can look at.
+    """The scene for rays between the earliest and the latest of ``times``.
 
     ``order`` is an order of the Gaussians in which neighbours follow each other.
     """
@@ -97,15 +97,15 @@ def make_scene(
 
 
 def shade_rays(inputs: TraceInputs) -> tuple[Floats, Integers]:
-    """What every ray sees (r × 7), and how many hits that is."""
+    """Outputs of every ray (r × 7), and the number of its hits."""
     count = len(inputs.rays.origins)
-    seen, hits = empty(count, OUTPUT_COLUMNS), np.empty(count, np.int32)
+    outputs, hits = empty(count, OUTPUT_COLUMNS), np.empty(count, np.int32)
 
     def work(first: int, last: int) -> None:
-        shade(first, last, inputs, seen, hits)
+        shade(first, last, inputs, outputs, hits)
 
     parallel_for(work, ranges(len(inputs.rays.starts) - 1, PACKETS_PER_PART))
-    return seen, hits
+    return outputs, hits
 
 
 def make_inputs(
@@ -139,6 +139,6 @@ def _viewed_distance(scene: TraceScene, origins: Floats) -> float:
     order = scene.tree.order
     if not len(order) or not len(origins):
         return _LEAST_SIZE
-    some = order[:: max(len(order) // _ASKED, 1)]
+    some = order[:: max(len(order) // _SAMPLED, 1)]
     away = scene.primitives[some, MEAN : MEAN + 3] - origins[:1]
     return max(float(np.median(np.linalg.norm(away, axis=1))), _LEAST_SIZE)

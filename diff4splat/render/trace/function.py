@@ -46,7 +46,7 @@ def trace_compiled(
     moving: MovingCloud | None,
     order: Integers = NO_ORDER,
 ) -> RayOutputs:
-    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable.
+    """Outputs along valid ``rays`` through valid ``gaussians``.
 
     ``order`` is an order of the Gaussians in which neighbours follow each other.
     """
@@ -84,13 +84,13 @@ class _Trace(torch.autograd.Function):
         *tensors: Tensor,
     ) -> tuple[Tensor, Tensor]:
         inputs = _inputs(_unpack(tensors), settings, squared_gate, order)
-        seen, hits = shade_rays(inputs)
+        outputs, hits = shade_rays(inputs)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
             ctx.inputs, ctx.memory_bytes = inputs, settings.memory_bytes
         counts = torch.from_numpy(hits).long()
         ctx.mark_non_differentiable(counts)
-        return torch.from_numpy(seen), counts
+        return torch.from_numpy(outputs), counts
 
     @staticmethod
     def backward(ctx: Any, table: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:
@@ -99,42 +99,48 @@ class _Trace(torch.autograd.Function):
                 "trace: expected create_graph=False, got True; use backend='reference' to "
                 "differentiate twice"
             )
-        own = _unpack(ctx.saved_tensors)
-        made = gradients(
-            ctx.inputs, own.cloud, own.motion, table.contiguous().numpy(), ctx.memory_bytes
+        arrays = _unpack(ctx.saved_tensors)
+        grads = gradients(
+            ctx.inputs, arrays.cloud, arrays.motion, table.contiguous().numpy(), ctx.memory_bytes
         )
-        to_rays = torch.from_numpy(made.rays)
+        to_rays = torch.from_numpy(grads.rays)
         return (
             *(None, None, None),
-            *map(torch.from_numpy, made.cloud),
-            _sh_gradient(own.sh, made),
-            *map(torch.from_numpy, made.motion),
+            *map(torch.from_numpy, grads.cloud),
+            _sh_gradient(arrays.sh, grads),
+            *map(torch.from_numpy, grads.motion),
             to_rays[:, :3],
             to_rays[:, 3:6],
-            to_rays[:, 6] if len(own.times) else None,
+            to_rays[:, 6] if len(arrays.times) else None,
         )
 
 
 def _unpack(tensors: tuple[Tensor, ...]) -> _Arrays:
     plain = [tensor.detach().contiguous() for tensor in tensors]
-    arrays: list[np.ndarray] = [tensor.numpy() for tensor in plain]
+    numpy: list[np.ndarray] = [tensor.numpy() for tensor in plain]
     return _Arrays(
-        cloud=Cloud(*arrays[:4]),
+        cloud=Cloud(*numpy[:4]),
         sh=plain[4],
-        motion=MotionArrays(*arrays[5:8]),
-        origins=arrays[8],
-        directions=arrays[9],
-        times=arrays[10],
+        motion=MotionArrays(*numpy[5:8]),
+        origins=numpy[8],
+        directions=numpy[9],
+        times=numpy[10],
     )
 
 
 def _inputs(
-    own: _Arrays, settings: TraceSettings, squared_gate: float | None, order: Integers
+    arrays: _Arrays, settings: TraceSettings, squared_gate: float | None, order: Integers
 ) -> TraceInputs:
     rules = make_rules(settings, np.inf if squared_gate is None else squared_gate)
-    scene = make_scene(own.cloud, own.motion, _color_table(own.sh), own.times, rules, order)
+    scene = make_scene(
+        arrays.cloud, arrays.motion, _color_table(arrays.sh), arrays.times, rules, order
+    )
     return make_inputs(
-        scene, (own.origins, own.directions, own.times), settings, rules, own.sh.shape[1]
+        scene,
+        (arrays.origins, arrays.directions, arrays.times),
+        settings,
+        rules,
+        arrays.sh.shape[1],
     )
 
 
@@ -149,7 +155,7 @@ def _plain_colors(sh: Float[Tensor, "n 1 3"]) -> Float[Tensor, "n 3"]:
     return 0.5 + DEGREE_ZERO * sh[:, 0]
 
 
-def _sh_gradient(sh: Float[Tensor, "n k 3"], made: Gradients) -> Float[Tensor, "n k 3"]:
+def _sh_gradient(sh: Float[Tensor, "n k 3"], grads: Gradients) -> Float[Tensor, "n k 3"]:
     if sh.shape[1] == 1:
-        return (DEGREE_ZERO * torch.from_numpy(made.plain_colors)).to(sh)[:, None]
-    return torch.from_numpy(made.lobes).view(-1, 3, LANES)[..., : sh.shape[1]].mT.contiguous()
+        return (DEGREE_ZERO * torch.from_numpy(grads.plain_colors)).to(sh)[:, None]
+    return torch.from_numpy(grads.lobes).view(-1, 3, LANES)[..., : sh.shape[1]].mT.contiguous()

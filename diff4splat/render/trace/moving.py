@@ -1,4 +1,4 @@
-"""Gaussians that move in a line and shine for a while: native 4D Gaussians, seen at any time.
+"""Gaussians with constant velocity and a pulse of opacity: native 4D Gaussians.
 
 Axes: ``n`` Gaussians. A 4D covariance is one to one with a slice covariance that does not change, a
 mean that moves at constant velocity, and a pulse of opacity in time (Yang et al., ICLR 2024):
@@ -72,8 +72,8 @@ def valid_motion(
         "time_deviations_s": moving.time_deviations_s > 0,
     }
     dropped = {}
-    for name, own in fine.items():
-        if count := int((usable & ~own).sum()):
+    for name, valid in fine.items():
+        if count := int((usable & ~valid).sum()):
             dropped[name] = count
-        usable = usable & own
+        usable = usable & valid
     return usable, dropped

@@ -1,4 +1,4 @@
-"""Brute force in plain PyTorch: every ray meets every Gaussian; autograd does the way back.
+"""Brute force in plain PyTorch: every ray against every Gaussian, with gradients by autograd.
 
 Axes: ``r`` rays of a chunk, ``n`` Gaussians, ``p`` pairs (ray, Gaussian) that see each other, ``k``
 places in the longest list of a chunk. Per ray, over its pairs by (τ, index):
@@ -35,7 +35,7 @@ _OUTPUT_COLUMNS = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RayOutputs:
-    """What rays see, before the background."""
+    """Outputs per ray, before the background."""
 
     rgb: Float[Tensor, "r 3"]
     distance_sum: Float[Tensor, " r"]
@@ -43,14 +43,14 @@ class RayOutputs:
     weight: Float[Tensor, " r"]
     """Σ w"""
     light: Float[Tensor, " r"]
-    """How much of what lies behind is seen."""
+    """Transmittance: the share of light from behind all hits."""
     median: Float[Tensor, " r"]
     hits: Int[Tensor, " r"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Scene:
-    """What all rays look at."""
+    """Gaussians as all rays use them."""
 
     gaussians: Gaussians
     whiten: Float[Tensor, "n 3 3"]
@@ -61,7 +61,7 @@ class _Scene:
 def trace_reference(
     gaussians: Gaussians, rays: Rays, settings: TraceSettings, moving: MovingCloud | None
 ) -> RayOutputs:
-    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable."""
+    """Outputs along valid ``rays`` through valid ``gaussians``."""
     scene = _Scene(
         gaussians=gaussians.to(torch.float64),
         whiten=whitening(gaussians),

@@ -1,6 +1,6 @@
 """The arrays that pass from kernel to kernel.
 
-Axes: ``n`` Gaussians, ``m`` of them that can be seen at all, ``g`` groups of sixteen of these,
+Axes: ``n`` Gaussians, ``m`` of them that are visible at all, ``g`` groups of sixteen of these,
 ``r`` rays. Shapes and places are float64, because a needle's whitening needs it; what lanes read is
 float32 relative to the tree's anchor or to the frame of a packet.
 """
@@ -86,7 +86,7 @@ class Tree(NamedTuple):
 
 
 class TraceScene(NamedTuple):
-    """What rays look at."""
+    """Gaussians and their hierarchy."""
 
     primitives: Doubles
     """n × 16, or 24 if they move."""

@@ -51,7 +51,7 @@ FIXED = 3
 """Channels that are always there; any further ones are looped over."""
 _AHEAD = 8
 UNSTOPPED = 3e38
-"""What ``stops`` holds for a pixel that looked at its whole list."""
+"""Value in ``stops`` of a pixel whose complete list was blended."""
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Kernels: what stands still and what moves, brought together by depth.
+"""Kernels: static and moving Gaussians, merged by depth.
 
 Both sides are sorted, nearest first and equal depths by index, so merging them is what sorting all
 would give.
@@ -9,12 +9,12 @@ from diff4splat.render.raster.jit import kernel
 
 
 @kernel
-def merge_orders(still, moving, depth, order):
+def merge_orders(static, moving, depth, order):
     """Merge two orders into ``order``."""
     a = b = 0
     for rank in range(len(order)):
-        if b == len(moving) or (a < len(still) and _before(still[a], moving[b], depth)):
-            order[rank] = still[a]
+        if b == len(moving) or (a < len(static) and _before(static[a], moving[b], depth)):
+            order[rank] = static[a]
             a += 1
         else:
             order[rank] = moving[b]
@@ -22,18 +22,18 @@ def merge_orders(still, moving, depth, order):
 
 
 @kernel
-def merge_lists(first, last, tiles, still, moving, depth, lists):
+def merge_lists(first, last, tiles, static, moving, depth, lists):
     """Merge the lists of ``tiles[first:last]`` into ``lists``, whose starts are known."""
     for place in range(first, last):
         tile = tiles[place]
-        a, end_a = still.starts[tile], still.starts[tile + 1]
+        a, end_a = static.starts[tile], static.starts[tile + 1]
         b, end_b = moving.starts[tile], moving.starts[tile + 1]
         for position in range(lists.starts[tile], lists.starts[tile + 1]):
-            take_still = b == end_b or (
-                a < end_a and _before(still.members[a], moving.members[b], depth)
+            take_static = b == end_b or (
+                a < end_a and _before(static.members[a], moving.members[b], depth)
             )
-            if take_still:
-                lists.members[position] = still.members[a]
+            if take_static:
+                lists.members[position] = static.members[a]
                 a += 1
             else:
                 lists.members[position] = moving.members[b]

@@ -1,4 +1,4 @@
-"""Kernels: which Gaussians every tile must look at, by a counting sort over tiles.
+"""Kernels: lists of the Gaussians that overlap each tile, by a counting sort over tiles.
 
 A Gaussian is on the list of a tile when the ellipse where its opacity reaches the cutoff meets the
 rectangle of the tile's pixel centres. Row by row of tiles this is exact: the ellipse cut by a band
@@ -93,7 +93,7 @@ def _columns(prints, i, tile_row, box, grid):
     """First and last column of tiles that a footprint touches in a row of tiles."""
     shift = grid.shift
     left, top, right, bottom = box
-    # The whole ellipse lies in one row or one column of tiles: the box is exact.
+    # The ellipse lies in one row or one column of tiles: the box is exact.
     if top >> shift == bottom >> shift or left >> shift == right >> shift:
         return left >> shift, right >> shift
     start, stop = _interval(prints, i, (tile_row << shift) + 0.5, ((tile_row + 1) << shift) - 0.5)

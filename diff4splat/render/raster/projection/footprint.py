@@ -1,4 +1,4 @@
-"""A Gaussian on the picture, and the way back, in float64.
+"""Projection of a Gaussian to its 2D footprint, and its gradient, in float64.
 
 Same formulas as ``render.projection``: with M = J Wᵀ R S, rows a and b of M, and dilation d,
 

@@ -1,4 +1,4 @@
-"""Kernels: spherical harmonics to RGB seen from a point, and back, for listed Gaussians.
+"""Kernels: spherical harmonics to RGB from a viewpoint, and gradients, for listed Gaussians.
 
 colour = max(0, 0.5 + Σ_k sh_k Y_k(d)), d the unit vector from the camera to the mean. Order, signs
 and constants as in ``scene.harmonics``. Only the bands that the scene has are evaluated.

@@ -86,7 +86,7 @@ def project_keyframed(
     first, last, keys, moment, cloud, sh, view, rules, means, prints, depth, visible, unusable
 ):
     """As ``project``, for moving Gaussians; writes their moved ``means``."""
-    found = 0
+    count = 0
     for place in range(first, last):
         i = keys.moving[place]
         mean = _moved(triple(cloud.means, i), place, keys, moment)
@@ -95,9 +95,9 @@ def project_keyframed(
         scales = _stretched(triple(cloud.scales, i), place, keys, moment)
         state = (mean, quat, scales, np.float64(cloud.opacities[i]))
         if is_seen(i, state, sh, view, rules, prints, depth, unusable):
-            visible[first + found] = i
-            found += 1
-    return found
+            visible[first + count] = i
+            count += 1
+    return count
 
 
 @contracted

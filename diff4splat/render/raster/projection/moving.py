@@ -1,4 +1,4 @@
-"""The moving Gaussians of a scene, brought to a time and onto the picture.
+"""The moving Gaussians of a scene, evaluated at a time and projected.
 
 Key frames are projected by a kernel that evaluates them on the way. Any other motion is asked for
 its state, and the rows that move are copied.
@@ -48,7 +48,7 @@ class Moving:
         depth: Floats,
         unusable: NDArray[np.int64],
     ) -> Integers:
-        """Footprints at ``time_s``; returns who can be seen and adds to ``unusable``."""
+        """Footprints at ``time_s``; returns the visible indices and adds to ``unusable``."""
         if len(self.index) == 0:
             return self.index
         numbers = self.sh.reshape(len(self.sh), self.sh.shape[1] * 3)

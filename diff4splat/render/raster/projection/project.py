@@ -44,20 +44,20 @@ MEANS, QUATS, SCALES, OPACITIES, SH = range(5)
 
 @kernel
 def project(first, last, candidates, cloud, sh, view, rules, prints, depth, visible, unusable):
-    """Fill ``prints`` and ``depth`` of the ``candidates`` that can be seen.
+    """Fill ``prints`` and ``depth`` of the visible ``candidates``.
 
     They are listed in ``visible`` from ``first`` on. ``unusable`` counts Gaussians by their first
     unusable parameter. Returns how many are listed.
     """
-    found = 0
+    count = 0
     for place in range(first, last):
         i = candidates[place]
         mean, quat = triple(cloud.means, i), quadruple(cloud.quats, i)
         state = (mean, quat, triple(cloud.scales, i), np.float64(cloud.opacities[i]))
         if is_seen(i, state, sh, view, rules, prints, depth, unusable):
-            visible[first + found] = i
-            found += 1
-    return found
+            visible[first + count] = i
+            count += 1
+    return count
 
 
 @contracted
@@ -98,7 +98,7 @@ def _usable(values):
 
 @contracted
 def _leave_print(i, state, view, rules, prints, depth):
-    """Whether a Gaussian can be seen, by its mean, quaternion, scales and opacity.
+    """Whether a Gaussian is visible, by its mean, quaternion, scales and opacity.
 
     If so, its footprint goes to row ``i``.
     """

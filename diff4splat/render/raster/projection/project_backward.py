@@ -1,7 +1,7 @@
 """Kernel: gradients of footprints to those of the Gaussians and of the camera, in float64.
 
 The chain of ``footprint`` from the end: shape → moments → rows of J Wᵀ and R S → mean, quaternion,
-scales and camera. Nothing is kept from the way forward; it is cheaper to compute again.
+scales and camera. Nothing is saved by the forward pass: computing it again is cheaper.
 """
 
 import math
@@ -44,7 +44,7 @@ def project_backward(first, last, listed, cloud, view, rules, prints, sums, grad
 
 @contracted
 def _one(index, cloud, view, rules, prints, sums, grads, camera):
-    """The way back of one Gaussian."""
+    """Gradients of one Gaussian."""
     turned, scales = unit(quadruple(cloud.quats, index)), triple(cloud.scales, index)
     mean = triple(cloud.means, index)
     local = camera_space(view, mean)

@@ -1,4 +1,4 @@
-"""Axis-aligned boxes of Gaussians at their support, still or from one time to another.
+"""Axis-aligned boxes of the supports of Gaussians, at one time or over an interval.
 
 Axes: ``n`` Gaussians. A box that holds nothing has corners at plus and minus infinity.
 """
@@ -26,17 +26,17 @@ class Boxes(NamedTuple):
 def boxes_between(primitives: Doubles, reach: Doubles, earliest: float, latest: float) -> Boxes:
     """Boxes that hold ``primitives`` at every time from ``earliest`` to ``latest``."""
     count = len(primitives)
-    made = Boxes(np.empty((count, 3)), np.empty((count, 3)))
+    boxes = Boxes(np.empty((count, 3)), np.empty((count, 3)))
 
     def work(first: int, last: int) -> None:
-        box(first, last, primitives, reach, (float(earliest), float(latest)), *made)
+        box(first, last, primitives, reach, (float(earliest), float(latest)), *boxes)
 
     parallel_for(work, ranges(count, PRIMITIVES_PER_PART))
-    return made
+    return boxes
 
 
 def empty_boxes(count: int) -> Boxes:
-    """So many boxes that hold nothing."""
+    """``count`` empty boxes."""
     return Boxes(np.full((count, 3), np.inf), np.full((count, 3), -np.inf))
 
 

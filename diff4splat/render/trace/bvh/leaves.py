@@ -1,4 +1,4 @@
-"""Kernel: what of a primitive sixteen lanes ask before it is a candidate of a packet.
+"""Kernel: bounds of primitives in groups of sixteen, for the test against a packet.
 
 Groups are as in the tree. A primitive lies behind a plane with normal n where n · (mean - origin)
 exceeds |reach · S Rᵀ n|: the exact extent of the ellipsoid along n.
@@ -50,7 +50,7 @@ def gather_leaves(tree: Tree, primitives: Doubles, reach: Doubles, moment: float
 
 @kernel
 def fill_leaves(first, last, tree, primitives, reach, moment, leaves):
-    """Fill groups ``first`` to ``last``; behind the last primitive there is none that is met."""
+    """Fill groups ``first`` to ``last``; slots after the last primitive intersect no ray."""
     table, row_bytes, count = address(primitives), 8 * primitives.shape[1], len(tree.order)
     for group in range(first, last):
         for lane in range(LANES):

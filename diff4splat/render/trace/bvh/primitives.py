@@ -1,6 +1,6 @@
-"""Kernel: Gaussians to what rays meet, in float64, and the boxes around them.
+"""Kernel: Gaussians to primitives in float64, and the boxes around them.
 
-W = S⁻¹ Rᵀ, reach k the distance in standard deviations at which a Gaussian ends (0 is never seen):
+W = S⁻¹ Rᵀ, reach k the distance in standard deviations at which a Gaussian ends (0 is invisible):
 k = √(2 ln(o / cutoff)) for kernel degree 2, (18 ln(o / cutoff))^¼ for degree 4. The tight box of
 the ellipsoid has half sizes k √Σ_jj.
 """
@@ -75,7 +75,7 @@ def _fill_motion(primitives, i, motion):
 
 @kernel
 def box(first, last, primitives, reach, interval, lower, upper):
-    """Corners of the boxes that hold primitives in an interval of time; empty if never seen.
+    """Corners of the boxes that hold primitives in an interval of time; empty if invisible.
 
     The mean moves in a line and the shape stays, so the boxes at both ends bound it exactly.
     """

@@ -2,7 +2,7 @@
 
 Axes: ``n`` boxes, ``m`` of them that hold something. There are no pointers: child c of node i is
 node 16 i + c one level below. Boxes of similar size are neighbours first, so that a large one does
-not widen the nodes of small ones. Sixteen children are asked at once.
+not widen the nodes of small ones. Sixteen children are tested at once.
 """
 
 import math
@@ -23,14 +23,14 @@ _DEPTH = 12
 """Bits of a place along each axis."""
 _SIZE_CLASSES, _OCTAVES = 16, 3
 SLACK = 1e-6
-"""What a float32 corner gives way, relative to its size: more than rounding in the tests does."""
+"""Relative margin of float32 corners, larger than the rounding of the tests."""
 
 
 def build_tree(boxes: Boxes, given: Integers = NO_ORDER) -> Tree:
     """The tree of the boxes that hold something; equal boxes give equal bits on any threads.
 
-    ``given`` is an order to keep, as of boxes that have moved since: what holds nothing now leaves
-    it, what it does not list follows. It slows searching down as neighbours part, and no more.
+    ``given`` is an order to keep, as of boxes that have moved since: boxes that are empty now are
+    removed from it, boxes that it does not list follow. Traversal slows down as neighbours part.
     """
     anchor, extent = _surroundings(boxes)
     fresh = boxes.lower[:, 0] <= boxes.upper[:, 0]
@@ -43,7 +43,7 @@ def build_tree(boxes: Boxes, given: Integers = NO_ORDER) -> Tree:
     def work(first: int, last: int) -> None:
         fit_groups(first, last, tree, boxes)
 
-    # Whole nodes to a part, so that no two of them write into one.
+    # A part covers complete nodes, so that no two parts write to one node.
     parallel_for(work, ranges(groups, PRIMITIVES_PER_PART))
     fit_nodes(tree.nodes, tree.levels, groups)
     return tree
@@ -108,8 +108,8 @@ def place_keys(first, last, listed, boxes, anchor, extent, keys):
             half = max(half, 0.5 * (upper[i, axis] - lower[i, axis]))
             middle = 0.5 * (lower[i, axis] + upper[i, axis]) - anchor[axis]
             cell[axis] = min(max(int((0.5 + 0.5 * middle / extent) * side), 0), side - 1)
-        finer = math.log2(extent / half) / _OCTAVES if half > 0 else _SIZE_CLASSES
-        size_class = min(max(int(finer), 0), _SIZE_CLASSES - 1)
+        octave = math.log2(extent / half) / _OCTAVES if half > 0 else _SIZE_CLASSES
+        size_class = min(max(int(octave), 0), _SIZE_CLASSES - 1)
         keys[place] = np.uint64(size_class << (3 * _DEPTH)) | np.uint64(hilbert(cell, 3, _DEPTH))
 
 
@@ -133,7 +133,7 @@ def fit_groups(first, last, tree, boxes):
 
 @inlined
 def _outward(corner, sign):
-    # Where nothing is, infinity must not meet infinity.
+    # Infinite corners of empty boxes stay: infinity minus infinity is NaN.
     return np.float32(corner + sign * SLACK * abs(corner) if abs(corner) < np.inf else corner)
 
 

@@ -1,4 +1,4 @@
-"""The colour of a primitive as one ray sees it: 0.5 + Σ_k sh_k Y_k(direction).
+"""The colour of a primitive along a ray: 0.5 + Σ_k sh_k Y_k(direction).
 
 Sixteen coefficients of a channel lie side by side, so one channel is one product of lanes.
 """
@@ -29,7 +29,7 @@ class ShWorkspace(NamedTuple):
 
 
 class ColorTables(NamedTuple):
-    """Addresses of what colours are made of."""
+    """Addresses of the arrays that colours depend on."""
 
     colors: int
     table: int
@@ -53,7 +53,7 @@ def make_sh_workspace():
 
 @inlined
 def color_tables(inputs, workspace):
-    """How the rays of ``inputs`` see its scene."""
+    """Addresses of the colours and rays of ``inputs``."""
     scene, rays = inputs.scene, inputs.rays
     return ColorTables(
         address(scene.colors),
@@ -71,7 +71,7 @@ def color_tables(inputs, workspace):
 
 @inlined
 def evaluate_sh(tables, i, ray):
-    """Evaluate the harmonics for primitive ``i`` seen by ``ray``."""
+    """Evaluate the harmonics of primitive ``i`` along ``ray``."""
     if tables.bands > 1:
         direction = (
             mean_direction(tables, i, ray)

@@ -1,4 +1,4 @@
-"""The way back of a colour: to the harmonics, and to the direction in which they are seen."""
+"""Gradients of a colour: to the harmonics and to the viewing direction."""
 
 import math
 
@@ -33,12 +33,12 @@ def plain_backward(row, pulls):
 @inlined
 def lobes_backward(tables, i, lobes, pulls):
     """Add to the row of harmonics of primitive ``i``; returns the gradient of the basis by lane."""
-    basis, own = lanes_at(tables.basis, 0), fill(0.0)
+    basis, slopes = lanes_at(tables.basis, 0), fill(0.0)
     for channel in range(3):
         at, slope = channel * LANES, np.float32(pulls[channel])
         put_lanes(lobes, at, fma(basis, slope, lanes_at(lobes, at)))
-        own = fma(lanes_at(tables.colors, i * LOBES + at), slope, own)
-    return own
+        slopes = fma(lanes_at(tables.colors, i * LOBES + at), slope, slopes)
+    return slopes
 
 
 @inlined
@@ -49,7 +49,7 @@ def evaluate_sh_backward(tables, basis_grad, ray_row):
 
 @inlined
 def mean_direction_backward(tables, i, ray, basis_grad, row, ray_row):
-    """The same to origin and mean, between which the direction lies."""
+    """The same to origin and mean, which define the direction."""
     away = mean_direction(tables, i, ray)
     squared, turned = dot(away, away), _direction_gradient(tables, basis_grad)
     if squared == 0:

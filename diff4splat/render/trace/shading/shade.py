@@ -1,4 +1,4 @@
-"""Kernel: hits of packets to what their rays see.
+"""Kernel: colours and distances along rays from their hits.
 
 Per ray, over its hits nearest first: w = α T, T ← (1 - α) T; sums are in float64.
 """
@@ -18,12 +18,12 @@ from diff4splat.render.trace.traversal.intersect import scratch_addresses
 from diff4splat.render.trace.traversal.traverse import initial_scratch, traverse_in_parts
 
 RGB, DISTANCE, WEIGHT, LIGHT, MEDIAN, OUTPUT_COLUMNS = 0, 3, 4, 5, 6, 7
-"""Columns of what a ray sees: rgb (3), Σ w τ, Σ w, light left, median τ."""
+"""Columns of the outputs of a ray: rgb (3), Σ w τ, Σ w, light left, median τ."""
 
 
 @kernel
-def shade(first, last, inputs, seen, hits):
-    """Trace packets ``first`` to ``last`` into the rows ``seen`` and ``hits`` of their rays."""
+def shade(first, last, inputs, ray_outputs, hits):
+    """Trace packets ``first`` to ``last`` into their rays' rows of ``ray_outputs`` and ``hits``."""
     scratch, workspace, rays = initial_scratch(), make_sh_workspace(), inputs.rays
     tables = color_tables(inputs, workspace)
     for packet in range(first, last):
@@ -33,16 +33,16 @@ def shade(first, last, inputs, seen, hits):
             at = scratch_addresses(scratch, end - place)
             for lane in range(end - place):
                 ray = rays.order[place + lane]
-                found = _blend(at, tables, lane, ray)
+                blended = _blend(at, tables, lane, ray)
                 for column in range(OUTPUT_COLUMNS):
-                    seen[ray, column] = found[column]
+                    ray_outputs[ray, column] = blended[column]
                 hits[ray] = word_at(at.counts, lane)
             place = end
 
 
 @inlined
 def _blend(at, tables, lane, ray):
-    """What one ray sees, front to back."""
+    """Outputs of one ray, front to back."""
     red = green = blue = far = weights = median = 0.0
     light, first = 1.0, lane * at.room
     for place in range(first, first + word_at(at.counts, lane)):

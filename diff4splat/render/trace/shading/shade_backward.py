@@ -1,6 +1,6 @@
-"""Kernel: gradients of what rays see to those of the rays, and to sums per primitive.
+"""Kernel: gradients of outputs to those of the rays, and to sums per primitive.
 
-Per ray, back to front, with B what is seen behind a hit times its gradient:
+Per ray, back to front, with B the light from behind a hit times its gradient:
 
     ∂/∂ln α = (T worth - B / (1 - α)) α    worth = rgb · ∂rgb + τ ∂Στw + ∂Σw
 
@@ -55,7 +55,7 @@ _ROWS = 1024
 
 
 class _Workspace(NamedTuple):
-    """Addresses of what one thread works with."""
+    """Addresses of the arrays of one thread."""
 
     where: int
     """The row of every primitive, or -1."""
@@ -70,7 +70,7 @@ class _Workspace(NamedTuple):
 
 @kernel
 def shade_backward(first, last, inputs, output_grads, where, listed, ray_grads):
-    """Gradients of the rays of packets ``first`` to ``last``, and sums of what they meet.
+    """Gradients of the rays of packets ``first`` to ``last``, and sums of the primitives they hit.
 
     ``where`` (-1 everywhere, and so again afterwards) and ``listed`` have room for all primitives.
     Returns the primitives, their sums, and the sums of their harmonics.
@@ -121,7 +121,7 @@ def _list(at, rays, where, listed, count):
 
 @inlined
 def _grown(rows, count):
-    """Room for at least ``count`` rows, zeros behind those there were."""
+    """Room for at least ``count`` rows, new ones zero."""
     if count <= len(rows):
         return rows
     larger = np.zeros((2 * count, rows.shape[1]), rows.dtype)
@@ -139,7 +139,7 @@ def _ray_backward(at, tables, rules, work, lane, ray):
     given = work.output_grads + 4 * OUTPUT_COLUMNS * ray
     color_grad, far_grad = triple_at(given + 4 * RGB, 0), np.float64(float_at(given, DISTANCE))
     weight_grad, median_grad = float_at(given, WEIGHT), float_at(given, MEDIAN)
-    behind, along = light * float_at(given, LIGHT), fill(0.0)
+    beyond, along = light * float_at(given, LIGHT), fill(0.0)
     for place in range(stop - 1, first - 1, -1):
         alpha = np.float64(float_at(at.alphas, place))
         i = np.int64(int_at(at.members, int_at(at.ranks, place)))
@@ -149,20 +149,20 @@ def _ray_backward(at, tables, rules, work, lane, ray):
         after, light = light, double_at(work.lights, place - first)
         worth, pulls = _worth(tables, i, color_grad, alpha * light)
         worth += far_grad * float_at(at.distances, place) + weight_grad
-        e = (light * worth - behind / (1 - alpha)) * alpha
+        e = (light * worth - beyond / (1 - alpha)) * alpha
         if float_at(at.alphas, place) >= np.float32(rules.alpha_max):
             e = 0.0
-        behind += alpha * light * worth
+        beyond += alpha * light * worth
         f = far_grad * alpha * light + (median_grad if light > 0.5 >= after else 0.0)
         sums = work.sums + 8 * COLUMNS * row
         intersect_backward(tables, rules.quartic, i, ray, (e, f), sums, work.ray_row)
         if tables.bands == 1:
             plain_backward(sums, pulls)
         else:
-            own = lobes_backward(tables, i, work.lobes + 4 * LOBES * row, pulls)
-            along = along + own
+            direction_grad = lobes_backward(tables, i, work.lobes + 4 * LOBES * row, pulls)
+            along = along + direction_grad
             if tables.toward_mean:
-                put_lanes(work.basis_grad, 0, own)
+                put_lanes(work.basis_grad, 0, direction_grad)
                 mean_direction_backward(tables, i, ray, work.basis_grad, sums, work.ray_row)
     if tables.bands > 1 and not tables.toward_mean and stop > first:
         put_lanes(work.basis_grad, 0, along)
@@ -171,7 +171,7 @@ def _ray_backward(at, tables, rules, work, lane, ray):
 
 @inlined
 def _lights(at, first, stop, lights):
-    """The light in front of every hit; returns what is left behind the last."""
+    """The light in front of every hit; returns the light after the last."""
     light = 1.0
     for place in range(first, stop):
         put_double(lights, place - first, light)

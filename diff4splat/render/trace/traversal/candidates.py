@@ -1,9 +1,9 @@
-"""Which primitives a packet of rays may meet: down the tree, sixteen children at once.
+"""Candidate primitives of a packet of rays: down the tree, sixteen children at once.
 
-A node, or a primitive, is left out when it lies wholly outside one of the planes around the rays.
-What remains is sorted by the z of the mean, or a little more than the least z at which the packet
-can meet it if that is less. So lists of hits are nearly in order as they come, and whoever looks
-at candidates one after another knows how near what follows can be.
+A node or primitive is skipped when it lies outside one of the planes around the rays. Candidates
+are sorted by the z of the mean, or by a little more than the least z at which the packet can
+intersect them if that is less. So hits arrive nearly in order, and each candidate bounds the depth
+of those that follow.
 """
 
 import numpy as np
@@ -29,22 +29,22 @@ _DIGIT_BITS, _DIGIT_MASK = np.uint64(8), np.uint64(BUCKETS - 1)
 _DROPPED_BITS = np.uint64(12)
 """Depths are sorted to one part in two thousand: lists need only be nearly in order."""
 EXTENT_SLACK = np.float32(1.00002)
-"""Extents are taken a shade larger than they are: rays decide who is met, not rounding here."""
+"""Relative margin of extents: rounding here must not drop what a ray intersects."""
 
 ORDER_SLACK = np.float32(1.03)
-"""How much further than its least z a candidate may stand in the order."""
+"""Sort key of a candidate at most, relative to its least z."""
 
 
 @inlined
 def find_candidates(scene, frame, scratch):
-    """List candidates in ``scratch.members`` by ``scratch.depths``; returns how many there are.
+    """List candidates in ``scratch.members`` by ``scratch.depths``; returns their number.
 
-    -1 if there are more than fit.
+    Returns -1 if they do not fit.
     """
     tree, planes, rows = scene.tree, scratch.planes, scratch.rows
     nodes, leaves = tree.nodes.reshape(-1), scene.leaves.reshape(-1)
     groups, height = (len(tree.order) + LANES - 1) // LANES, len(tree.levels) - 2
-    stack, top, found = scratch.stack, 0, 0
+    stack, top, count = scratch.stack, 0, 0
     if groups:
         stack[0], top = height << 32, 1
     while top > 0:
@@ -53,7 +53,7 @@ def find_candidates(scene, frame, scratch):
         at = (tree.levels[level] + node) * NODE_ROWS * LANES
         inside = bits(_boxes_inside(nodes, at, planes, rows))
         while inside != 0 and level > 0:
-            # The last child goes down first: what is found is in the order of the tree.
+            # The stack is last in, first out: candidates are listed in the order of the tree.
             last = last_bit(inside)
             inside ^= 1 << last
             stack[top] = ((level - 1) << 32) | (node * LANES + last)
@@ -61,11 +61,11 @@ def find_candidates(scene, frame, scratch):
         while inside != 0:
             group = node * LANES + first_bit(inside)
             inside &= inside - 1
-            if found + LANES > len(scratch.keys):
+            if count + LANES > len(scratch.keys):
                 return -1
-            found = _leaf(scene, leaves, group, frame, planes, scratch, found)
-    _sort(scratch, found)
-    return found
+            count = _leaf(scene, leaves, group, frame, planes, scratch, count)
+    _sort(scratch, count)
+    return count
 
 
 @inlined
@@ -88,7 +88,7 @@ def _corner(nodes, at, planes, rows, side):
 
 
 @inlined
-def _leaf(scene, leaves, group, frame, planes, scratch, found):
+def _leaf(scene, leaves, group, frame, planes, scratch, count):
     """Add the primitives of a group that reach into the beam."""
     at, front = group * scene.leaves.shape[1] * LANES, PLANES - 1
     slack = load(leaves, at + LEAF_SLACK * LANES)
@@ -110,16 +110,16 @@ def _leaf(scene, leaves, group, frame, planes, scratch, found):
     while left != 0:
         lane = first_bit(left)
         left &= left - 1
-        scratch.found[found] = scene.tree.order[group * LANES + lane]
+        scratch.unsorted[count] = scene.tree.order[group * LANES + lane]
         depth = np.uint64(scratch.lane_depth_bits[lane]) >> _DROPPED_BITS
-        scratch.keys[found] = (depth << _INDEX_BITS) | np.uint64(found)
-        found += 1
-    return found
+        scratch.keys[count] = (depth << _INDEX_BITS) | np.uint64(count)
+        count += 1
+    return count
 
 
 @inlined
 def _distances(scene, leaves, at, frame, planes, side):
-    """The least and the largest distance of means outside a plane while the packet looks."""
+    """The least and the largest distance of means outside a plane, over the times of the packet."""
     distance = _along(leaves, at + LEAF_MEAN * LANES, planes, side) - planes[4 * side + 3]
     if scene.leaves.shape[1] == STATIC_ROWS:
         return distance, distance
@@ -155,37 +155,37 @@ def _squared_extent(leaves, at, planes, side):
 
 
 @inlined
-def _sort(scratch, found):
-    """Candidates by the leading bits of their depth, equal ones as they were found."""
+def _sort(scratch, count):
+    """Candidates by the leading bits of their depth, equal ones in the order of the tree."""
     keys, spare, starts = scratch.keys, scratch.spare_keys, scratch.starts
     low, high = ~np.uint64(0), np.uint64(0)
-    for place in range(found):
+    for place in range(count):
         key = keys[place] >> _INDEX_BITS
         low, high = min(low, key), max(high, key)
-    span, shift = high - low if found else np.uint64(0), _INDEX_BITS
+    span, shift = high - low if count else np.uint64(0), _INDEX_BITS
     while span > 0:
-        _scatter(keys, spare, starts, found, low << _INDEX_BITS, shift)
+        _scatter(keys, spare, starts, count, low << _INDEX_BITS, shift)
         keys, spare = spare, keys
         shift += _DIGIT_BITS
         span >>= _DIGIT_BITS
-    for rank in range(found):
+    for rank in range(count):
         key = keys[rank]
         scratch.depth_bits[rank] = np.uint32((key >> _INDEX_BITS) << _DROPPED_BITS)
-        scratch.members[rank] = scratch.found[np.int64(key & _INDEX_MASK)]
+        scratch.members[rank] = scratch.unsorted[np.int64(key & _INDEX_MASK)]
 
 
 @inlined
-def _scatter(keys, spare, starts, found, base, shift):
+def _scatter(keys, spare, starts, count, base, shift):
     """One pass: stable counting sort by one digit."""
     starts[:] = 0
-    for place in range(found):
+    for place in range(count):
         starts[((keys[place] - base) >> shift) & _DIGIT_MASK] += 1
     running = 0
     for bucket in range(len(starts)):
         size = starts[bucket]
         starts[bucket] = running
         running += size
-    for place in range(found):
+    for place in range(count):
         bucket = ((keys[place] - base) >> shift) & _DIGIT_MASK
         spare[starts[bucket]] = keys[place]
         starts[bucket] += 1

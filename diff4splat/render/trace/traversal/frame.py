@@ -1,6 +1,6 @@
-"""A packet of rays in axes of its own.
+"""The frame of a packet of rays.
 
-The frame stands at an origin near those of the rays and looks along their mean direction d; e1 and
+Its origin is near those of the rays and its z axis is their mean direction d; e1 and
 e2 are across. A ray is slid to the plane z = 0 and scaled to one unit of z:
 
     point at z = (shift_x + z slope_x, shift_y + z slope_y, z),    τ = (z - start) · stretch
@@ -23,11 +23,11 @@ SLOPE_X, SLOPE_Y, SHIFT_X, SHIFT_Y, STRETCH, START, SINCE, FARTHEST, LAST = (
     k * PACKET for k in range(9)
 )
 """Where the numbers of a packet's rays begin: as above, the time since the frame's, and the largest
-τ that is still looked at (-1 once the ray is done)."""
+τ that is searched (-1 once the ray is done)."""
 PLANES = 5
 """Right, left, below, above, in front."""
 ROUNDING = 4 * PLANES
-"""Behind normals and offsets: what rounding may move a plane by."""
+"""Index after normals and offsets: how far rounding may move a plane."""
 
 
 class Frame(NamedTuple):

@@ -30,7 +30,7 @@ def swap(at, one, other):
 
 @inlined
 def sort_hits(at, ray, dark):
-    """Sort the hits of a ray, and forget those behind the one that leaves it ``dark``."""
+    """Sort the hits of a ray, and drop those after the hit that leaves it ``dark``."""
     first, count = ray * at.room, word_at(at.counts, ray)
     if not _insert_all(at, first, count):
         _take_nearest(at, first, count, dark)
@@ -64,7 +64,7 @@ def _insert_all(at, first, count):
 def _take_nearest(at, first, count, dark):
     """Take one nearest hit after another off a heap until no light is left.
 
-    The heap stands on its head: its root is the last place, so what is taken fills the front.
+    The heap is stored backwards: its root is the last index, so hits that are taken fill the front.
     """
     root, light = first + count - 1, 1.0
     for node in range(count // 2 - 1, -1, -1):

@@ -1,4 +1,4 @@
-"""Sixteen rays at once meet one candidate after another; every ray keeps its hits in order.
+"""Intersection of sixteen rays at once with one candidate after another; hits stay in order.
 
 In the frame of the packet (see `frame`) a primitive has its mean at (x, y, z), deviation s along
 the view, and an upper triangular root of what remains across:
@@ -79,7 +79,7 @@ _ROOM = 1e-5
 
 
 class ScratchAddresses(NamedTuple):
-    """Addresses of what is in the scratch."""
+    """Addresses of the arrays in the scratch."""
 
     numbers: int
     shapes: int
@@ -100,7 +100,7 @@ class ScratchAddresses(NamedTuple):
 
 @inlined
 def scratch_addresses(scratch, rays):
-    """Where a packet of so many ``rays`` keeps things."""
+    """Addresses of the scratch of a packet of ``rays`` rays."""
     return ScratchAddresses(
         address(scratch.numbers),
         address(scratch.shapes),
@@ -120,10 +120,10 @@ def scratch_addresses(scratch, rays):
 
 
 @inlined
-def intersect_all(scene, frame, rules, scratch, found, rays):
-    """Meet ``found`` candidates until all of ``rays`` are dark; False if hits do not fit.
+def intersect_all(scene, frame, rules, scratch, candidate_count, rays):
+    """Intersect the ``candidates`` until all ``rays`` are dark; False if hits do not fit.
 
-    Then the hits of every ray are in order, and end where its light does.
+    Afterwards the hits of every ray are sorted, and end where its light is used up.
     """
     at, lit, first = scratch_addresses(scratch, rays), rays, 0
     table, columns = address(scene.primitives), scene.primitives.shape[1]
@@ -132,10 +132,10 @@ def intersect_all(scene, frame, rules, scratch, found, rays):
         put_word(at.settled, ray, 0)
         put_double(at.light, ray, 1.0)
         put_float(at.soonest, ray, np.float32(np.inf))
-    while first < found and lit > 0:
-        last = min(first + CHUNK, found)
+    while first < candidate_count and lit > 0:
+        last = min(first + CHUNK, candidate_count)
         for rank in range(first, last):
-            ahead = min(rank + _AHEAD, found - 1)
+            ahead = min(rank + _AHEAD, candidate_count - 1)
             prefetch_at(table + 8 * columns * np.int64(int_at(at.members, ahead)))
             row = table + 8 * columns * np.int64(int_at(at.members, rank))
             shape = at.shapes + 4 * SHAPE_COLUMNS * (rank - first)
@@ -149,7 +149,7 @@ def intersect_all(scene, frame, rules, scratch, found, rays):
                     left &= left - 1
                     if not _append(at, lane, bit, rank):
                         return False
-        if last < found:
+        if last < candidate_count:
             following = np.float64(float_at(at.depths, last)) / ORDER_SLACK
             for ray in range(rays):
                 if float_at(at.numbers, FARTHEST + ray) > 0 and _is_opaque(
@@ -164,7 +164,7 @@ def intersect_all(scene, frame, rules, scratch, found, rays):
 
 @inlined
 def _intersect(at, shape, lane, moving, rules):
-    """Sixteen rays from ``lane`` on meet a shape; returns a bit for each that hits it.
+    """Intersect sixteen rays from ``lane`` on with a shape; returns a bit for each hit.
 
     Distances and alphas of these are left in ``lane_distances`` and ``lane_alphas``.
     """
@@ -216,7 +216,7 @@ def _exponent(level, squared, rules):
 
 @inlined
 def _append(at, lane, bit, rank):
-    """Put a hit behind the others of its ray; False if it does not fit."""
+    """Append a hit to those of its ray; False if it does not fit."""
     count = word_at(at.counts, lane + bit)
     if count == at.room:
         return False
@@ -231,10 +231,9 @@ def _append(at, lane, bit, rank):
 
 @inlined
 def _is_opaque(at, rules, following, ray):
-    """Whether the hits that nothing can come before any more leave a ray no light.
+    """Whether settled hits, which no later candidate can precede, leave a ray no light.
 
-    Light is a product, so these hits need no order: they are moved in front of the others, when
-    there are any.
+    Light is a product, so settled hits need no order: they are moved before the others.
     """
     start = np.float64(float_at(at.numbers, START + ray))
     limit = following - start - _ROOM * abs(start)

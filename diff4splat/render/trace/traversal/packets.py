@@ -1,6 +1,6 @@
-"""Rays that look the same way from about the same place, sixty-four at a time.
+"""Packets of at most sixty-four rays with similar origins and directions.
 
-Axes: ``r`` rays. Rays are sorted by the cell that they start in (see `cells`) and then along
+Axes: ``r`` rays. Rays are sorted by the cell that they start in (see `ray_binning`) and then along
 Hilbert's curve over the octahedral map of directions, and cut into packets that stay within a cone,
 because float32 is relative to the size of a packet.
 """
@@ -57,14 +57,14 @@ def ray_keys(first, last, origins, directions, cells, keys):
         corner[0] = min(int(x * side), side - 1)
         corner[1] = min(int(y * side), side - 1)
         place = hilbert(corner, 2, _DEPTH)
-        # There and back again, so that packets across two cells look the same way.
+        # Alternate the direction, so that packets across two cells have similar directions.
         place = side * side - 1 - place if cell & 1 else place
         keys[ray] = np.uint64((cell << (2 * _DEPTH)) | place)
 
 
 @kernel
 def cut(order, origins, directions, squared_apart, starts):
-    """Where packets begin in ``order``, and its length behind them; returns how many there are."""
+    """Write where packets begin in ``order``, then its length; returns the number of packets."""
     count, first = 0, 0
     for place in range(len(order)):
         if place - first == PACKET or _parts(
@@ -80,7 +80,7 @@ def cut(order, origins, directions, squared_apart, starts):
 
 @inlined
 def _parts(origins, directions, one, other, squared_apart):
-    """Whether two rays look too different ways, or from places too far apart."""
+    """Whether the directions or origins of two rays are too far apart."""
     away = minus(triple(origins, one), triple(origins, other))
     turn = dot(triple(directions, one), triple(directions, other))
     return turn < _CONE or dot(away, away) > squared_apart

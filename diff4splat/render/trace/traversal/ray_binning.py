@@ -1,4 +1,4 @@
-"""Cells of origins: how far apart rays of one packet may start, and how far apart they may look.
+"""Binning of rays by origin: how far apart the origins and directions of a packet may be.
 
 Axes: ``s`` rays that were picked. The rays of one cell are cut by direction into packets of P. With
 cells of sides c, N rays, and solid angles that the rays of each cell fill and that are A in sum,
@@ -7,14 +7,15 @@ the beam of a packet is about
     Σ c / 2 + d √(P A / N)
 
 wide at distance d (rays go along one of three sides, and across two). In smaller cells fewer rays
-look the same way, so A grows: over the area of a lens as 1 / c², along a path as 1 / c. A pinhole
-has one cell.
+have similar directions, so A grows: over the area of a lens as 1 / c², along a path as 1 / c. A
+pinhole has one cell.
 
-Both are told by some of the rays, sorted by cell and part of the field. A is the number of such
-pairs over the share that is seen of them, which is one less the share of rays that are alone in
-theirs (Good, "The population frequencies of species and the estimation of population parameters",
-Biometrika 1953). Sides are those of a box with the variance of origins within pairs: where a
-shutter rolls, rays that look the same way start at the same place anyway.
+Both are estimated from a sample of the rays, sorted by cell and part of the field. A is the number
+of such pairs over the share of them in the sample, which is one less the share of rays alone in
+their pair (Good,
+"The population frequencies of species and the estimation of population parameters", Biometrika
+1953). Sides are those of a box with the variance of origins within pairs: where a
+shutter rolls, rays of similar direction have similar origins anyway.
 """
 
 import math
@@ -31,17 +32,17 @@ from diff4splat.render.trace.traversal.frame import PACKET
 
 _MOST_PARTS = 1 << 8
 """Of the box along each axis."""
-_PICKED = 4096
+_SAMPLED = 4096
 _GOLDEN = 0.6180339887498949
 _HALVINGS = 10
 _POINT = 1e-5
 """Origins that are no further apart, next to the distance, are one."""
-_LOOKS = 8
-"""Parts of the directions along each axis of their map, to tell how large a field they fill."""
+_DIRECTION_PARTS = 8
+"""Parts of the directions along each axis of their map, to estimate their solid angle."""
 
 
 class RayBins(NamedTuple):
-    """The box of the origins along its own axes, cut into equal parts."""
+    """The oriented box of the origins, cut into equal cells."""
 
     base: Doubles
     """One of the origins."""
@@ -65,15 +66,15 @@ def choose_bins(origins: Floats, directions: Floats, size: float, distance: floa
     width, least, chosen = min(float(box.extent.max()), size), math.inf, _cut(box, size)
     if width < _POINT * distance:
         return chosen
-    looks = np.empty((len(picked), 2))
-    map_directions(directions, picked, looks)
+    mapped = np.empty((len(picked), 2))
+    map_directions(directions, picked, mapped)
     for _ in range(_HALVINGS):
-        made = _cut(box, width)
-        field, side = _measured(made, along, looks)
+        bins = _cut(box, width)
+        field, side = _measured(bins, along, mapped)
         beam = 0.5 * side / distance + math.sqrt(PACKET * field / len(origins))
         if beam >= least:
             break
-        least, chosen, width = beam, made, 0.5 * width
+        least, chosen, width = beam, bins, 0.5 * width
     return chosen
 
 
@@ -86,9 +87,9 @@ class _Box(NamedTuple):
 
 def _spread_out(count: int) -> NDArray[np.int64]:
     """Some of ``count`` rays, in step with nothing: samples of pixels repeat."""
-    if count <= _PICKED:
+    if count <= _SAMPLED:
         return np.arange(count)
-    return (np.arange(_PICKED) * _GOLDEN % 1.0 * count).astype(np.int64)
+    return (np.arange(_SAMPLED) * _GOLDEN % 1.0 * count).astype(np.int64)
 
 
 def _edges(places: Doubles) -> tuple[Doubles, Doubles]:
@@ -105,18 +106,20 @@ def _cut(box: _Box, width: float) -> RayBins:
     return RayBins(box.base, box.axes, box.lower, per_unit, parts.astype(np.int64))
 
 
-def _measured(cells: RayBins, along: Doubles, looks: Doubles) -> tuple[float, float]:
+def _measured(cells: RayBins, along: Doubles, mapped: Doubles) -> tuple[float, float]:
     """Solid angles summed over cells, and the sum of the sides; infinite where rays do not tell."""
-    lower, extent = _edges(looks)
-    part = np.where(extent > 0, extent, 1.0) / _LOOKS
-    own = np.minimum(((looks - lower) / part).astype(np.int64), _LOOKS - 1)
+    lower, extent = _edges(mapped)
+    part = np.where(extent > 0, extent, 1.0) / _DIRECTION_PARTS
+    direction_part = np.minimum(((mapped - lower) / part).astype(np.int64), _DIRECTION_PARTS - 1)
     at = np.minimum(((along - cells.lower) * cells.per_unit).astype(np.int64), cells.counts - 1)
-    keys = np.ravel_multi_index((*at.T, *own.T), (*cells.counts, _LOOKS, _LOOKS))
+    keys = np.ravel_multi_index(
+        (*at.T, *direction_part.T), (*cells.counts, _DIRECTION_PARTS, _DIRECTION_PARTS)
+    )
     _, pair, rays = np.unique(keys, return_inverse=True, return_counts=True)
-    known = 1 - (rays == 1).sum() / len(keys)
-    if known <= 0:
+    coverage = 1 - (rays == 1).sum() / len(keys)
+    if coverage <= 0:
         return math.inf, math.inf
-    solid_angle = len(rays) / known * 4 * math.pi * float(part.prod())
+    solid_angle = len(rays) / coverage * 4 * math.pi * float(part.prod())
     within = 0.0
     for axis in along.T:
         means = np.bincount(pair, axis) / rays
@@ -126,10 +129,10 @@ def _measured(cells: RayBins, along: Doubles, looks: Doubles) -> tuple[float, fl
 
 
 @kernel
-def map_directions(directions, picked, looks):
+def map_directions(directions, picked, mapped):
     """Places of some directions in the unit square."""
     for place in range(len(picked)):
-        looks[place] = octahedral(triple(directions, picked[place]))
+        mapped[place] = octahedral(triple(directions, picked[place]))
 
 
 @inlined

@@ -12,7 +12,7 @@ from diff4splat.render.trace.tables import Floats, Integers
 from diff4splat.render.trace.traversal.frame import LAST, PACKET, PLANES, ROUNDING
 
 CHUNK = 32
-"""Candidates that are met before rays settle what cannot change any more."""
+"""Candidates that are intersected before rays settle hits that cannot change any more."""
 SHAPE_COLUMNS = 24
 BUCKETS = 256
 _STACK = 16 * 12
@@ -33,12 +33,12 @@ class Scratch(NamedTuple):
     keys: NDArray[np.uint64]
     spare_keys: NDArray[np.uint64]
     starts: NDArray[np.int32]
-    found: Integers
-    """Candidates as they were found (c)."""
+    unsorted: Integers
+    """Candidates in the order of the tree (c)."""
     members: Integers
-    """The same in the order in which they are met (c)."""
+    """Candidates in the order of intersection (c)."""
     depths: Floats
-    """What they are ordered by (c): they are met at this z divided by `gather.LATER` or later."""
+    """Sort keys (c): the least z of a candidate is at least this over `candidates.ORDER_SLACK`."""
     depth_bits: NDArray[np.uint32]
     shapes: Floats
     """Candidates of a chunk in the axes of the frame."""
@@ -54,7 +54,7 @@ class Scratch(NamedTuple):
     soonest: Floats
     """The least τ of the others."""
     light: NDArray[np.float64]
-    """What is left behind those that are settled."""
+    """Transmittance after the settled hits."""
 
 
 @inlined

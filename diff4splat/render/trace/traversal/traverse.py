@@ -1,4 +1,4 @@
-"""What the packets of a bundle hit: the part that the way forward and the way back share."""
+"""Hits of packets of rays: the part that the forward and the backward pass share."""
 
 from diff4splat.kernels.jit import shared
 from diff4splat.render.trace.traversal.candidates import find_candidates
@@ -18,32 +18,32 @@ def initial_scratch():
 
 @shared
 def traverse(inputs, first, last, scratch):
-    """Fill ``scratch`` with the hits of the rays at ``first`` to ``last``, or say what is short."""
+    """Fill ``scratch`` with the hits of rays ``first`` to ``last``, or return what is too small."""
     scene, rays = inputs.scene, inputs.rays
     frame = make_frame(rays, first, last)
     place_rays(rays, first, last, frame, scratch.numbers)
     make_beam(scratch.numbers, last - first, frame, scene.tree.anchor, scratch.planes, scratch.rows)
-    found = find_candidates(scene, frame, scratch)
-    if found < 0:
+    count = find_candidates(scene, frame, scratch)
+    if count < 0:
         return _MORE_CANDIDATES
-    if not intersect_all(scene, frame, inputs.rules, scratch, found, last - first):
+    if not intersect_all(scene, frame, inputs.rules, scratch, count, last - first):
         return _MORE_HITS
     return _DONE
 
 
 @shared
 def traverse_in_parts(inputs, first, last, scratch):
-    """As `look` for as many rays from ``first`` on as fit; returns where it ended and the scratch.
+    """As `traverse`, for as many rays from ``first`` on as fit; returns their end and the scratch.
 
-    The room for hits grows up to ``inputs.most_hits``; then fewer rays are done at once. One ray
-    gets what it needs.
+    The room for hits grows up to ``inputs.most_hits``; then fewer rays are traced at once. A single
+    ray gets all the room it needs.
     """
     while True:
-        said = traverse(inputs, first, last, scratch)
-        if said == _DONE:
+        status = traverse(inputs, first, last, scratch)
+        if status == _DONE:
             return last, scratch
         hits = len(scratch.distances)
-        if said == _MORE_CANDIDATES:
+        if status == _MORE_CANDIDATES:
             scratch = make_scratch(_GROWTH * len(scratch.keys), hits)
         elif _GROWTH * hits <= inputs.most_hits or last - first == 1:
             scratch = make_scratch(len(scratch.keys), _GROWTH * hits)
