@@ -22,8 +22,8 @@ from diff4splat.evaluation.result_store import NAME, ItemStore, run_key
 from diff4splat.evaluation.runner import Outcome, require_some, run_items
 from diff4splat.evaluation.sources import ClipSource
 from diff4splat.evaluation.systems import Reconstructor, model_identity, reconstruct_clip
-from diff4splat.generation.pipeline import Diff4SplatPipeline
-from diff4splat.models.hub.pretrained import Model, load_model
+from diff4splat.generation.plan import RECONSTRUCTION_PARTS
+from diff4splat.models.hub.model import Model, load_model
 from diff4splat.models.video_vae.vae import LatentDistribution, VideoVae
 from diff4splat.progress.phases import Phases
 from diff4splat.training.train_stage import MODEL_FOLDER
@@ -112,7 +112,7 @@ def judge(variant: Variant, folder: Path, held_out: HeldOut, phases: Phases) -> 
     """
     model = load_model(folder / MODEL_FOLDER)
     pictures = "true pictures" if variant.use_ground_truth_frames else "decoded pictures"
-    identity = model_identity(Diff4SplatPipeline(model), f"reconstruction, {pictures}")
+    identity = model_identity(model, RECONSTRUCTION_PARTS, f"reconstruction, {pictures}")
     subject = Reconstructor(
         reconstruct=partial(reconstruct_clip, _seeing(model, variant)),
         identity=replace(identity, name=variant.name, untrained=False),

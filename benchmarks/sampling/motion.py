@@ -19,7 +19,7 @@ from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.training.batches.motion_targets import (
     extend_to_all_cells,
     moving_mask,
@@ -46,7 +46,7 @@ class Told:
         asked = GenerationSettings(motion=settings)
         wish = MotionRequest(text=self.text, seed=seed, settings=asked)
         frames = self.truth.shape[1]
-        made = sample_motion(model.networks.dit.motion_branch, self.picture, frames, wish)
+        made = sample_motion(model.networks.motion_unet, self.picture, frames, wish)
         return made.field, made.calls.conditional + made.calls.unconditional
 
 

@@ -44,8 +44,7 @@ class Evaluate:
 
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
-        from diff4splat.cli.worlds import prepare_sources
+        from diff4splat.cli.precompile import precompile_renderer, precompile_sources
         from diff4splat.evaluation.captions import grammar_caption
         from diff4splat.evaluation.datasets import open_clips
         from diff4splat.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
@@ -67,8 +66,8 @@ class Evaluate:
             features=features,
             captioner=grammar_caption,
         )
-        prepare_renderer(speck("cpu"), phases)
-        prepare_sources([protocol.source], phases)
+        precompile_renderer(speck("cpu"), phases)
+        precompile_sources([protocol.source], phases)
         extent = Extent(limit=self.items, fresh=self.fresh)
         found = evaluate(clips, setup, self.out, extent, phases)
         print(found.markdown)

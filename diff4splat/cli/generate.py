@@ -63,7 +63,8 @@ class Generate:
     def run(self) -> None:
         """Check everything cheap first, then generate, render and write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.renderer import left_out, prepare_renderer
+        from diff4splat.cli.precompile import precompile_renderer
+        from diff4splat.cli.skipped_gaussians import skipped_gaussians
         from diff4splat.generation.input_cameras import path_frame, reconcile_intrinsics
         from diff4splat.generation.pipeline import Diff4SplatPipeline
         from diff4splat.io.atomic import atomic_folder
@@ -85,9 +86,9 @@ class Generate:
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
             pipeline = Diff4SplatPipeline.from_pretrained(self.model)
             scene = pipeline(picture, path, self.prompt, seed=self.seed, settings=settings, log=log)
-            prepare_renderer(scene.gaussians, log.phases)
-            if dropped := left_out(scene, float(scene.path.times_s[0])):
-                note(dropped)
+            precompile_renderer(scene.gaussians, log.phases)
+            if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
+                note(skipped)
             frames = render_frames(scene, scene.path, log, with_depth=not self.skip_depth)
             result = Result.of(scene, picture.rgb, frames.rgb[0])
             facts = describe(result, self.camera, picture.focal_source)

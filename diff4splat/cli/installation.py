@@ -9,15 +9,11 @@ from diff4splat.errors import Diff4SplatError
 if TYPE_CHECKING:
     from diff4splat.scene.gaussians import Gaussians
 
-COMPILE_S = 20
-"""Seconds that compiling the CPU renderer takes on a laptop."""
-COMPILE_TRACER_S = 40
-"""The same of the ray tracer."""
 LIBRARIES = (
     "diff4splat.generation.pipeline",
     "diff4splat.outputs.scene_folder",
-    "diff4splat.render.raster.warm",
-    "diff4splat.render.trace.warm",
+    "diff4splat.render.raster.warm_up",
+    "diff4splat.render.trace.warm_up",
 )
 """Modules that load every library a command needs."""
 TOLERANCE = 1e-4
@@ -66,37 +62,29 @@ def load_libraries() -> None:
         ) from error
 
 
-def refusal(backend: str, device: str) -> str | None:
+def unsupported_reason(backend: str, device: str) -> str | None:
     """Why a back end does not draw float32 on a device."""
-    from diff4splat.cli.renderer import picture_job
+    from diff4splat.cli.precompile import small_job
     from diff4splat.render.backends import BACKENDS
 
-    return import_module(BACKENDS[backend]).refusal(picture_job(speck(device)))
+    return import_module(BACKENDS[backend]).unsupported_reason(small_job(speck(device)))
 
 
-def readiness(backend: str) -> str:
-    """Whether a picture can be had at once."""
-    from diff4splat.cli.renderer import COMPILED, is_compiled
+def backend_readiness(backend: str) -> str:
+    """Whether a back end can render at once."""
+    from diff4splat.cli.precompile import RASTER, RASTERIZER, readiness
 
-    return compiled_or_not(backend != COMPILED or is_compiled(), COMPILE_S)
-
-
-def compiled_or_not(ready: bool, seconds: int) -> str:
-    """What is said of kernels that take so many seconds to compile."""
-    if ready:
-        return "ready"
-    return f"will compile on first use (about {seconds} s); now: diff4splat doctor --warm"
+    return readiness(RASTERIZER) if backend == RASTER else "ready"
 
 
 def tracer_readiness() -> str:
     """Whether rays can be traced at once, or at all."""
-    from diff4splat.render.trace.support import refusal as tracer_refusal
+    from diff4splat.cli.precompile import TRACER, readiness
+    from diff4splat.render.trace.support import unsupported_reason as tracer_reason
 
-    if (reason := tracer_refusal(speck("cpu"))) is not None:
+    if (reason := tracer_reason(speck("cpu"))) is not None:
         return f"refuses: {reason}"
-    from diff4splat.render.trace import warm
-
-    return compiled_or_not(warm.is_ready(), COMPILE_TRACER_S)
+    return readiness(TRACER)
 
 
 def self_test() -> str:
@@ -107,13 +95,13 @@ def self_test() -> str:
     """
     import torch
 
-    from diff4splat.cli.renderer import COMPILED, is_compiled, picture_job
+    from diff4splat.cli.precompile import RASTER, RASTERIZER, kernel_group, small_job
     from diff4splat.render.api import render
 
-    ready = refusal(COMPILED, "cpu") is None and is_compiled()
-    backend = COMPILED if ready else "reference"
+    ready = unsupported_reason(RASTER, "cpu") is None and kernel_group(RASTERIZER).is_ready()
+    backend = RASTER if ready else "reference"
     scene = speck("cpu")
-    camera = picture_job(scene).camera
+    camera = small_job(scene).camera
     made = render(scene, camera, backend=backend).rgb
     exact = render(scene.to(torch.float64), camera, backend="reference").rgb
     error = float((made - exact).abs().max())

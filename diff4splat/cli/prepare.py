@@ -99,13 +99,13 @@ class PrepareLatents:
         """Encode and write."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.precompile import precompile_renderer
         from diff4splat.configs.recipes import find_recipe
         from diff4splat.models.hub.model import load_model
         from diff4splat.training.latents.encode import EncodingJob, encode_clips
 
         phases = ConsolePhases()
-        prepare_renderer(speck("cpu"), phases)
+        precompile_renderer(speck("cpu"), phases)
         job = EncodingJob(
             model=load_model(self.model),
             data=find_recipe(self.config).stage_of_kind("video_diffusion").data,

@@ -43,7 +43,8 @@ class Render:
     def run(self) -> None:
         """Load, choose cameras and times, render, write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.renderer import left_out, prepare_renderer
+        from diff4splat.cli.precompile import precompile_renderer
+        from diff4splat.cli.skipped_gaussians import skipped_gaussians
         from diff4splat.io.scene_file import load_scene
         from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, write_view
         from diff4splat.progress.run_log import RunLog
@@ -68,9 +69,10 @@ class Render:
         if self.out.suffix.lower() == ".png":
             path = one_pose(path, self.frame)
         if self.out.suffix.lower() in VIEW_SUFFIXES:  # others are refused, and at once
-            prepare_renderer(scene.gaussians, log.phases)
-        if dropped := left_out(scene, float(path.times_s[0]) if self.time is None else self.time):
-            note(dropped)
+            precompile_renderer(scene.gaussians, log.phases)
+        time_s = float(path.times_s[0]) if self.time is None else self.time
+        if skipped := skipped_gaussians(scene, time_s):
+            note(skipped)
         write_view(scene, path, self.out, self.time, log)
         note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
 

@@ -84,15 +84,14 @@ def prepare(
     phases: "Phases",
 ) -> None:
     """Compile what will draw, with a progress bar, unless that is done."""
-    from diff4splat.cli.renderer import compile_ahead, prepare_renderer
+    from diff4splat.cli.precompile import precompile_renderer, precompile_tracer
     from diff4splat.outputs.photographs import needs_rays
-    from diff4splat.render.trace import warm
 
     traced = [needs_rays(scene, filmed, settings) for filmed in sequences]
-    if any(traced) and not warm.is_ready():
-        compile_ahead(warm, phases)
+    if any(traced):
+        precompile_tracer(phases)
     if not all(traced):
-        prepare_renderer(scene.gaussians, phases)
+        precompile_renderer(scene.gaussians, phases)
 
 
 def one_frame(filmed: "PhysicalPath", frame: int) -> "PhysicalPath":

@@ -19,12 +19,12 @@ class ErrorTime:
         """Measure, write, and print the table."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.precompile import precompile_renderer
         from diff4splat.error_time import report as error_time
 
         phases = ConsolePhases()
         # Knobs of the renderer must not count its compilation.
-        prepare_renderer(speck("cpu"), phases)
+        precompile_renderer(speck("cpu"), phases)
         written = error_time.run(self.out, self.knob, self.repeats, phases)
         print(written.table)
         note(f"wrote {', '.join(file.name for file in written.files)} to {self.out}")

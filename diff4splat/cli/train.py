@@ -46,8 +46,7 @@ class Train:
         """Train, then say how far it came."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
-        from diff4splat.cli.worlds import prepare_sources
+        from diff4splat.cli.precompile import precompile_renderer, precompile_sources
         from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
         from diff4splat.training.recipe.overrides import override
         from diff4splat.training.train_stage import StageRequest, is_main_process, train_stage
@@ -60,8 +59,8 @@ class Train:
             recipe = with_latents(recipe, self.stage, self.latents)
         recipe.stage(self.stage)
         phases = ConsolePhases()
-        prepare_renderer(speck("cpu"), phases)
-        prepare_sources(recipe.stage(self.stage).data.sources, phases)
+        precompile_renderer(speck("cpu"), phases)
+        precompile_sources(recipe.stage(self.stage).data.sources, phases)
         request = StageRequest(
             recipe=recipe,
             stage=self.stage,

@@ -22,7 +22,7 @@ from diff4splat.error_time.knobs import Knob
 from diff4splat.error_time.scene_knobs import random_gaussians, rmse, truncate_harmonics
 from diff4splat.geometry.camera import pinhole
 from diff4splat.render.api import render
-from diff4splat.render.raster.plan import (
+from diff4splat.render.raster.raster_settings import (
     DEFAULT_LIGHT_CUTOFF,
     DEFAULT_TILE_PX,
     TILE_SIZES_PX,

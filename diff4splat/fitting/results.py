@@ -31,7 +31,7 @@ from diff4splat.outputs.scene_folder import write_view
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
 
 RESULT_FILES = ("scene.safetensors", "video.mp4", "comparison.png", "card.json")

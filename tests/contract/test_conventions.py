@@ -26,7 +26,7 @@ from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
-from diff4splat.render.physical.lines import line_shares
+from diff4splat.render.physical.sensor_rows import line_shares
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion

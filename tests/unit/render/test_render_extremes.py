@@ -11,7 +11,7 @@ from torch.utils._pytree import tree_leaves
 from diff4splat.geometry.camera import pinhole
 from diff4splat.render import backends
 from diff4splat.render.api import render
-from diff4splat.render.raster.plan import DEFAULT_LIGHT_CUTOFF
+from diff4splat.render.raster.raster_settings import DEFAULT_LIGHT_CUTOFF
 from diff4splat.render.settings import OUTPUTS, RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
