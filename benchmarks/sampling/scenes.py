@@ -60,7 +60,7 @@ def _row(subject: Generator, protocol: Protocol) -> str:
     )
     quality = statistics.fmean(pictures)
     asked = subject.settings.motion
-    how = f"{asked.steps} | {asked.guidance.weight:g} | {asked.moves_above:g}"
+    how = f"{asked.steps} | {asked.guidance.weight:g} | {asked.threshold:g}"
     return f"| {how} | {right:.2f} | {both:.2f} | {still:.3f} | {quality:.2f} |"
 
 
