@@ -35,7 +35,7 @@ class Drawn:
     found: forward.Footprints
     filled: forward.Filled
     values: np.ndarray
-    canvas: PaddedImage
+    image: PaddedImage
 
 
 def draw(own: RenderSettings, channels: int, spread_px: float = 5.0, opacity: float = 0.0) -> Drawn:
@@ -51,9 +51,9 @@ def draw(own: RenderSettings, channels: int, spread_px: float = 5.0, opacity: fl
     binned = forward.bin_footprints(found, plan)
     assert len(binned.regions) == 1
     filled = forward.fill_region(found, plan.grid, binned, binned.regions[0])
-    canvas = PaddedImage(plan.grid, channels, medians=True)
-    forward.blend_region(plan, filled, found, values, canvas)
-    return Drawn(plan, found, filled, values, canvas)
+    image = PaddedImage(plan.grid, channels, medians=True)
+    forward.blend_region(plan, filled, found, values, image)
+    return Drawn(plan, found, filled, values, image)
 
 
 def exact(drawn: Drawn, own: RenderSettings) -> tuple[Tensor, ...]:
@@ -85,9 +85,9 @@ def test_pictures_and_gradients(case: tuple, channels: int) -> None:
     drawn = draw(own, channels, spread_px, opacity)
     shape, values, want, light, unsure = exact(drawn, own)
     assert float(unsure.double().mean()) < 0.05
-    canvas = drawn.canvas
-    planes = canvas.pictures(canvas.planes).permute(1, 2, 0).double()
-    left = canvas.pictures(canvas.light)[0].double()
+    image = drawn.image
+    planes = image.cropped(image.planes).permute(1, 2, 0).double()
+    left = image.cropped(image.light)[0].double()
     sure = ~unsure
     scale = float(want.detach().abs().max())
     torch.testing.assert_close(planes[sure], want[sure], rtol=0, atol=2e-6 * scale)
@@ -107,14 +107,14 @@ def backward(drawn: Drawn, incoming: Tensor) -> tuple[Tensor, Tensor]:
     """Moments of ∂/∂ln α and gradients of values."""
     grid, lists = drawn.plan.grid, drawn.filled.lists
     height, width = CAMERA.size_px
-    whole = torch.zeros(incoming.shape[-1], *drawn.canvas.shape)
+    whole = torch.zeros(incoming.shape[-1], *drawn.image.shape)
     whole[:, :height, :width] = incoming.permute(2, 0, 1)
     padded = whole.flatten().numpy()
     slots = np.full((len(lists.members), MOMENTS + drawn.values.shape[1]), np.nan, np.float32)
     tiles = np.arange(grid.rows * grid.columns)
     blend_backward(
         tiles, grid, lists, drawn.found.prints, drawn.values, drawn.plan.rules,
-        drawn.canvas.light, drawn.canvas.stops, padded.reshape(-1), slots,
+        drawn.image.light, drawn.image.stops, padded.reshape(-1), slots,
     )  # fmt: skip
     # Every slot is written, those of Gaussians that nobody looked at with zeros.
     assert np.isfinite(slots).all()
@@ -137,7 +137,7 @@ def test_pixels_stop_where_the_light_runs_out(cutoff: float) -> None:
     rank = {index: position for position, index in enumerate(drawn.found.order.tolist())}
     ranks = np.array([rank[index] for index in drawn.filled.lists.members.tolist()])
     positions = np.searchsorted(ranks, dark.argmax(0)) + 1
-    stops = drawn.canvas.pictures(drawn.canvas.stops)[0].numpy()
+    stops = drawn.image.cropped(drawn.image.stops)[0].numpy()
     sure = ~unsure.numpy()
     assert dark.any()
     np.testing.assert_array_equal((stops < 1e38)[sure], dark.any(0)[sure])
@@ -152,15 +152,15 @@ def test_medians_are_indices_of_gaussians() -> None:
     near_half = ((light.detach() - 0.5).abs() < 1e-4).any(0)
     half = (light <= 0.5).numpy()
     want = np.where(half.any(0), drawn.found.order[half.argmax(0)], -1)
-    got = drawn.canvas.pictures(drawn.canvas.medians)[0].numpy()
+    got = drawn.image.cropped(drawn.image.medians)[0].numpy()
     sure = ~(unsure | near_half).numpy()
     np.testing.assert_array_equal(got[sure], want[sure])
     assert bool((got == -1).any() and (got >= 0).any())
 
 
 def test_the_padding_stays_dark() -> None:
-    canvas = draw(RenderSettings(tile_px=64), 3).canvas
-    light = canvas.light.reshape(canvas.shape)
+    image = draw(RenderSettings(tile_px=64), 3).image
+    light = image.light.reshape(image.shape)
     assert not light[45:].any() and not light[:, 51:].any()
-    planes = canvas.planes.reshape(-1, *canvas.shape)
+    planes = image.planes.reshape(-1, *image.shape)
     assert not planes[:, 45:].any() and not planes[:, :, 51:].any()
