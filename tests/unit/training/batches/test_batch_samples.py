@@ -130,7 +130,7 @@ def test_clips_that_are_too_short_say_so() -> None:
         sample(make_clip(frames=3))
 
 
-def test_moments_tell_a_branch_what_whole_clips_do() -> None:
+def test_keyframes_give_the_motion_network_the_same_as_full_clips() -> None:
     whole = make_clip(frames=17, static=False, tracks=20)
     data = replace(DATA, input_stride=2)
     moments = sample(
