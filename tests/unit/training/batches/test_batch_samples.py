@@ -151,9 +151,9 @@ def test_a_moment_stands_for_the_frames_up_to_it() -> None:
     torch.testing.assert_close(clip.times_s, times_s[wanted])
 
 
-def test_whole_clips_are_not_taken_for_moments() -> None:
+def test_full_clips_are_refused_where_keyframes_are_expected() -> None:
     data = replace(DATA, frames=9, input_stride=2, keyframes_only=True)
-    with pytest.raises(InputError, match="expected 3 moments, got 17 frames"):
+    with pytest.raises(InputError, match="expected 3 keyframes, got 17 frames"):
         sample(make_clip(frames=17), data)
 
 
