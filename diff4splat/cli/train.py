@@ -80,7 +80,9 @@ class Train:
         measures = ", ".join(f"{name} {value:.4g}" for name, value in result.measures.items())
         total = recipe.stage(self.stage).steps
         more = "" if result.outcome == "finished" else "; the same command goes on"
-        print(f"{self.stage}: step {result.step} of {total} ({measures or 'not judged yet'}){more}")
+        print(
+            f"{self.stage}: step {result.step} of {total} ({measures or 'not evaluated yet'}){more}"
+        )
 
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""
