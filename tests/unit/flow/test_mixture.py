@@ -43,9 +43,13 @@ def test_one_component_follows_its_closed_trajectory() -> None:
 
 
 @pytest.mark.parametrize("std", [0.0, 1e-30, 1e-6, 1e3])
-@pytest.mark.parametrize("level", [0.0, 1e-6, 0.5, 1.0])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_velocity_and_gradient_stay_finite(std: float, level: float, dtype: torch.dtype) -> None:
+def test_velocity_and_gradient_stay_finite(std: float, dtype: torch.dtype) -> None:
+    for level in (0.0, 1e-6, 0.5, 1.0):
+        assert_velocity_finite(std, level, dtype)
+
+
+def assert_velocity_finite(std: float, level: float, dtype: torch.dtype) -> None:
     mixture = GaussianMixture(
         means=torch.tensor([[0.0, 1.0], [1.0, -1.0]], dtype=dtype),
         stds=torch.full((2, 2), std, dtype=dtype),
