@@ -146,7 +146,7 @@ def _monocular_depth(dynamic: StageRecipe) -> StageRecipe:
         steps=6_000,
         global_batch=8,
         micro_batch=8,
-        trained=("ldrm",),
+        trained=("monocular_depth",),
         losses=DepthLosses(),
         optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
         data=replace(dynamic.data, target_frames=4, tracks=0),
@@ -166,9 +166,7 @@ def _video_diffusion(dynamic: StageRecipe) -> StageRecipe:
         global_batch=16,
         micro_batch=16,
         optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
-        losses=FlowLosses(
-            min_level_weighting=0.4, channel_power_exponent=0.5, motion_channel_weight=200.0
-        ),
+        losses=FlowLosses(min_level_weighting=0.4, channel_power_exponent=0.5, hidden_weight=8.0),
         data=replace(stage.data, augment=False, tracks=TRACKS),
         timestep_shift=3.0,
         augment_captions=True,
@@ -185,7 +183,7 @@ def _motion_diffusion(video: StageRecipe) -> StageRecipe:
         name="motion_diffusion",
         kind="motion_diffusion",
         steps=4_000,
-        trained=("dit",),
+        trained=("motion_unet",),
         losses=MotionDiffusionLosses(min_level_weighting=0.4, motion_mask=10.0),
         data=replace(video.data, keyframes_only=True),
         timestep_shift=16.0,

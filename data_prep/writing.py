@@ -16,10 +16,10 @@ import torch
 from diff4splat.data.manifest import read_manifest
 from diff4splat.data.members.encode import EncodedClip, encode_clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
-from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
-from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
-from diff4splat.data_prep.synthetic.drawing.warm import prepare_drawing
-from diff4splat.data_prep.synthetic.narration import SOURCE
+from diff4splat.data_prep.synthetic.captioning import SOURCE
+from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.warm import prepare_drawing
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.errors import ConfigError
 from diff4splat.progress.phases import Phases

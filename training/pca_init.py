@@ -29,11 +29,11 @@ def init_from_principal_components(vae: VideoVae, samples: ClipSamples, phases: 
         InputError: neither samples nor those in their place can be used.
     """
     with phases.phase("linear code", CLIPS) as advance:
-        moments = BlockStatistics(vae.code)
+        moments = BlockStatistics(vae.pca_shortcut)
         for index in range(CLIPS):
             moments.add(network_video(require_batch(load_batch(samples, [index]))))
             advance()
-    set_principal_components(vae.code, moments)
+    set_principal_components(vae.pca_shortcut, moments)
 
 
 class BlockStatistics:

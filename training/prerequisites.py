@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import PARTS, Networks, create_networks
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.stage import StageRecipe
@@ -83,7 +83,7 @@ def starting_networks(
         CheckpointError, FileFormatError: a checkpoint is missing, damaged or of other networks.
     """
     needed = STAGES[stage.kind].needed(recipe.model)
-    networks = create_networks(recipe.model, seed=recipe.seed, needed=needed)
+    networks = create_networks(recipe.model, seed=recipe.seed, parts=needed)
     _take(networks, start, needed)
     return _filled(networks, stages_before(recipe, stage, folder, start), folder)
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.features.load import load_features
-from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.pretrained import Model, save_model
+from diff4splat.models.factory import model_parts
+from diff4splat.models.hub.model import Model, save_model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.earlier_release import earlier_fingerprint
@@ -82,7 +82,7 @@ def train_stage(request: StageRequest) -> StageResult:
         seed=recipe.seed,
         features=load_features(request.features),
     )
-    if "vae" in stage_recipe.trained and networks.vae.code is not None:
+    if "vae" in stage_recipe.trained and networks.vae.pca_shortcut is not None:
         init_from_principal_components(networks.vae, samples, request.phases)
     stage = create_stage(networks, plan)
     result = fit_stage(stage, samples, stage_recipe, _settings(request, plan))
@@ -130,7 +130,7 @@ def _hand_over(
     networks, trained = trained_networks(request.recipe, request.folder, request.start)
     model = Model(config=request.recipe.model, networks=networks, trained=trained)
     save_model(model, request.folder / MODEL_FOLDER)
-    missing = ", ".join(part for part in PARTS if part not in trained)
+    missing = ", ".join(part for part in model_parts(request.recipe.model) if part not in trained)
     state = f"not trained to the end: {missing}" if missing else "every part is trained"
     request.note(f"wrote {request.folder / MODEL_FOLDER}; {state}")
 

@@ -59,8 +59,8 @@ def warm_up() -> None:
         Diff4SplatError: the renderer cannot run here.
     """
     from diff4splat.cli.renderer import COMPILED, compile_ahead, compile_renderer
-    from diff4splat.data_prep.synthetic.drawing.compiled import KERNELS as DRAWING
-    from diff4splat.data_prep.synthetic.drawing.warm import compile_drawing
+    from diff4splat.data_prep.synthetic.renderer.compiled import KERNELS as DRAWING
+    from diff4splat.data_prep.synthetic.renderer.warm import compile_drawing
     from diff4splat.render.raster.jit import KERNELS
     from diff4splat.render.trace import warm as tracer
     from diff4splat.render.trace.compiled import KERNELS as TRACING

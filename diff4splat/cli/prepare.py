@@ -48,7 +48,7 @@ class PrepareSynthetic:
         """Draw, write, and show a contact sheet."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.data_prep.clip_sheet import write_clip_sheet
-        from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+        from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
         from diff4splat.data_prep.synthetic.worlds import WorldRecipe
         from diff4splat.data_prep.writing import WorldJob, write_worlds
 

@@ -9,7 +9,7 @@ import tyro
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
-    from diff4splat.models.hub.pretrained import Model
+    from diff4splat.models.hub.model import Model
 
 
 @dataclass(frozen=True, kw_only=True)

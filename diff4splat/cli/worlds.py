@@ -15,14 +15,14 @@ COMPILE_S = 20
 def prepare_sources(sources: "Iterable[SourceSettings | SourceRange]", phases: "Phases") -> None:
     """Before clips come from ``sources``: compile what draws worlds if one of them is that."""
     if any(source.kind == "worlds" for source in sources):
-        from diff4splat.data_prep.synthetic.drawing.warm import prepare_drawing
+        from diff4splat.data_prep.synthetic.renderer.warm import prepare_drawing
 
         prepare_drawing(phases)
 
 
 def readiness() -> str:
     """Whether a world can be drawn at once."""
-    from diff4splat.data_prep.synthetic.drawing import warm
+    from diff4splat.data_prep.synthetic.renderer import warm
 
     if warm.is_ready():
         return "ready"

@@ -16,7 +16,7 @@ from PIL import Image
 from diff4splat.cli import doctor, fields, installation, worlds
 from diff4splat.cli.console import ConsolePhases
 from diff4splat.cli.main import run
-from diff4splat.data_prep.synthetic.drawing import warm as drawing
+from diff4splat.data_prep.synthetic.renderer import warm as drawing
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.io.scene_file import save_scene

@@ -10,7 +10,7 @@ from training_commands import contents, refusal, rows
 
 from diff4splat.cli.main import run
 from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.pretrained import load_model
+from diff4splat.models.hub.model import load_model
 from diff4splat.training.latents.latent_shards import read_packs
 
 SHORT = ("--set", "stages.video_diffusion.steps=2")

@@ -1,7 +1,8 @@
-"""Every stage learns one clip by heart: its loss falls to a tenth, through the real trainer.
+"""Every stage overfits one clip through the real trainer: its loss falls to a tenth.
 
-Noise, levels and targets differ at every step; only the clip stays. In stages with motion the
-paper's pull to standstill is off: its minimum is far above zero by design (see the last test).
+The tests that always run take fewer steps, with a looser limit. Noise, levels and targets differ at
+every step; only the clip is the same. In stages with motion the paper's pull to zero motion is off:
+its minimum is far above zero by design (see the last test).
 """
 
 import json
@@ -27,6 +28,19 @@ from diff4splat.training.trainer.settings import RunSettings
 
 STEPS = {"vae": 600, "dynamic": 400, "video_diffusion": 300, "joint": 400}
 USUAL_STEPS = 150
+SHORT_STEPS = {
+    "vae": (50, 0.45),
+    "static-low": (40, 0.12),
+    "static-high": (40, 0.12),
+    "dynamic": (190, 0.28),
+    "generator": (100, 0.45),
+    "joint": (80, 0.5),
+}
+"""Steps and the share of the first loss that may remain.
+
+More remains when cameras are exchanged, when motion is not rendered or when the noise is not that
+of the target.
+"""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 
@@ -54,7 +68,7 @@ class OneClip:
         return self.made
 
 
-def overfit(name: str, folder: Path) -> list[float]:
+def overfit(name: str, steps: int, folder: Path) -> list[float]:
     """The total loss of every step."""
     recipe = stage_recipe(name)
     if name in ("dynamic", "joint"):
@@ -63,7 +77,7 @@ def overfit(name: str, folder: Path) -> list[float]:
     recipe = replace(
         recipe,
         data=replace(recipe.data, target_frames=TARGET_FRAMES),
-        steps=STEPS.get(name, USUAL_STEPS),
+        steps=steps,
         global_batch=1,
         optimizer=OptimizerSettings(learning_rate=7e-3, warmup_steps=10, weight_decay=0.0),
     )
@@ -77,12 +91,26 @@ def overfit(name: str, folder: Path) -> list[float]:
     return [row[f"loss/{TOTAL}"] for row in rows if row["event"] == "step"]
 
 
+def remaining(losses: list[float], last: int) -> float:
+    """The mean loss of the last steps over that of the first five."""
+    return statistics.mean(losses[-last:]) / statistics.mean(losses[:5])
+
+
+@pytest.mark.usefixtures("as_shipped")
+@pytest.mark.parametrize("name", STAGES)
+def test_the_loss_of_one_clip_falls(name: str, tmp_path: Path) -> None:
+    steps, limit = SHORT_STEPS[name]
+    losses = overfit(name, steps, tmp_path)
+    assert len(losses) == steps
+    assert remaining(losses, last=10) <= limit
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize("name", STAGES)
 def test_one_clip_is_learnt_by_heart(name: str, tmp_path: Path) -> None:
-    losses = overfit(name, tmp_path)
-    assert len(losses) == STEPS.get(name, USUAL_STEPS)
-    assert statistics.mean(losses[-20:]) <= statistics.mean(losses[:5]) / 10
+    losses = overfit(name, STEPS.get(name, USUAL_STEPS), tmp_path)
+    assert remaining(losses, last=20) <= 0.1
 
 
 def test_the_papers_motion_loss_cannot_fall_to_a_tenth() -> None:

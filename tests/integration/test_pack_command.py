@@ -11,7 +11,7 @@ from training_commands import refusal
 from diff4splat.cli.main import run
 from diff4splat.io.images import write_png
 from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.pretrained import load_model
+from diff4splat.models.hub.model import load_model
 from diff4splat.models.hub.weights import part_file, weights_sha256
 
 STATED = ("--license", "Apache-2.0", "--origin", "made by a test")

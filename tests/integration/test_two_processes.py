@@ -17,7 +17,7 @@ from diff4splat.training.trainer.loop.fit import fit_stage
 
 SUPPORT = Path(__file__).parents[1] / "support"
 MODES = ("ddp", "fsdp2")
-SHARED = {"checkpoint_every": 2, "timeout_s": 30.0}
+SHARED = {"checkpoint_every": 2, "timeout_s": 120.0}
 
 
 def launch(folder: Path, calls: list[dict]) -> list[int]:
@@ -38,7 +38,7 @@ def launch(folder: Path, calls: list[dict]) -> list[int]:
             for rank in range(2)
         ]
         try:
-            return [process.wait(timeout=90) for process in running]
+            return [process.wait(timeout=400) for process in running]
         finally:
             for process in running:
                 process.kill()

@@ -64,7 +64,7 @@ def call(asked: dict) -> None:
 def main() -> None:
     torch.set_num_threads(1)
     calls = json.loads(Path(sys.argv[1]).read_text())
-    with open_processes("ddp", "cpu", timeout_s=30.0):
+    with open_processes("ddp", "cpu", timeout_s=120.0):
         for asked in calls:
             call(asked)
 

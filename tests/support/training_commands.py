@@ -1,8 +1,6 @@
 """What tests of the training commands share."""
 
 import json
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -65,16 +63,3 @@ def assert_same(first: dict[str, torch.Tensor], second: dict[str, torch.Tensor])
     assert first.keys() == second.keys()
     for key, value in first.items():
         assert torch.equal(value, second[key]), key
-
-
-def command(*given: str) -> list[str]:
-    return [sys.executable, "-m", "diff4splat.cli.main", *given]
-
-
-def wait_for(file: Path, word: str, seconds: float = 90) -> None:
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if file.is_file() and word in file.read_text():
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"{file} never said {word}")

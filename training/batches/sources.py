@@ -11,8 +11,8 @@ from typing import Protocol, runtime_checkable
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder, Selection
 from diff4splat.data.clip_part import ClipPart
-from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
-from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import FPS, WorldRecipe, make_world
 from diff4splat.errors import InputError
 from diff4splat.training.batches.epoch_shuffle import Places, ShuffledIndices, split_by_motion

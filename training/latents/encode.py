@@ -19,17 +19,16 @@ from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
 from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
 from diff4splat.errors import InputError
-from diff4splat.geometry.camera import stack_cameras
+from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.augment import mirrored
-from diff4splat.training.batches.motion_targets import motion_targets
 from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.temporal_crop import from_first_camera
 from diff4splat.training.latents.latent_shards import LatentPack, has_pack, join_packs, write_pack
-from diff4splat.training.latents.video_latents import packed_motion, render_condition
+from diff4splat.training.latents.video_latents import FirstFrame, render_condition
 from diff4splat.training.recipe.data import DataSettings
 
 PACK = 128
@@ -105,17 +104,24 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
     view, frames = clip.views[0], slice(None, data.clip_frames, data.input_stride)
     rgb, cameras = unit_rgb(view.rgb[frames]), view.cameras[frames].to(torch.float32)
     latent = model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean
+    condition = render_condition(model, _first_frame(clip, data, rgb[0], cameras))
     return LatentPack(
         latent=latent,
-        render_condition=render_condition(model, rgb[0], cameras),
-        motion=true_motion(model, clip, data),
+        render_latent=None if condition is None else condition.latent,
+        validity=None if condition is None else condition.validity,
         cameras=stack_cameras([cameras]),
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
-        model=model.weights_sha256,
+        model=model.weights_sha256(),
     )
 
 
-def true_motion(model: Model, clip: Clip, data: DataSettings) -> Float[Tensor, "1 m t h w"]:
-    """Motion channels of a clip; none for a model without motion channels."""
-    return packed_motion(model.config, motion_targets(clip, data.input_stride)[None])
+def _first_frame(
+    clip: Clip, data: DataSettings, rgb: Float[Tensor, "h w 3"], cameras: Camera
+) -> FirstFrame:
+    """The first input frame with its true motion."""
+    motion = pixel_motion(clip, data.input_stride)
+    moving = moving_mask(motion)
+    return FirstFrame(
+        rgb=rgb, field=extend_to_all_cells(motion, moving), moving=moving, cameras=cameras
+    )

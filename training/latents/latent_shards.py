@@ -1,9 +1,9 @@
 """A folder of encoded clips: one tensor file per pack of clips.
 
-    FOLDER/latents-00000.safetensors, …   latent, draft, motion (float32), focal_px, center_px,
-                                          pose, is_static; captions and model in the metadata
+    FOLDER/latents-00000.safetensors, …   latent, render_latent, validity, focal_px,
+                                          center_px, pose, is_static; captions in the metadata
 
-Axes: ``n`` clips of a pack, ``c t h w`` latents, ``f`` video frames.
+Axes: ``n`` clips of a pack, ``c t h w`` latents, ``f hh ww`` video frames and pixels.
 """
 
 import json
@@ -20,7 +20,7 @@ from diff4splat.geometry.camera import Camera, join_cameras
 from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
 
 PATTERN = "latents-*.safetensors"
-TENSORS = ("latent", "draft", "motion", "focal_px", "center_px", "pose", "is_static")
+TENSORS = ("latent", "focal_px", "center_px", "pose", "is_static")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,8 +28,8 @@ class LatentPack:
     """Some encoded clips."""
 
     latent: Float[Tensor, "n c t h w"]
-    render_condition: Float[Tensor, "n c t h w"] | None
-    motion: Float[Tensor, "n m t h w"]
+    render_latent: Float[Tensor, "n c t h w"] | None
+    validity: Float[Tensor, "n 1 f hh ww"] | None
     cameras: Camera
     """Batch shape (n, f)."""
     is_static: Bool[Tensor, " n"]
@@ -52,14 +52,14 @@ def write_pack(pack: LatentPack, folder: Path, number: int) -> None:
     cameras = pack.cameras
     tensors = {
         "latent": pack.latent.float(),
-        "motion": pack.motion.float(),
         "focal_px": cameras.focal_px,
         "center_px": cameras.center_px,
         "pose": cameras.world_from_camera,
         "is_static": pack.is_static.long(),
     }
-    if pack.render_condition is not None:
-        tensors["draft"] = pack.render_condition.float()
+    if pack.render_latent is not None:
+        tensors["render_latent"] = pack.render_latent.float()
+        tensors["validity"] = pack.validity.half()
     metadata = {
         "captions": json.dumps(pack.captions),
         "size_px": json.dumps(cameras.size_px),
@@ -80,11 +80,11 @@ def has_pack(folder: Path, number: int) -> bool:
 
 def join_packs(packs: Sequence[LatentPack]) -> LatentPack:
     """Packs of one model as one."""
-    conditions = [pack.render_condition for pack in packs if pack.render_condition is not None]
+    rendered = [pack for pack in packs if pack.render_latent is not None]
     return LatentPack(
         latent=torch.cat([pack.latent for pack in packs]),
-        render_condition=torch.cat(conditions) if conditions else None,
-        motion=torch.cat([pack.motion for pack in packs]),
+        render_latent=torch.cat([pack.render_latent for pack in rendered]) if rendered else None,
+        validity=torch.cat([pack.validity for pack in rendered]) if rendered else None,
         cameras=join_cameras([pack.cameras for pack in packs]),
         is_static=torch.cat([pack.is_static for pack in packs]),
         captions=tuple(text for pack in packs for text in pack.captions),
@@ -117,10 +117,7 @@ def require_alike(packs: Sequence[LatentPack], where: str) -> None:
     Raises:
         InputError: they are not.
     """
-    kinds = {
-        (pack.model, pack.versions, pack.render_condition is None, pack.motion.shape[1])
-        for pack in packs
-    }
+    kinds = {(pack.model, pack.versions, pack.render_latent is None) for pack in packs}
     if len(kinds) > 1:
         raise InputError(
             f"{where}: expected latents that one model made in one way, got those of {len(kinds)} "
@@ -131,6 +128,9 @@ def require_alike(packs: Sequence[LatentPack], where: str) -> None:
 def _read_pack(file: Path) -> LatentPack:
     try:
         stored, metadata = read_tensors(file), read_metadata(file)
+        if "draft" in stored:
+            raise ValueError("render conditions of an earlier release, without validity")
+        validity = stored.get("validity")
         cameras = Camera(
             focal_px=stored["focal_px"],
             center_px=stored["center_px"],
@@ -139,8 +139,8 @@ def _read_pack(file: Path) -> LatentPack:
         )
         return LatentPack(
             latent=stored["latent"],
-            render_condition=stored.get("draft"),
-            motion=stored["motion"],
+            render_latent=stored.get("render_latent"),
+            validity=None if validity is None else validity.float(),
             cameras=cameras,
             is_static=stored["is_static"].bool(),
             captions=_captions(metadata, len(stored["latent"])),

@@ -32,8 +32,8 @@ class _Source:
             sample_index=torch.tensor([index]),
             source=(self.name,),
             latent=pack.latent[own],
-            render_condition=None if pack.render_condition is None else pack.render_condition[own],
-            motion=pack.motion[own],
+            render_latent=None if pack.render_latent is None else pack.render_latent[own],
+            validity=None if pack.validity is None else pack.validity[own],
             cameras=pack.cameras[own],
             captions=(pack.captions[place],),
         )

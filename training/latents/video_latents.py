@@ -1,21 +1,27 @@
-"""Videos as the networks read them: latents, Plücker maps, render conditions, motion channels.
+"""Videos as the networks read them: latents, Plücker maps, render conditions.
 
-Axes: ``b`` batch, ``f`` frames, ``h w`` pixels, ``c t h2 w2`` latents.
+Axes: ``b`` batch, ``f`` frames, ``h w`` pixels, ``c t h2 w2`` latents, ``hc wc`` cells.
 """
 
+from dataclasses import dataclass
+
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.render_condition import render_condition_latent
+from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.priors import image_depth
+from diff4splat.generation.render_condition import encode_condition, render_layered_image
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import plucker_map
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.config.model import ModelConfig
-from diff4splat.models.hub.pretrained import Model
-from diff4splat.models.motion_unet.motion_field import append_zero_motion, pack_motion
+from diff4splat.models.hub.model import Model
+from diff4splat.models.motion_unet.motion_field import masked_offsets, upsample_to_pixels
+from diff4splat.models.video_dit.render_condition import RenderCondition
 from diff4splat.models.video_vae.vae import VideoVae
+from diff4splat.paths.camera_path import CameraPath
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 
@@ -49,53 +55,60 @@ def zero_latents(model: ModelConfig, batch: ClipBatch) -> Float[Tensor, "b c t h
     return torch.zeros(len(batch), model.vae.latent_channels, *grid, device=batch.video.device)
 
 
-def packed_motion(
-    model: ModelConfig, motion: Float[Tensor, "b 3 t hc wc"]
-) -> Float[Tensor, "b m t h2 w2"]:
-    """True motion as channels beside the latent; none for a model without motion channels."""
-    return pack_motion(motion, model.vae.space_stride)[:, : model.motion_channels]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstFrame:
+    """What a render condition is made from: the first frame, its true motion, and the cameras."""
+
+    rgb: Float[Tensor, "h w 3"]
+    """In [0, 1]."""
+    field: Float[Tensor, "3 t hc wc"]
+    """True relative displacement of every cell (``motion_field``)."""
+    moving: Bool[Tensor, "h w"]
+    """Pixels that truly move."""
+    cameras: Camera
+    """Batch shape (f,), relative to the first."""
 
 
-def without_motion_channels(
-    model: ModelConfig, latent: Float[Tensor, "b c t h2 w2"]
-) -> Float[Tensor, "b d t h2 w2"]:
-    """The latent channels alone."""
-    return latent[:, : model.vae.latent_channels]
+@torch.no_grad()
+def render_condition(model: Model, first: FirstFrame) -> RenderCondition | None:
+    """The layered image along the path, on predicted depth and with true motion; None without.
 
-
-def with_zero_motion(
-    model: ModelConfig, condition: Float[Tensor, "b d t h2 w2"] | None
-) -> Float[Tensor, "b c t h2 w2"] | None:
-    """A render condition with the channels that the video model reads."""
-    return None if condition is None else append_zero_motion(condition, model.motion_channels)
-
-
-def render_condition(
-    model: Model, rgb: Float[Tensor, "h w 3"], cameras: Camera
-) -> Float[Tensor, "1 c t h2 w2"] | None:
-    """Latent of the render condition of one clip; None for a model without.
-
-    ``rgb`` is the first frame, in [0, 1]; ``cameras`` (f,) are relative to the first.
+    With predicted motion the true video would be no fair target where the prediction is wrong.
     """
-    if not model.config.dit.draft:
+    if not model.config.dit.render_condition:
         return None
-    image = InputImage(rgb=rgb, camera=cameras[0], focal_source="clip")
-    return render_condition_latent(model, image, cameras)
+    image = InputImage(rgb=first.rgb, camera=first.cameras[0], focal_source="clip")
+    depth = image_depth(model, image)
+    displacement = masked_offsets(upsample_to_pixels(first.field), first.moving, depth)
+    maps = ImageMaps(depth=depth, displacement=displacement if displacement.any() else None)
+    border_cells = model.config.refinement.border_cells
+    layered = build_layered_image(image, image, maps, border_cells)
+    times_s = torch.linspace(0, 1, len(first.cameras), device=depth.device)
+    path = CameraPath(cameras=first.cameras, times_s=times_s)
+    return encode_condition(model, render_layered_image(layered, path))
 
 
 @torch.no_grad()
 def encode_batch(model: Model, batch: ClipBatch) -> LatentBatch:
-    """Latents, render conditions and motion channels of clips, by frozen networks."""
-    firsts = [unit_rgb(batch.video[index, 0]) for index in range(len(batch))]
-    conditions = [
-        render_condition(model, rgb, batch.cameras[index]) for index, rgb in enumerate(firsts)
-    ]
+    """Latents and render conditions of clips, by frozen networks."""
+    conditions = [render_condition(model, first_frame(batch, index)) for index in range(len(batch))]
+    used = model.config.dit.render_condition
     return LatentBatch(
         sample_index=batch.sample_index,
         source=batch.source,
         latent=encode_video(model.networks.vae, batch),
-        render_condition=torch.cat(conditions) if model.config.dit.draft else None,
-        motion=packed_motion(model.config, batch.motion),
+        render_latent=torch.cat([one.latent for one in conditions]) if used else None,
+        validity=torch.cat([one.validity for one in conditions]) if used else None,
         cameras=batch.cameras,
         captions=batch.captions,
+    )
+
+
+def first_frame(batch: ClipBatch, index: int) -> FirstFrame:
+    """The first frame of one sample."""
+    return FirstFrame(
+        rgb=unit_rgb(batch.video[index, 0]),
+        field=batch.field[index],
+        moving=batch.moving[index],
+        cameras=batch.cameras[index],
     )

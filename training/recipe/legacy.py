@@ -15,6 +15,8 @@ KINDS = {
     "generator": "video_diffusion",
 }
 REMOVED_KINDS = ("told", "generated")
+TRAINED = {"depth": ("monocular_depth",), "branch": ("motion_unet",)}
+"""What kinds train that are parts of their own now."""
 STAGE_KEYS = {
     "true_pictures": "use_ground_truth_frames",
     "single_share": "single_image_probability",
@@ -49,10 +51,7 @@ LOSS_DEFAULTS = {
 }
 """Every key of the one class of weights that all kinds shared."""
 _FLOW = {"flow": "flow", "flow_level": "min_level_weighting"}
-_VIDEO_FLOW = _FLOW | {
-    "flow_motion": "motion_channel_weight",
-    "flow_energy": "channel_power_exponent",
-}
+_VIDEO_FLOW = _FLOW | {"flow_energy": "channel_power_exponent"}
 _RECONSTRUCTION = {
     key: key for key in ("photometric", "perceptual", "depth", "depth_log", "smoothness")
 }
@@ -98,6 +97,8 @@ def upgraded_stage(stage: Mapping[str, Any]) -> dict[str, Any]:
     """One stage of such a recipe."""
     found = _renamed(stage, STAGE_KEYS)
     found["kind"] = KINDS.get(str(stage.get("kind")), stage.get("kind"))
+    if stage.get("kind") in TRAINED:
+        found["trained"] = list(TRAINED[stage["kind"]])
     if isinstance(stage.get("data"), dict):
         found["data"] = _renamed(stage["data"], DATA_KEYS)
     losses = stage.get("losses", {})

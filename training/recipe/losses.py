@@ -86,8 +86,8 @@ class FlowLosses:
     min_level_weighting: float = 0.0
     """Velocity errors at levels below count as if they were made at this level (ours); 0 is the
     paper. A network that predicts clean latents would otherwise learn small levels alone."""
-    motion_channel_weight: float = 1.0
-    """Weight of a motion channel, where a latent channel has 1 on average (ours)."""
+    hidden_weight: float = 1.0
+    """Weight of a latent cell that the first frame hides, where a shown one has 1 (ours)."""
     channel_power_exponent: float = 0.0
     """Weight of a latent channel: its share of image power to this exponent (ours); 0 is the
     paper."""

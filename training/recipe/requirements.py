@@ -21,14 +21,14 @@ def require_fit(stage: StageRecipe, model: ModelConfig) -> None:
 
 
 def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
-    what, refines = f"stage {stage.name}", model.detail.used
+    what, refines = f"stage {stage.name}", model.refinement.used
     fits = stage.kind != "posed_video_pretrain" or (refines and stage.use_ground_truth_frames)
-    expected = "a refinement decoder (model.detail) and use_ground_truth_frames for its kind"
+    expected = "a refinement decoder (model.refinement) and use_ground_truth_frames for its kind"
     require(fits, what, expected, "one or neither")
-    fits = stage.kind != "motion_diffusion" or model.dit.motion_width > 0
-    require(fits, f"{what}: model.dit.motion_width", "a motion network for its kind", 0)
-    fits = stage.kind != "monocular_depth" or (refines and model.detail.picture_width > 0)
-    require(fits, f"{what}: model.detail.picture_width", "a depth network for its kind", 0)
+    fits = stage.kind != "motion_diffusion" or model.motion_unet.used
+    require(fits, f"{what}: model.motion_unet.width", "a motion network for its kind", 0)
+    fits = stage.kind != "monocular_depth" or model.monocular_depth.used
+    require(fits, f"{what}: model.monocular_depth.channels", "a depth network for its kind", 0)
 
 
 def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
@@ -40,7 +40,7 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     require(fits, f"{what}.augment", "false where captions are read", "true")
     fits = not data.keyframes_only or stage.kind == "motion_diffusion"
     require(fits, f"{what}.keyframes_only", "false but for a motion_diffusion stage", "true")
-    keyframed = model.detail.used and stage.kind in RECONSTRUCTION_KINDS
+    keyframed = model.refinement.used and stage.kind in RECONSTRUCTION_KINDS
     fits, stride = not keyframed or data.keyframe_stride == TIME_STRIDE, data.keyframe_stride
     expected = f"{TIME_STRIDE} with a refinement decoder"
     require(fits, f"{what}.keyframe_stride", expected, stride)

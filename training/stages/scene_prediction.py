@@ -14,8 +14,12 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from diff4splat.generation.canonical_scene import (
+    CanonicalScene,
+    reconstruct,
+    reconstruct_refined,
+)
 from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.reconstruction import Canonical, reconstruct, reconstruct_detailed
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
@@ -101,7 +105,7 @@ class ScenePredictor:
         None where the model has no such decoder. Recipes may take true frames instead of decoding,
         which is about a fifth of a dynamic step.
         """
-        if not self.plan.model.detail.used:
+        if not self.plan.model.refinement.used:
             return None
         truth = unit_rgb(batch.video).movedim(-1, 1)
         if self.plan.recipe.use_ground_truth_frames:
@@ -118,14 +122,14 @@ class ScenePredictor:
 
 def canonical_scenes(
     maps: RawGaussianMaps, batch: ClipBatch, model: ModelConfig, video: PosedVideo | None
-) -> list[Canonical]:
+) -> list[CanonicalScene]:
     """One set of Gaussians per sample, from its first input image or from its posed ``video``."""
     scenes = []
     for index in range(len(batch)):
         sample = maps.sample(index)
         if video is not None:
             posed = video.sample(index)
-            scenes.append(reconstruct_detailed(sample, posed, model.activation, RunLog()))
+            scenes.append(reconstruct_refined(sample, posed, model.activation, RunLog()))
             continue
         image = first_image(batch, index)
         base = plane_base(image.rgb, image.camera, batch.cameras[index], model.ldrm.grid_stride)
@@ -145,14 +149,14 @@ def log_depth(raw: Float[Tensor, "n 1 h w"], model: ModelConfig) -> Float[Tensor
     return key_depth(raw.float(), model.activation)[:, 0].log()
 
 
-def _static_images(scenes: list[Canonical], batch: ClipBatch) -> RenderedScenes:
+def _static_images(scenes: list[CanonicalScene], batch: ClipBatch) -> RenderedScenes:
     times = batch.target_time.shape[1]
     rgb, depth = _target_images([[scene.gaussians] * times for scene in scenes], batch)
     return RenderedScenes(rgb=rgb, depth=depth, offsets=None)
 
 
 def _dynamic_images(
-    scenes: list[Canonical], deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
+    scenes: list[CanonicalScene], deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
 ) -> RenderedScenes:
     """``deformations`` hold the raw maps of all samples, one tensor (b, 10, …) per target time."""
     moved = []
@@ -189,18 +193,18 @@ def track_offsets(
 def _with_input_depth(
     rendered: RenderedScenes, maps: RawGaussianMaps, model: ModelConfig
 ) -> RenderedScenes:
-    if not model.detail.used:
+    if not model.refinement.used:
         return rendered
     return replace(rendered, input_depth=key_depth(maps.gaussians[:, -1], model.activation))
 
 
 def deformed_state(
-    scene: Canonical, raw: Float[Tensor, "10 t h w"], model: ModelConfig
+    scene: CanonicalScene, raw: Float[Tensor, "10 t h w"], model: ModelConfig
 ) -> DeformationState:
     """Difference of all Gaussians from the canonical ones at one time."""
     units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.activation)
-    raw_scale = raw_scales(scene.maps.gaussians[0].float())[scene.cells]
-    return deformation_state(raw.float(), raw_scale, scene.cells, units)
+    raw_scale = raw_scales(scene.maps.gaussians[0].float())[scene.cell_index]
+    return deformation_state(raw.float(), raw_scale, scene.cell_index, units)
 
 
 def deformed(gaussians: Gaussians, state: DeformationState) -> Gaussians:
@@ -236,5 +240,5 @@ def _cell_index(
     grid_stride = model.ldrm.grid_stride
     height, width = (side // grid_stride for side in batch.video.shape[2:4])
     frame, row, column = cell.unbind(-1)
-    frame = frame // (TIME_STRIDE if model.detail.used else 1)
+    frame = frame // (TIME_STRIDE if model.refinement.used else 1)
     return (frame * height + row // grid_stride) * width + column // grid_stride

@@ -14,9 +14,11 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.path import add_noise
+from diff4splat.models.blocks.patches import fill_first_pack
+from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.factory import Networks
 from diff4splat.training.latents.latent_batch import LatentBatch
-from diff4splat.training.latents.video_latents import camera_rays, with_zero_motion
+from diff4splat.training.latents.video_latents import camera_rays
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.timestep_sampling import (
     LevelDistribution,
@@ -71,16 +73,26 @@ class VideoFlow:
                 LossTerm(
                     name="flow",
                     weight=losses.flow,
-                    compute=lambda: self._error(velocity, video, weights),
+                    compute=lambda: self._error(velocity, video, weights, self._cells(batch)),
                 )
             ]
         )
 
     def measures(self, batch: LatentBatch, training: bool) -> Terms:
-        """``flow_error``: mean squared error of the velocity over fixed levels."""
+        """``flow_error``: mean squared error of the velocity over fixed levels.
+
+        ``hidden_error`` is the same, weighted by how much of a latent cell the first frame hides.
+        """
         videos = [self.at_level(batch, level) for level in EVAL_LEVELS]
-        errors = [self._error(self.velocity(batch, one, training), one) for one in videos]
-        return {"flow_error": torch.stack(errors).mean(0)}
+        predicted = [self.velocity(batch, one, training) for one in videos]
+        hidden = hidden_share(batch)
+        measured = {"flow_error": None} | ({} if hidden is None else {"hidden_error": hidden})
+        return {
+            name: torch.stack(
+                [self._error(*pair, cells=cells) for pair in zip(predicted, videos, strict=True)]
+            ).mean(0)
+            for name, cells in measured.items()
+        }
 
     def noisy(self, batch: LatentBatch) -> NoisyVideo:
         """Noise and level of every sample."""
@@ -95,10 +107,9 @@ class VideoFlow:
     def with_noise(
         self, batch: LatentBatch, level: Float[Tensor, " b"], purpose: str
     ) -> NoisyVideo:
-        """The latents and motion channels of a batch, with noise drawn for a purpose."""
-        clean = torch.cat([batch.latent, batch.motion], 1)
-        noise = self._plan.random.normal(batch, clean, purpose)
-        return NoisyVideo(clean=clean, noise=noise, level=level.to(clean))
+        """The latents of a batch, with noise drawn for a purpose."""
+        noise = self._plan.random.normal(batch, batch.latent, purpose)
+        return NoisyVideo(clean=batch.latent, noise=noise, level=level.to(batch.latent))
 
     def velocity(
         self, batch: LatentBatch, video: NoisyVideo, training: bool
@@ -119,11 +130,15 @@ class VideoFlow:
     def _velocity(
         self, batch: LatentBatch, latent: Tensor, levels: Tensor, text: tuple[Tensor | None, ...]
     ) -> Float[Tensor, "b c t h w"]:
-        condition = with_zero_motion(self._plan.model, batch.render_condition)
-        return self._networks.dit(latent, levels, camera_rays(batch.cameras), *text, condition)
+        rays = camera_rays(batch.cameras)
+        return self._networks.dit(latent, levels, rays, *text, batch.render_condition)
 
     def _error(
-        self, velocity: Tensor, video: NoisyVideo, weights: Float[Tensor, " b"] | None = None
+        self,
+        velocity: Tensor,
+        video: NoisyVideo,
+        weights: Float[Tensor, " b"] | None = None,
+        cells: Float[Tensor, "b t h w"] | None = None,
     ) -> Float[Tensor, " b"]:
         return flow_matching(
             velocity,
@@ -132,15 +147,30 @@ class VideoFlow:
             first_frame_is_clean=True,
             weights=weights,
             channels=self._channels,
+            cells=cells,
         )
+
+    def _cells(self, batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:
+        """Weight of each latent cell: hidden ones count more."""
+        share, weight = hidden_share(batch), self._losses.hidden_weight
+        return None if share is None or weight == 1 else 1 + (weight - 1) * share
 
     @cached_property
     def _channels(self) -> Float[Tensor, " c"]:
         """Weight of each channel; latent channels have 1 on average."""
         losses, vae = self._losses, self._networks.vae
         share = torch.ones_like(vae.latent_std)
-        if vae.code is not None:
-            power = vae.code.energy() * vae.latent_std.square()
+        if vae.pca_shortcut is not None:
+            power = vae.pca_shortcut.energy() * vae.latent_std.square()
             share = power.pow(losses.channel_power_exponent)
-        motion = share.new_full((self._plan.model.motion_channels,), losses.motion_channel_weight)
-        return torch.cat([share / share.mean(), motion])
+        return share / share.mean()
+
+
+def hidden_share(batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:
+    """How much of each latent cell the first frame hides; None without a render condition."""
+    if batch.validity is None:
+        return None
+    side_px = batch.validity.shape[-1] // batch.latent.shape[-1]
+    hidden = torch.nn.functional.avg_pool3d(1 - batch.validity, (1, side_px, side_px))
+    # The first frame fills its pack of four.
+    return fill_first_pack(hidden).unflatten(2, (-1, TIME_STRIDE)).mean(3)[:, 0]

@@ -12,14 +12,14 @@ class SceneKind:
     """One kind of place."""
 
     phrase: str
-    """How captions name it."""
-    stage_m: tuple[float, float]
+    """Name in captions."""
+    area_radius_m: tuple[float, float]
     tilt_deg: tuple[float, float]
-    """How far the camera looks down."""
+    """Tilt of the camera."""
     ground: str
-    """Role of what things stand on."""
+    """Material role of the ground."""
     tags: frozenset[str]
-    """Which families stand around: see ``Family.places``."""
+    """Tags of the static families: see ``Family.places``."""
     props: tuple[int, int]
     far: frozenset[str] = frozenset()
     far_count: tuple[int, int] = (0, 0)
@@ -27,7 +27,7 @@ class SceneKind:
     is_under_water: bool = False
     hills_m: tuple[float, float] = (0.0, 0.0)
     weight: float = 1.0
-    """How often it comes, beside the others."""
+    """Relative frequency."""
 
 
 SCENE_KINDS: dict[str, SceneKind] = {
@@ -35,7 +35,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         weight=2.0,
         phrase="in a room",
         tags=frozenset(["room"]),
-        stage_m=(0.7, 1.3),
+        area_radius_m=(0.7, 1.3),
         tilt_deg=(6.0, 28.0),
         ground="floor",
         props=(4, 7),
@@ -45,7 +45,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         weight=1.5,
         phrase="on a table",
         tags=frozenset(["table"]),
-        stage_m=(0.16, 0.34),
+        area_radius_m=(0.16, 0.34),
         tilt_deg=(10.0, 34.0),
         ground="wood",
         props=(4, 8),
@@ -56,7 +56,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         phrase="in a meadow",
         tags=frozenset(["ground"]),
         far=frozenset(["tree", "conifer", "house", "windmill", "bush"]),
-        stage_m=(1.2, 3.6),
+        area_radius_m=(1.2, 3.6),
         tilt_deg=(2.0, 20.0),
         ground="lawn",
         props=(7, 14),
@@ -68,7 +68,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         phrase="in a garden",
         tags=frozenset(["ground"]),
         far=frozenset(["tree", "house", "bush", "fence"]),
-        stage_m=(0.8, 2.2),
+        area_radius_m=(0.8, 2.2),
         tilt_deg=(4.0, 24.0),
         ground="lawn",
         props=(8, 14),
@@ -80,7 +80,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         phrase="on sand",
         tags=frozenset(["sand"]),
         far=frozenset(["conifer", "tower", "bush"]),
-        stage_m=(1.0, 3.4),
+        area_radius_m=(1.0, 3.4),
         tilt_deg=(2.0, 20.0),
         ground="sand",
         props=(5, 10),
@@ -92,7 +92,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         phrase="in a street",
         tags=frozenset(["street"]),
         far=frozenset(["house", "flats", "tree", "tower"]),
-        stage_m=(1.4, 3.6),
+        area_radius_m=(1.4, 3.6),
         tilt_deg=(3.0, 20.0),
         ground="asphalt",
         props=(4, 8),
@@ -103,7 +103,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         weight=1.5,
         phrase="in a courtyard",
         tags=frozenset(["street", "ground"]),
-        stage_m=(1.1, 2.6),
+        area_radius_m=(1.1, 2.6),
         tilt_deg=(4.0, 26.0),
         ground="paving",
         props=(5, 9),
@@ -112,7 +112,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         weight=0.6,
         phrase="under water",
         tags=frozenset(["sea"]),
-        stage_m=(0.7, 1.8),
+        area_radius_m=(0.7, 1.8),
         tilt_deg=(2.0, 18.0),
         ground="sand",
         props=(9, 15),

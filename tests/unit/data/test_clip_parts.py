@@ -132,5 +132,5 @@ def test_other_licences(name: str) -> None:
 def test_other_processes_read_it(folder: ClipFolder) -> None:
     # Started afresh: a fork of a process with threads may hang in whatever a thread was holding.
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        sums = list(pool.map(depth_sum, [folder] * 3, range(3), timeout=60))
+        sums = list(pool.map(depth_sum, [folder] * 3, range(3), timeout=300))
     assert sums == [depth_sum(folder, position) for position in range(3)]

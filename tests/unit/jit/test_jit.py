@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from diff4splat import jit
-from diff4splat.data_prep.synthetic.drawing import compiled as drawing
+from diff4splat.data_prep.synthetic.renderer import compiled as drawing
 from diff4splat.render.raster import jit as raster
 from diff4splat.render.trace import compiled as trace
 from diff4splat.scene.motion.hexplane import jit as hexplane

@@ -14,7 +14,7 @@ from torch import nn
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.models.factory import PARTS, create_networks
-from diff4splat.models.hub.pretrained import Model, load_model, with_text_encoder
+from diff4splat.models.hub.model import Model, load_model
 from diff4splat.training.prerequisites import (
     continued_stage,
     last_checkpoint,

@@ -14,7 +14,7 @@ from safetensors.torch import load_file
 from diff4splat.errors import CheckpointError, ConfigError, InputError
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.models.factory import create_networks
-from diff4splat.models.hub.pretrained import load_model
+from diff4splat.models.hub.model import load_model
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latent_statistics import read_statistics

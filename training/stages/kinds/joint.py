@@ -13,10 +13,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.factory import Networks
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
-from diff4splat.training.latents.video_latents import encode_batch, without_motion_channels
+from diff4splat.training.latents.video_latents import encode_batch
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.loss_terms import (
     combine,
@@ -69,7 +69,7 @@ class JointStage(ModelStage):
             velocity = self.flow.velocity_at(batch, latent, at.levels, self.training)
             moved = latent - (start / STEPS)[:, None, None, None, None] * velocity
             latent = torch.cat([video.clean[:, :, :1], moved[:, :, 1:]], 2)
-        return without_motion_channels(self.plan.model, latent)
+        return latent
 
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Terms:

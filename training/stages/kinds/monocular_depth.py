@@ -18,15 +18,13 @@ from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.depth import depth_pearson
 from diff4splat.metrics.masked import masked_mean, mean_or_nan
 from diff4splat.models.config.networks import TIME_STRIDE
-from diff4splat.models.factory import Networks
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.losses.log_depth import gradient_error, inverse_depth_error, rescale_median
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
-from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
+from diff4splat.training.stages.model_stage import ModelStage, Terms
 from diff4splat.training.stages.previews import depth_preview
 from diff4splat.training.stages.scene_prediction import log_depth
-from diff4splat.training.stages.sub_networks import depth_network, train_only
 
 SKY_DEPTH = 10 * PLANE_DEPTH
 """Pixels without depth are at least as far."""
@@ -47,17 +45,11 @@ class DepthImages:
 class MonocularDepthStage(ModelStage):
     """The depth network alone."""
 
-    parts = ("ldrm",)
-
-    def __init__(self, networks: Networks, plan: StagePlan) -> None:
-        super().__init__(networks, plan)
-        # In a tuple, so that the network is not registered a second time.
-        self._network = (depth_network(networks),)
-        train_only(self.ldrm, self._network[0])
+    parts = ("monocular_depth",)
 
     def compilable(self) -> tuple[nn.Module, ...]:
         """The depth network."""
-        return self._network
+        return (self.monocular_depth,)
 
     def forward(self, batch: ClipBatch) -> Terms:
         """The terms ``depth_log``, ``depth_gradient``, ``inverse_depth`` and ``sky_margin``."""
@@ -77,7 +69,7 @@ class MonocularDepthStage(ModelStage):
 
     def log_depth(self, rgb: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n h w"]:
         """Logarithm of the depth z of every pixel."""
-        raw = self._network[0](rgb)
+        raw = self.monocular_depth(rgb)
         with torch.autocast(rgb.device.type, enabled=False):
             return log_depth(raw, self.plan.model)
 

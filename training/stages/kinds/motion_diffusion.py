@@ -27,7 +27,6 @@ from diff4splat.training.losses.timestep_sampling import (
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import motion_preview
-from diff4splat.training.stages.sub_networks import motion_network, train_only
 from diff4splat.training.stages.text_conditioning import TextConditioning
 from diff4splat.training.stages.video_flow import EVAL_LEVELS
 
@@ -57,13 +56,10 @@ class NoisyMotion:
 class MotionDiffusionStage(ModelStage):
     """The motion network alone."""
 
-    parts = ("text_encoder", "dit")
+    parts = ("text_encoder", "motion_unet")
 
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)
-        # In a tuple, so that the network is not registered a second time.
-        self._network = (motion_network(networks),)
-        train_only(self.dit, self._network[0])
         self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
 
     def forward(self, batch: ClipBatch) -> Terms:
@@ -72,7 +68,7 @@ class MotionDiffusionStage(ModelStage):
         uniform = self.random.uniform(batch, "level")
         level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
         noisy = self._noisy(batch, level.to(batch.field), "noise")
-        clean, logits = self._network[0].answers(*self._inputs(batch, noisy))
+        clean, logits = self.motion_unet.predict_motion_and_mask(*self._inputs(batch, noisy))
         weights = min_level_weights(noisy.level, losses.min_level_weighting)
         return weighted_sum(
             [
@@ -126,7 +122,7 @@ class MotionDiffusionStage(ModelStage):
         return rgb, noisy.motion, noisy.level, text, mask
 
     def _clean(self, batch: ClipBatch, noisy: NoisyMotion) -> Float[Tensor, "b 3 t1 hc wc"]:
-        return self._network[0](*self._inputs(batch, noisy))
+        return self.motion_unet(*self._inputs(batch, noisy))
 
     def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
         """Clean motion in one step from noise."""

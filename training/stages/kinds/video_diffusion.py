@@ -13,14 +13,10 @@ from torch import Tensor
 from diff4splat.flow.path import clean_from_velocity
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import Networks
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
-from diff4splat.training.latents.video_latents import (
-    encode_batch,
-    image_video,
-    without_motion_channels,
-)
+from diff4splat.training.latents.video_latents import encode_batch, image_video
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import Row, preview
 from diff4splat.training.stages.video_flow import EVAL_LEVELS, VideoFlow
@@ -33,8 +29,9 @@ class VideoDiffusionStage(ModelStage):
 
     @classmethod
     def needed(cls, model: ModelConfig) -> tuple[str, ...]:
-        """LDRM makes the render conditions."""
-        return (*cls.parts, "ldrm") if model.dit.draft else cls.parts
+        """The depth prior makes the render conditions."""
+        conditioned = model.dit.render_condition and model.monocular_depth.used
+        return (*cls.parts, "monocular_depth") if conditioned else cls.parts
 
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)
@@ -51,7 +48,7 @@ class VideoDiffusionStage(ModelStage):
 
     @torch.no_grad()
     def measure(self, batch: ClipBatch | LatentBatch) -> Terms:
-        """``flow_error``: mean squared error of the velocity over fixed levels."""
+        """``flow_error`` and ``hidden_error`` over fixed levels."""
         return self.flow.measures(self.encoded(batch), self.training)
 
     @torch.no_grad()
@@ -59,8 +56,8 @@ class VideoDiffusionStage(ModelStage):
         """Truth, render condition, and the clean video predicted from each evaluation level."""
         batch = self.encoded(batch)
         rows: list[Row] = [("truth", self._images(batch.latent))]
-        if batch.render_condition is not None:
-            rows.append(("render condition", self._images(batch.render_condition)))
+        if batch.render_latent is not None:
+            rows.append(("render condition", self._images(batch.render_latent)))
         rows += [(f"from level {level:g}", self._predicted(batch, level)) for level in EVAL_LEVELS]
         return preview(rows)
 
@@ -68,7 +65,6 @@ class VideoDiffusionStage(ModelStage):
         video = self.flow.at_level(batch, level)
         velocity = self.flow.velocity(batch, video, self.training)
         clean = clean_from_velocity(video.latent, velocity, video.level)
-        clean = without_motion_channels(self.plan.model, clean)
         return self._images(torch.cat([batch.latent[:, :, :1], clean[:, :, 1:]], 2))
 
     def _images(self, latent: Float[Tensor, "b c t h w"]) -> list[Tensor]:

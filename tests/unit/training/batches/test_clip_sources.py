@@ -147,7 +147,7 @@ def test_other_processes_draw_the_same_clips(folder: Path) -> None:
     # Opened already: what was read so far must not hinder sending it.
     assert names(pickle.loads(pickle.dumps(clips)), range(3)) == here
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        found = list(pool.map(process_and_name, [clips] * 3, range(3), timeout=60))
+        found = list(pool.map(process_and_name, [clips] * 3, range(3), timeout=300))
     assert [name for _, name in found] == here
     assert os.getpid() not in {process for process, _ in found}
 

@@ -16,7 +16,7 @@ from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.latents import encode
@@ -34,7 +34,7 @@ WORDS = ("someone turns left.", "someone turns right.")
 def tiny_model(draft: bool = False) -> Model:
     config: ModelConfig = recipe_by_name("test").model
     config = replace(config, dit=replace(config.dit, draft=draft))
-    networks = create_networks(config, with_text=False)
+    networks = create_networks(config)
     return Model(config=config, networks=networks, weights_sha256="weights")
 
 

@@ -105,13 +105,13 @@ def test_measures_weigh_no_levels() -> None:
 def coded(power: float) -> ModelStage:
     """Video diffusion over an autoencoder with a linear code."""
     model = recipe_by_name("test").model
-    model = replace(model, vae=replace(model.vae, linear_code=True))
+    model = replace(model, vae=replace(model.vae, pca_shortcut=True))
     return make_stage(stage_recipe("video_diffusion", channel_power_exponent=power), model=model)
 
 
 def test_channels_count_by_their_share_in_pictures() -> None:
     stage = coded(0.5)
-    share = stage.vae.code.to_block.weight.detach().norm(dim=0)
+    share = stage.vae.pca_shortcut.to_block.weight.detach().norm(dim=0)
     torch.testing.assert_close(stage.flow._channels, share / share.mean())
     stage.vae.set_statistics(torch.zeros(4), torch.tensor([1.0, 2.0, 3.0, 4.0]))
     share = share * torch.tensor([1.0, 2.0, 3.0, 4.0])
