@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Convert:
     out: Path
     """A name ending in .ply for one time, or a folder for a sequence."""
     time: float | None = None
-    """Seconds, for a single file; if left out, the first time of the motion."""
+    """Time in seconds of a single file. Default: the start of the motion."""
     fps: float = 24.0
     """Files per second of a sequence."""
 
@@ -66,7 +66,7 @@ class Convert:
 
 
 def file_times_s(scene: "Scene", fps: float) -> list[float]:
-    """When each file of a sequence shows the scene; one file for a scene that stands still."""
+    """Time of each file of a sequence; one file for a static scene."""
     start_s, stop_s = scene.motion.time_range_s
     if len(scene.motion.moving_index) == 0:
         return [start_s]

@@ -1,6 +1,6 @@
-"""``diff4splat doctor``: what this installation has, whether it works, and what could be added.
+"""``diff4splat doctor``: versions, back ends and extras of this installation, and a self-test.
 
-The table goes to standard output line by line, so that it tells something however far it gets.
+The table is printed line by line, so that a crash still leaves the lines before it.
 """
 
 import os
@@ -23,7 +23,7 @@ EXTRAS = (
     ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),
     ("gsplat", "pictures on a GPU", "pip install 'diff4splat[cuda]'"),
 )
-"""(package, what it is for, how to add it)."""
+"""(package, purpose, install command)."""
 _WIDTH = 20
 TRACER, FIELDS = "renderer trace", "hexplane fields"
 
@@ -32,10 +32,10 @@ Rows = Iterable[tuple[str, str]]
 
 @dataclass(frozen=True, kw_only=True)
 class Doctor:
-    """Check the installation: versions, back ends, extras, and that a picture comes out right."""
+    """Check the installation: versions, back ends, extras, and a test render."""
 
     warm: bool = False
-    """Only compile, which otherwise happens before the first picture, rays, field and world."""
+    """Compile all kernels now instead of before their first use."""
 
     def run(self) -> None:
         """Print the table, or compile."""
@@ -53,7 +53,7 @@ class Doctor:
 
 
 def warm_up() -> None:
-    """Compile all that has kernels, and say how long each took and where it lies.
+    """Compile all kernels; print the time and the cache folder.
 
     Raises:
         Diff4SplatError: the renderer cannot run here.
@@ -67,7 +67,7 @@ def warm_up() -> None:
 
     warm_one("worlds", compile_drawing, DRAWING)
     warm_one(FIELDS, partial(compile_ahead, fields), fields.kernels())
-    reason = installation.refusal(COMPILED, "cpu")
+    reason = installation.unsupported_reason(COMPILED, "cpu")
     if reason is not None:
         raise Diff4SplatError(f"renderer {COMPILED}: {reason}")
     warm_one(f"renderer {COMPILED}", compile_renderer, KERNELS)
@@ -75,27 +75,27 @@ def warm_up() -> None:
 
 
 def warm_one(
-    what: str, compile_all: "Callable[[Phases], tuple[str, ...]]", kernels: list[Any]
+    label: str, compile_all: "Callable[[Phases], tuple[str, ...]]", kernels: list[Any]
 ) -> None:
-    """Compile one list of ``kernels`` with its own bar and line."""
+    """Compile one list of ``kernels`` with a progress bar and a summary line."""
     from diff4splat.cli.console import ConsolePhases, note
 
     phases = ConsolePhases()
     compiled = compile_all(phases)
     folder = kernels[0].stats.cache_path
-    place = f"kept in {folder}" if folder else "not kept, because no folder can be written to"
+    location = f"kept in {folder}" if folder else "not kept, because no folder can be written to"
     did = f"compiled {len(compiled)} kernels" if compiled else "was already compiled; loaded"
-    note(f"{what}: {did} in {phases.seconds['compile']:.1f} s; {place}")
+    note(f"{label}: {did} in {phases.seconds['compile']:.1f} s; {location}")
 
 
 def print_rows(rows: Rows) -> None:
-    """One aligned line each, as soon as it is known."""
+    """Print one aligned line each, as soon as it is available."""
     for name, value in rows:
         print(f"{name:<{_WIDTH}}{value}", flush=True)
 
 
 def machine_rows() -> Rows:
-    """What can be told without any library."""
+    """Rows that need no library."""
     from diff4splat import __version__
 
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
@@ -107,16 +107,16 @@ def machine_rows() -> Rows:
 
 
 def cpu_name() -> str:
-    """As people know it where the system tells, else the architecture."""
+    """The model name if the system has one, else the architecture."""
     try:
-        found = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+        match = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     except OSError:
-        found = None
-    return found[1] if found else platform.processor() or platform.machine()
+        match = None
+    return match[1] if match else platform.processor() or platform.machine()
 
 
 def torch_rows() -> Rows:
-    """PyTorch and what it computes on."""
+    """PyTorch and its devices."""
     import torch
 
     threads = torch.get_num_threads()
@@ -130,7 +130,7 @@ def torch_rows() -> Rows:
 
 
 def backend_rows() -> Rows:
-    """What every back end says to a picture on the CPU, and on the GPU if there is one."""
+    """State of every rendering back end on the CPU, and on the GPU if available."""
     import torch
 
     from diff4splat.render.backends import BACKENDS
@@ -138,19 +138,19 @@ def backend_rows() -> Rows:
     devices = ("cpu", "cuda") if torch.cuda.is_available() else ("cpu",)
     for name in BACKENDS:
         for device in devices:
-            reason = installation.refusal(name, device)
+            reason = installation.unsupported_reason(name, device)
             state = installation.readiness(name) if reason is None else f"refuses: {reason}"
             yield f"renderer {name}", state if len(devices) == 1 else f"{device}: {state}"
 
 
 def compiled_rows() -> Rows:
-    """What else has kernels to compile."""
+    """State of the other compiled kernels."""
     yield TRACER, installation.tracer_readiness()
     yield FIELDS, installation.compiled_or_not(fields.is_ready(), fields.COMPILE_S)
     yield "worlds", worlds.readiness()
 
 
 def extra_rows() -> Rows:
-    """Optional packages: the version, or how to add one."""
+    """Optional packages: the version, or the install command."""
     for package, purpose, command in EXTRAS:
         yield package, installation.version(package) or f"not installed; for {purpose}: {command}"

@@ -1,4 +1,4 @@
-"""``diff4splat eval``: how good a model is on clips that nobody trained on, beside trivial answers.
+"""``diff4splat eval``: measure a model on test clips, beside trivial baselines.
 
 --protocol ── load_protocol ── open_clips ─┐
 --model ───── Diff4SplatPipeline ── subject ┴─ evaluate ─ results.json, results.md, items.png
@@ -14,33 +14,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate:
-    """Measure a model on held-out clips, with trivial baselines in the same table."""
+    """Measure a model on the test split, with trivial baselines in the same table."""
 
     model: str = "small"
-    """A model folder, or a size (test, small): its shipped weights, else random ones."""
+    """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
     protocol: str = "held_out_v2"
-    """Name of a protocol that ships, or a JSON file of your own."""
+    """Name of a bundled protocol, or a protocol JSON file."""
     size: int | None = None
-    """Picture side in pixels, such as the model's own; the protocol's if left out."""
+    """Image side in pixels. Default: as in the protocol."""
     task: Literal["generation", "reconstruction", "text"] = "generation"
-    """From the first picture; from the input video; or does the text decide what moves."""
+    """Generate from one image, reconstruct the input video, or test the effect of the text."""
     out: Path = Path("evaluation")
     """Folder for the results."""
     items: int | None = None
-    """Measure the first so many clips only; the table then says that it is a subset."""
+    """Measure only the first N clips; the table then says that it is a subset."""
     features: str | None = None
-    """LPIPS weights that you have, as `vgg:FILE` or `alex:TRUNK,HEADS`; if left out, a stand-in."""
+    """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
     steps: int = 8
-    """Steps of the sampler."""
+    """Sampling steps."""
     fresh: bool = False
-    """Measure again what an earlier run into the same folder has measured."""
+    """Ignore the results of an earlier run in the same folder."""
 
     def run(self) -> None:
         """Check everything cheap first, then measure, write, and print the table."""
         from dataclasses import replace
 
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
+        from diff4splat.cli.installation import single_gaussian
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.cli.worlds import prepare_sources
         from diff4splat.evaluation.captions import grammar_caption
@@ -64,7 +64,7 @@ class Evaluate:
             features=features,
             captioner=grammar_caption,
         )
-        prepare_renderer(speck("cpu"), phases)
+        prepare_renderer(single_gaussian("cpu"), phases)
         prepare_sources([protocol.source], phases)
         extent = Extent(limit=self.items, fresh=self.fresh)
         found = evaluate(clips, setup, self.out, extent, phases)

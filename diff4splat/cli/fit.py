@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Fit:
     def run(self) -> None:
         """Check, read, fit, write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
+        from diff4splat.cli.installation import single_gaussian
         from diff4splat.cli.renderer import compile_ahead, prepare_renderer
         from diff4splat.fitting.checkpoint import FILE
         from diff4splat.fitting.fit import FitRun, fit_scene
@@ -93,7 +93,7 @@ class Fit:
         for line in capture.notes:
             note(line)
         if self.renderer in ("auto", "raster"):
-            prepare_renderer(speck("cpu"), log.phases)
+            prepare_renderer(single_gaussian("cpu"), log.phases)
         sight = Sight(capture=capture, backend=self.renderer, settings=settings.camera)
         if sight.traced and not tracer.is_ready():
             compile_ahead(tracer, log.phases)

@@ -1,4 +1,4 @@
-"""``--camera``: a preset expression or a path file becomes a camera path of the asked length."""
+"""``--camera``: build a camera path from presets or from a path file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,16 +16,16 @@ FILE_SUFFIXES = (".txt", ".json", ".tum")
 
 @dataclass(frozen=True, kw_only=True)
 class CameraOptions:
-    """Length and manner of a camera move, shared by every command that takes one."""
+    """Length, speed and easing of the camera path."""
 
     frames: int | None = None
-    """Frames of the video; if left out, 49 for presets, as many as it holds for a path file."""
+    """Number of frames. Default: 49 for presets, all frames of a path file."""
     fps: float | None = None
-    """Frames per second; if left out, 24 for presets, its own times for a path file."""
+    """Frames per second. Default: 24 for presets, the times of a path file."""
     amplitude: float | None = None
-    """Size of a preset's move, in near depths or turns; if left out, the preset's own."""
+    """Size of a preset's motion, in near depths or turns. Default: depends on the preset."""
     easing: Literal["linear", "smooth", "ease-in", "ease-out"] = "smooth"
-    """How a preset starts and stops."""
+    """Speed profile of a preset."""
 
 
 def choose_path(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
@@ -51,7 +51,7 @@ def _preset(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPa
 
 
 def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
-    """The file's own poses and times, or as many frames as asked for over the same stretch."""
+    """The poses and times of the file, resampled if a frame count or rate is given."""
     from diff4splat.io.path_files import read_path
     from diff4splat.paths.picture_size import resized
     from diff4splat.paths.spline import resample
@@ -64,8 +64,8 @@ def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "Camer
         return path
     frames = len(path) if options.frames is None else options.frames
     duration_s = float(path.times_s[-1])
-    own_fps = (frames - 1) / duration_s if duration_s > 0 and frames > 1 else DEFAULT_FPS
-    return resample(path, frames, own_fps if options.fps is None else options.fps)
+    file_fps = (frames - 1) / duration_s if duration_s > 0 and frames > 1 else DEFAULT_FPS
+    return resample(path, frames, file_fps if options.fps is None else options.fps)
 
 
 def _is_file(camera: str) -> bool:

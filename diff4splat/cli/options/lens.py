@@ -1,10 +1,10 @@
-"""``--lens``, its coefficients and field of view: a lens, and cameras whose focal lengths suit."""
+"""``--lens``, its coefficients and its field of view: the lens and its cameras."""
 
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from diff4splat.cli.optics_options import WITH_FOCAL_LENGTH, OpticsOptions
+from diff4splat.cli.options.optics import WITH_FOCAL_LENGTH, OpticsOptions
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 SENSOR_MM, FOV_DEG = 36.0, 180.0
 _ROUNDING = 1e-9
-BARREL = (-0.1, 0.02, 0.0, 0.0)
-"""k1 k2 p1 p2 of an opencv lens where nobody says."""
+BARREL_DISTORTION = (-0.1, 0.02, 0.0, 0.0)
+"""Default k1 k2 p1 p2 of an opencv lens."""
 
 
-def lens_of(options: OpticsOptions, path: "CameraPath") -> tuple["Lens", "CameraPath"]:
-    """The lens, and ``path`` with the focal lengths that it needs."""
+def build_lens(options: OpticsOptions, path: "CameraPath") -> tuple["Lens", "CameraPath"]:
+    """The lens, and ``path`` with the focal lengths of that lens."""
     import torch
 
     lens = _lens(options)
@@ -43,7 +43,7 @@ def _lens(options: OpticsOptions) -> "Lens":
     given = torch.tensor(options.lens_coefficients, dtype=torch.float64)
     match options.lens:
         case "opencv":
-            return _opencv(options.lens_coefficients or BARREL)
+            return _opencv(options.lens_coefficients or BARREL_DISTORTION)
         case "fisheye":
             coefficients = given if len(given) else given.new_zeros(4)
             return OpenCVFisheye(coefficients=coefficients, max_angle_rad=fov_rad / 2)
@@ -58,7 +58,7 @@ def _lens(options: OpticsOptions) -> "Lens":
 
 
 def _opencv(given: tuple[float, ...]) -> "Lens":
-    """From OpenCV's order of coefficients."""
+    """Lens from coefficients in OpenCV's order."""
     import torch
 
     from diff4splat.geometry.lenses.opencv_pinhole import OpenCVPinhole
@@ -72,10 +72,10 @@ def _opencv(given: tuple[float, ...]) -> "Lens":
 
 
 def _fisheye_fov_deg(options: OpticsOptions, lens: "OpenCVFisheye") -> float:
-    """What was asked for, else 180 degrees or as far as the lens goes.
+    """The requested field of view. Default: 180 degrees, or the largest that the lens covers.
 
     Raises:
-        ConfigError: the coefficients bend the picture back before that.
+        ConfigError: the distortion is not monotonic up to that angle.
     """
     widest = math.degrees(2 * lens.largest_angle_rad)
     if options.fov is not None and options.fov > widest * (1 + _ROUNDING):
@@ -87,7 +87,7 @@ def _fisheye_fov_deg(options: OpticsOptions, lens: "OpenCVFisheye") -> float:
 
 
 def _lens_camera(options: OpticsOptions, lens: "Lens", size_px: tuple[int, int]) -> "Camera":
-    """At the origin, float64."""
+    """Camera of the lens at the origin, float64."""
     import torch
 
     from diff4splat.geometry.lenses.build import (

@@ -1,4 +1,4 @@
-"""Lens, aperture, shutter and exposure on the command line, and which of them belong together."""
+"""Command line options for lens, aperture, shutter and exposure, and their checks."""
 
 import math
 from dataclasses import dataclass
@@ -12,68 +12,67 @@ ShutterName = Literal["global", "top-to-bottom", "bottom-to-top", "left-to-right
 WITH_FOCAL_LENGTH = ("pinhole", "opencv")
 """Lenses that keep the focal length of the camera path."""
 COEFFICIENTS = {"opencv": (4, 5, 8, 12), "fisheye": (4,), "blender": (5,)}
-"""How many numbers a lens takes."""
+"""Allowed numbers of coefficients per lens."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpticsOptions:
-    """A camera as it is built, in place of a pinhole."""
+    """A physical camera instead of a pinhole."""
 
     lens: LensName = "pinhole"
-    """What bends the picture. Equirectangular pictures are twice as wide as high."""
+    """Lens model. Equirectangular images are twice as wide as high."""
     lens_coefficients: tuple[float, ...] = ()
     """opencv: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]; fisheye: k1 k2 k3 k4; blender: k0 k1 k2 k3
-    k4 in rad/mm^i, all negated as in Cycles or not. If left out: barrel distortion, equidistant, a
-    wide lens."""
+    k4 in rad/mm^i, with either sign convention of Cycles. Default: barrel distortion (opencv),
+    equidistant (fisheye), a wide lens (blender)."""
     fov: float | None = None
-    """Field of view of a fisheye or blender lens in degrees, blind beyond; a fisheye's spans the
-    width. If left out, 180."""
+    """Field of view of a fisheye or blender lens in degrees; black outside. A fisheye's spans the
+    image width. Default: 180."""
     f_stop: float | None = None
     """Aperture as f-number, for lenses with a focal length."""
     aperture_radius: float | None = None
-    """Aperture as radius in scene units."""
+    """Aperture radius in scene units."""
     focus_distance: float | None = None
-    """In scene units; if left out, the depth in the middle of the first frame."""
+    """Focus distance in scene units. Default: the depth at the centre of the first frame."""
     focus_surface: SurfaceName | None = None
-    """What is in focus; if left out, a plane, as with real lenses."""
+    """Shape of the surface in focus. Default: plane, as with real lenses."""
     sensor_size: float | None = None
-    """Longer side of the sensor in millimetres, for --f-stop and blender; if left out, 36."""
+    """Longer side of the sensor in millimetres, for --f-stop and blender. Default: 36."""
     metres_per_unit: float | None = None
-    """Metres in a scene unit, for --f-stop; if left out, 1."""
+    """Metres per scene unit, for --f-stop. Default: 1."""
     shutter: ShutterName = "global"
-    """In which order lines are read out, or all at once."""
+    """Direction of the rolling shutter, or global."""
     readout: float | None = None
-    """Seconds from the first line to the last."""
+    """Read-out time from the first line to the last, in seconds."""
     exposure: float | None = None
-    """Seconds that each line sees."""
+    """Exposure time of each line, in seconds."""
     samples: int | None = None
-    """Rays per pixel; if left out, 64 with an aperture, else 16 where there is something to
-    average."""
+    """Samples per pixel. Default: 64 with an aperture, 16 with exposure time or --pixel-area."""
     pixel_area: bool = False
-    """Average over the square of a pixel in place of its middle."""
+    """Integrate over the pixel area instead of sampling its centre."""
     rows_per_chunk: int | None = None
-    """Lines that see the scene at one time, in place of --tolerance-px."""
+    """Sensor lines rendered at one time, instead of --tolerance-px."""
     tolerance_px: float | None = None
-    """How far anything may be from its place at the time of a line; if left out, 0.1."""
+    """Largest position error from rendering several lines at one time. Default: 0.1."""
     seed: int | None = None
-    """Of the samples; if left out, 0."""
+    """Random seed of the samples. Default: 0."""
 
     @property
     def has_aperture(self) -> bool:
-        """Whether there is depth of field."""
+        """Whether the camera has depth of field."""
         return self.f_stop is not None or self.aperture_radius is not None
 
     @property
     def rolls(self) -> bool:
-        """Whether lines are read one after another."""
+        """Whether the shutter is a rolling shutter."""
         return self.shutter != "global"
 
 
 def require_consistent(options: OpticsOptions) -> None:
-    """Refuse numbers out of range, and options without those that give them a meaning.
+    """Reject values out of range, and options without the options they need.
 
     Raises:
-        ConfigError: naming both.
+        ConfigError: with the names of both options.
     """
     require_numbers(options)
     if options.f_stop is not None and options.lens not in WITH_FOCAL_LENGTH:
@@ -101,16 +100,16 @@ def require_consistent(options: OpticsOptions) -> None:
         "samples": (averages, f"{aperture}, --exposure or --pixel-area"),
         "seed": (averages, f"{aperture}, --exposure or --pixel-area"),
     }
-    for name, (there, what) in needs.items():
-        if getattr(options, name) is not None and not there:
+    for name, (is_given, what) in needs.items():
+        if getattr(options, name) is not None and not is_given:
             raise ConfigError(f"{flag(name)}: expected together with {what}; give that too")
 
 
 def require_numbers(options: OpticsOptions) -> None:
-    """Refuse what is wrong whatever else was given.
+    """Reject single values out of range.
 
     Raises:
-        ConfigError: a number out of range, another number of coefficients, or two apertures.
+        ConfigError: a value out of range, a wrong number of coefficients, or two apertures.
     """
     if options.f_stop is not None and options.aperture_radius is not None:
         raise ConfigError("--f-stop, --aperture-radius: expected one of them, got both")
@@ -127,7 +126,7 @@ def require_numbers(options: OpticsOptions) -> None:
 
 
 def flag(name: str) -> str:
-    """As it is typed."""
+    """The flag of a field."""
     return f"--{name.replace('_', '-')}"
 
 

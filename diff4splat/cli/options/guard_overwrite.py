@@ -1,4 +1,4 @@
-"""A command must not write over what it reads."""
+"""Commands must not overwrite their inputs."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -7,10 +7,10 @@ from diff4splat.errors import ConfigError
 
 
 def require_inputs_kept(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
-    """Refuse a run whose output would replace one of its inputs.
+    """Reject an output that is also an input.
 
     Raises:
-        ConfigError: naming the file.
+        ConfigError: with the name of the file.
     """
     read = {_real(file) for file in inputs}
     for file in outputs:
