@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.captions.vocabulary import OPPOSITE
+from diff4splat.captions.vocabulary import OPPOSITE
 from diff4splat.data_prep.synthetic.cast import Cast
 from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.layout.plan import Placed, Plan

@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from diff4splat.data.clip import ClipMetadata, ObjectNote
-from diff4splat.data_prep.synthetic.action import direction_seen
-from diff4splat.data_prep.synthetic.assembly import Named
-from diff4splat.data_prep.synthetic.captions.colors import color_name
-from diff4splat.data_prep.synthetic.captions.grammar import (
+from diff4splat.captions.colors import color_name
+from diff4splat.captions.grammar import (
     CaptionFacts,
     Event,
-    Thing,
+    NamedObject,
     describe,
     motion_text,
 )
+from diff4splat.data.clip import ClipMetadata, ObjectNote
+from diff4splat.data_prep.synthetic.action import direction_seen
+from diff4splat.data_prep.synthetic.assembly import Named
 from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.materials import dominant_color
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
@@ -37,13 +37,15 @@ def facts_of(
     return CaptionFacts(
         place=scene if draws.chance(0.7) else "",
         events=events,
-        standing=standing,
+        static_objects=standing,
         camera=tuple((s.name, int(np.sign(s.amplitude))) for s in parse_path(path)),
     )
 
 
-def _thing(one: Named) -> Thing:
-    return Thing(color_name(dominant_color(one.textures[0])), FAMILIES[one.placed.family].noun)
+def _thing(one: Named) -> NamedObject:
+    return NamedObject(
+        color_name(dominant_color(one.textures[0])), FAMILIES[one.placed.family].noun
+    )
 
 
 def _event(one: Named, props: list[Named], camera: Camera, draws: Draws) -> Event:
@@ -53,7 +55,7 @@ def _event(one: Named, props: list[Named], camera: Camera, draws: Draws) -> Even
     if props and draws.chance(0.4):
         near = min(props, key=lambda other: float(np.linalg.norm(_middle(other) - _middle(one))))
         beside = _thing(near)
-    return Event(thing=_thing(one), motion=one.placed.motion, direction=direction, beside=beside)
+    return Event(subject=_thing(one), motion=one.placed.motion, direction=direction, beside=beside)
 
 
 def _middle(one: Named) -> np.ndarray:

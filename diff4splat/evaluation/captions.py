@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-from diff4splat.data.clip import Clip, ObjectNote
-from diff4splat.data_prep.synthetic.captions.grammar import (
+from diff4splat.captions.grammar import (
     Event,
-    Thing,
+    NamedObject,
     describe,
     parse_caption,
 )
+from diff4splat.data.clip import Clip, ObjectNote
 from diff4splat.errors import InputError
 from diff4splat.evaluation.text_measures import Wish, plain_caption
 
@@ -22,10 +22,10 @@ def grammar_caption(clip: Clip, note: ObjectNote, wish: Wish) -> str:
         facts = parse_caption(clip.note.caption)
     except InputError:
         return plain_caption(clip, note, wish)
-    thing = Thing(note.color, note.name)
+    thing = NamedObject(note.color, note.name)
     if wish == "still":
-        return describe(replace(facts, events=(), standing=(thing,)))
-    own = [event for event in facts.events if event.thing == thing and event.direction]
+        return describe(replace(facts, events=(), static_objects=(thing,)))
+    own = [event for event in facts.events if event.subject == thing and event.direction]
     motion = own[0].motion if own else MOTION
-    event = Event(thing=thing, motion=motion, direction=wish)
-    return describe(replace(facts, events=(event,), standing=()))
+    event = Event(subject=thing, motion=motion, direction=wish)
+    return describe(replace(facts, events=(event,), static_objects=()))

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[2]
 MOUNTED = ("models", "data_prep", "training", "configs")
 LAYERS = [  # lower may never import higher; the same row may not import each other
     {"errors", "jit"},
-    {"geometry", "flow", "metrics", "progress"},
+    {"captions", "geometry", "flow", "metrics", "progress"},
     {"paths"},
     {"scene"},
     {"render"},

@@ -172,7 +172,7 @@ def test_with_a_gpu_every_back_end_is_asked_twice(
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "a fast one")
     refusals = {"cpu": None, "cuda": "expected CPU tensors, got cuda"}
-    monkeypatch.setattr(installation, "refusal", lambda name, device: refusals[device])
+    monkeypatch.setattr(installation, "unsupported_reason", lambda name, device: refusals[device])
     monkeypatch.setattr(installation, "self_test", lambda: "fine")
     assert run(["doctor"]) == 0
     shown = capsys.readouterr().out

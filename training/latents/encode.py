@@ -14,10 +14,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.captions.mirror import mirrored_caption
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
-from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
 from diff4splat.errors import InputError
 from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.render_condition import render_condition_latent

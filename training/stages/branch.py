@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
+from diff4splat.captions.mirror import mirrored_caption
 from diff4splat.flow.path import add_noise, velocity_from_clean
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.factory import Networks

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.data_prep.synthetic.captions.paraphrase import said_otherwise
+from diff4splat.captions.paraphrase import paraphrase
 from diff4splat.models.text_encoder.encoder import tokenize
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
@@ -43,5 +43,5 @@ class TextConditionedStage(ModelStage):
         said = []
         for caption, own in zip(batch.captions, self.draw(batch, "words"), strict=True):
             draw, variant = torch.rand((), generator=own), torch.randint(12, (), generator=own)
-            said.append(said_otherwise(caption, float(draw), int(variant)))
+            said.append(paraphrase(caption, float(draw), int(variant)))
         return said

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from diff4splat.data_prep.synthetic.captions.vocabulary import VERBS
+from diff4splat.captions.vocabulary import VERBS
 from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.motions.act import Act, Performance, jointed, turning
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS, families_for

@@ -2,17 +2,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diff4splat.data_prep.synthetic.captions.colors import COLOR_NAMES, color_name
-from diff4splat.data_prep.synthetic.captions.counterfactual import rephrase
-from diff4splat.data_prep.synthetic.captions.grammar import (
+from diff4splat.captions.colors import COLOR_NAMES, color_name
+from diff4splat.captions.counterfactual import rephrase
+from diff4splat.captions.grammar import (
     CaptionFacts,
     Event,
-    Thing,
+    NamedObject,
     describe,
     motion_text,
     parse_caption,
 )
-from diff4splat.data_prep.synthetic.captions.vocabulary import (
+from diff4splat.captions.vocabulary import (
     CAMERA_MOVES,
     DIRECTIONS,
     NOUNS,
@@ -36,8 +36,8 @@ places = st.sampled_from(["", *PLACES])
 
 
 def event_of(thing: tuple, motion: str, direction: str, beside: tuple | None) -> Event:
-    other = Thing(*beside) if beside else None
-    return Event(thing=Thing(*thing), motion=motion, direction=direction, beside=other)
+    other = NamedObject(*beside) if beside else None
+    return Event(subject=NamedObject(*thing), motion=motion, direction=direction, beside=other)
 
 
 @settings(max_examples=60, deadline=None)
@@ -54,7 +54,7 @@ def test_what_is_described_is_parsed_again(
     facts = CaptionFacts(
         place=place,
         events=tuple(event_of(*one) for one in told),
-        standing=() if told else tuple(Thing(*one) for one in stands),
+        static_objects=() if told else tuple(NamedObject(*one) for one in stands),
         camera=tuple(camera),
     )
     assert parse_caption(describe(facts, variant)) == facts
@@ -69,7 +69,7 @@ def test_every_phrase_means_one_thing(table: dict) -> None:
 
 
 def test_an_example() -> None:
-    event = Event(thing=Thing("red", "torus"), motion="rolls", direction="left")
+    event = Event(subject=NamedObject("red", "torus"), motion="rolls", direction="left")
     facts = CaptionFacts(events=(event,), camera=(("orbit", 1),))
     caption = "a red torus rolls to the left, the camera circles right"
     assert describe(facts) == caption
@@ -78,7 +78,7 @@ def test_an_example() -> None:
 
 
 def test_articles() -> None:
-    facts = CaptionFacts(standing=(Thing("orange", "arch"),))
+    facts = CaptionFacts(static_objects=(NamedObject("orange", "arch"),))
     assert describe(facts) == "nothing moves around an orange arch"
 
 
@@ -98,8 +98,8 @@ def test_counterfactuals() -> None:
     ("caption", "words"),
     [
         ("", "what moves"),
-        ("a red blob rolls", "a thing such as"),
-        ("red ball rolls", "a thing such as"),
+        ("a red blob rolls", "an object such as"),
+        ("red ball rolls", "an object such as"),
         ("a red ball explodes", "a motion"),
         ("a red ball rolls, the camera dances", "a camera move"),
         ("nothing moves, a red ball rolls", "nothing after stillness"),

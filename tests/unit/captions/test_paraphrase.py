@@ -4,22 +4,22 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from diff4splat.data_prep.synthetic.captions.colors import COLOR_NAMES
-from diff4splat.data_prep.synthetic.captions.grammar import (
+from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.grammar import (
     CaptionFacts,
     Event,
-    Thing,
+    NamedObject,
     describe,
     parse_caption,
 )
-from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
-from diff4splat.data_prep.synthetic.captions.paraphrase import (
-    PLAIN,
-    REWORDED,
-    SHORT,
-    said_otherwise,
+from diff4splat.captions.mirror import mirrored_caption
+from diff4splat.captions.paraphrase import (
+    PLAIN_BELOW,
+    SHORT_BELOW,
+    SYNONYMS_BELOW,
+    paraphrase,
 )
-from diff4splat.data_prep.synthetic.captions.vocabulary import (
+from diff4splat.captions.vocabulary import (
     CAMERA_MOVES,
     DIRECTIONS,
     NOUNS,
@@ -51,17 +51,17 @@ examples = settings(max_examples=60, deadline=None)
 def facts_of(parts: dict) -> CaptionFacts:
     told = [
         Event(
-            thing=Thing(*thing),
+            subject=NamedObject(*thing),
             motion=motion,
             direction=direction,
-            beside=Thing(*beside) if beside else None,
+            beside=NamedObject(*beside) if beside else None,
         )
         for thing, motion, direction, beside in parts["told"]
     ]
     return CaptionFacts(
         place=parts["place"],
         events=tuple(told),
-        standing=() if told else tuple(Thing(*one) for one in parts["stands"]),
+        static_objects=() if told else tuple(NamedObject(*one) for one in parts["stands"]),
         camera=tuple(parts["camera"]),
     )
 
@@ -79,10 +79,10 @@ def test_a_mirror_image_of_a_mirror_image_is_the_thing_itself(parts: dict, varia
 def test_mirrors_exchange_left_and_right_and_nothing_else(parts: dict, variant: int) -> None:
     facts = facts_of(parts)
     seen = parse_caption(mirrored_caption(describe(facts, variant)))
-    assert (seen.place, seen.standing) == (facts.place, facts.standing)
+    assert (seen.place, seen.static_objects) == (facts.place, facts.static_objects)
     for event, other in zip(facts.events, seen.events, strict=True):
-        assert (other.thing, other.motion, other.beside) == (
-            event.thing, event.motion, event.beside,
+        assert (other.subject, other.motion, other.beside) == (
+            event.subject, event.motion, event.beside,
         )  # fmt: skip
         assert other.direction == IN_A_MIRROR.get(event.direction, event.direction)
 
@@ -130,22 +130,22 @@ def test_words_of_another_grammar_are_exchanged_one_by_one(caption: str, mirrore
 
 
 @examples
-@given(parts=captions, draw=st.floats(PLAIN, 1, exclude_max=True), variant=variants)
+@given(parts=captions, draw=st.floats(PLAIN_BELOW, 1, exclude_max=True), variant=variants)
 def test_sentences_of_the_grammar_say_what_is_true(parts: dict, draw: float, variant: int) -> None:
     facts = facts_of(parts)
-    said = parse_caption(said_otherwise(describe(facts), draw, variant))
-    assert (said.events, said.standing) == (facts.events, facts.standing)
-    if draw < SHORT:
+    said = parse_caption(paraphrase(describe(facts), draw, variant))
+    assert (said.events, said.static_objects) == (facts.events, facts.static_objects)
+    if draw < SHORT_BELOW:
         assert (said.place, said.camera) == ("", ())
     else:
         assert said == facts
 
 
 @examples
-@given(parts=captions, draw=st.floats(0, PLAIN, exclude_max=True), variant=variants)
+@given(parts=captions, draw=st.floats(0, PLAIN_BELOW, exclude_max=True), variant=variants)
 def test_plain_sentences_say_one_true_thing(parts: dict, draw: float, variant: int) -> None:
     facts = facts_of(parts)
-    said = said_otherwise(describe(facts), draw, variant)
+    said = paraphrase(describe(facts), draw, variant)
     if not facts.events:
         assert said == "nothing moves"
         return
@@ -154,9 +154,9 @@ def test_plain_sentences_say_one_true_thing(parts: dict, draw: float, variant: i
     named = said.removeprefix("the ")
     article = "an" if named[0] in "aeiou" else "a"
     (event,) = parse_caption(f"{article} {named}").events
-    told = [(one.thing, one.direction) for one in facts.events]
-    assert (event.thing, event.direction) in told
-    motions = {one.motion for one in facts.events if one.thing == event.thing}
+    told = [(one.subject, one.direction) for one in facts.events]
+    assert (event.subject, event.direction) in told
+    motions = {one.motion for one in facts.events if one.subject == event.subject}
     assert event.motion in (motions if not event.direction else motions | {"slides"})
     assert event.beside is None
 
@@ -168,22 +168,22 @@ def test_plain_sentences_are_about_each_thing_in_turn(told: list) -> None:
     facts = facts_of({"place": "", "told": told, "stands": [], "camera": []})
     caption = describe(facts)
     for variant, event in enumerate(facts.events):
-        start = f"the {event.thing.color} {event.thing.noun} "
-        assert said_otherwise(caption, 0.0, variant).startswith(start)
+        start = f"the {event.subject.color} {event.subject.noun} "
+        assert paraphrase(caption, 0.0, variant).startswith(start)
 
 
 def test_examples() -> None:
     caption = "in a room, a red ball rolls to the left beside a blue box, the camera rises"
-    assert said_otherwise(caption, 0.0, 0) == "the red ball slides to the left"
-    assert said_otherwise(caption, 0.0, 2) == "the red ball moves to the left"
-    assert said_otherwise(caption, PLAIN, 0) == "a red ball rolls to the left beside a blue box"
-    assert said_otherwise(caption, SHORT, 1).startswith(
+    assert paraphrase(caption, 0.0, 0) == "the red ball slides to the left"
+    assert paraphrase(caption, 0.0, 2) == "the red ball moves to the left"
+    assert paraphrase(caption, PLAIN_BELOW, 0) == "a red ball rolls to the left beside a blue box"
+    assert paraphrase(caption, SHORT_BELOW, 1).startswith(
         "in a room, a red ball is rolling to the le"
     )
-    assert said_otherwise(caption, REWORDED, 1) == caption
+    assert paraphrase(caption, SYNONYMS_BELOW, 1) == caption
 
 
 @pytest.mark.parametrize("draw", [0.0, 0.3, 0.5, 0.9])
 @pytest.mark.parametrize("caption", ["", "a dog runs to the left.", "the camera rises"])
 def test_captions_of_another_grammar_stay(caption: str, draw: float) -> None:
-    assert said_otherwise(caption, draw, 3) == caption
+    assert paraphrase(caption, draw, 3) == caption

@@ -1,7 +1,7 @@
-"""Names of colours, as people would say them.
+"""Colour names.
 
-The nearest of a few anchors in CIELAB (D65), with lightness counted less than hue because shading
-changes it: d² = (0.55 ΔL)² + Δa² + Δb².
+The name of the nearest anchor in CIELAB (D65): d² = (0.55 ΔL)² + Δa² + Δb². Lightness has a lower
+weight because shading changes it.
 """
 
 from functools import cache
@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.palettes import linear_from_hex
+from diff4splat.captions.srgb import linear_from_hex
 
 _ANCHORS = {
     "red": "b52b2b d0453f 8c2320 a83a34",
@@ -34,10 +34,10 @@ COLOR_NAMES = tuple(_ANCHORS)
 
 
 def color_name(linear: Float64[np.ndarray, "3"]) -> str:
-    """What a linear RGB colour is called."""
+    """The name of a linear RGB colour."""
     names, anchors = _anchors()
-    away = ((anchors - _lab(linear)) * np.array([0.55, 1.0, 1.0])) ** 2
-    return names[int(away.sum(1).argmin())]
+    squared_distance = ((anchors - _lab(linear)) * np.array([0.55, 1.0, 1.0])) ** 2
+    return names[int(squared_distance.sum(1).argmin())]
 
 
 @cache

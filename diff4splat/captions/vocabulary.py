@@ -1,7 +1,7 @@
-"""The words of captions: every phrase belongs to one motion, direction, place or camera move."""
+"""The words of captions.
 
-from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
-from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
+Every phrase belongs to exactly one motion, direction, place or camera move.
+"""
 
 DIRECTIONS = {
     "left": "to the left",
@@ -57,5 +57,71 @@ CAMERA_MOVES: dict[tuple[str, int], tuple[str, ...]] = {
     ("dolly-zoom", 1): ("moves in while the lens widens", "dollies in and widens"),
     ("dolly-zoom", -1): ("moves back while the lens narrows", "dollies out and narrows"),
 }
-PLACES = {name: kind.phrase for name, kind in SCENE_KINDS.items()}
-NOUNS = tuple(sorted({family.noun for family in FAMILIES.values()}))
+PLACES = {
+    "room": "in a room",
+    "tabletop": "on a table",
+    "meadow": "in a meadow",
+    "garden": "in a garden",
+    "dunes": "on sand",
+    "street": "in a street",
+    "courtyard": "in a courtyard",
+    "seabed": "under water",
+}
+NOUNS = (
+    "arch",
+    "ball",
+    "balloon",
+    "banner",
+    "barrel",
+    "bench",
+    "bird",
+    "bookcase",
+    "bottle",
+    "bowl",
+    "box",
+    "building",
+    "bush",
+    "capsule",
+    "car",
+    "caterpillar",
+    "chair",
+    "cone",
+    "crate",
+    "cylinder",
+    "drum",
+    "fence",
+    "fir tree",
+    "fish",
+    "flag",
+    "flight of steps",
+    "flower",
+    "four-legged animal",
+    "gear",
+    "heart",
+    "house",
+    "lamp",
+    "letter",
+    "mug",
+    "mushroom",
+    "pillar",
+    "potted plant",
+    "pumpkin",
+    "robot arm",
+    "rock",
+    "rounded block",
+    "snake",
+    "sofa",
+    "stack of books",
+    "star",
+    "stool",
+    "street lamp",
+    "table",
+    "torus",
+    "towel",
+    "tower",
+    "tree",
+    "tuft of grass",
+    "vase",
+    "wall",
+    "windmill",
+)
