@@ -9,7 +9,7 @@ from typing import Any
 
 from ablations.results import Row, difference
 from diff4splat.evaluation.columns import column_of
-from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.io.atomic import atomic_path
 from diff4splat.io.figures import DPI
 

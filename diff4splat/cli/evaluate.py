@@ -1,7 +1,7 @@
 """``diff4splat eval``: measure a model on test clips, beside trivial baselines.
 
 --protocol ── load_protocol ── open_clips ─┐
---model ───── Diff4SplatPipeline ── subject ┴─ evaluate ─ results.json, results.md, items.png
+--model ───── Diff4SplatPipeline ─── system ┴─ evaluate ─ results.json, results.md, items.png
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from diff4splat.evaluation.systems import Subject
+    from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +43,11 @@ class Evaluate:
         from diff4splat.cli.installation import single_gaussian
         from diff4splat.cli.renderer import prepare_renderer
         from diff4splat.cli.worlds import prepare_sources
-        from diff4splat.evaluation.captions import grammar_caption
-        from diff4splat.evaluation.datasets import open_clips
-        from diff4splat.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
-        from diff4splat.evaluation.measuring import Setup
-        from diff4splat.evaluation.protocol_json import load_protocol
+        from diff4splat.evaluation.evaluate import OUTPUT_FILES, RunLimits, evaluate
+        from diff4splat.evaluation.measure_item import Setup
+        from diff4splat.evaluation.measures.captions import grammar_caption
+        from diff4splat.evaluation.protocols.datasets import open_clips
+        from diff4splat.evaluation.protocols.protocol_json import load_protocol
         from diff4splat.metrics.features.load import load_features
 
         loaded, phases = load_protocol(self.protocol), ConsolePhases()
@@ -55,34 +55,33 @@ class Evaluate:
             loaded = replace(loaded, protocol=loaded.protocol.at_size((self.size, self.size)))
         features, clips = load_features(self.features), open_clips(loaded)
         with phases.phase("load model"):
-            subject = self.subject()
+            system = self.system()
         protocol = loaded.protocol
         setup = Setup(
             protocol=protocol,
             task=self.task,
-            subject=subject,
+            system=system,
             features=features,
             captioner=grammar_caption,
         )
         prepare_renderer(single_gaussian("cpu"), phases)
         prepare_sources([protocol.source], phases)
-        extent = Extent(limit=self.items, fresh=self.fresh)
-        found = evaluate(clips, setup, self.out, extent, phases)
-        print(found.markdown)
-        if found.outcome.taken_up:
-            note(
-                f"{found.outcome.taken_up} items were measured before; --fresh measures them again"
-            )
-        for failure in found.outcome.failures:
+        limits = RunLimits(limit=self.items, fresh=self.fresh)
+        evaluation = evaluate(clips, setup, self.out, limits, phases)
+        print(evaluation.markdown)
+        if evaluation.outcome.resumed:
+            resumed = evaluation.outcome.resumed
+            note(f"{resumed} items were measured before; --fresh measures them again")
+        for failure in evaluation.outcome.failures:
             note(f"failed: item {failure.item} ({failure.clip}): {failure.why}")
         note(f"wrote {', '.join(OUTPUT_FILES)} to {self.out}")
 
-    def subject(self) -> "Subject":
-        """The model in the role that the task asks for."""
+    def system(self) -> "EvaluatedSystem":
+        """The model as the system of the task."""
         from dataclasses import replace
         from functools import partial
 
-        from diff4splat.evaluation.systems import (
+        from diff4splat.evaluation.systems.evaluated_system import (
             Generator,
             Reconstructor,
             model_identity,

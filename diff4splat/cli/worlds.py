@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from diff4splat.evaluation.protocol import SourceRange
+    from diff4splat.evaluation.protocols.protocol import SourceRange
     from diff4splat.progress.phases import Phases
     from diff4splat.training.recipe import SourceSettings
 
