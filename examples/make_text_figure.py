@@ -10,7 +10,7 @@ import torch
 
 from diff4splat import Diff4SplatPipeline
 from diff4splat.generation.input_image import load_image
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.models.hub.pretrained import find_multiple_px, find_side_px
 from diff4splat.render.api import render
 

@@ -25,7 +25,7 @@ from diff4splat.cli.renderer import prepare_renderer
 from diff4splat.cli.worlds import prepare_sources
 from diff4splat.errors import Diff4SplatError
 from diff4splat.io.atomic import write_text
-from diff4splat.io.figures import require_matplotlib
+from diff4splat.io.figures.plots import require_matplotlib
 
 BAD_INPUT, INTERRUPTED = 2, 130
 

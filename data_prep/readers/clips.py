@@ -23,7 +23,7 @@ from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.data_prep.readers.places import Place
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.geometry.camera import Camera, join_cameras
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 LOOKS_LIKE = "manifest.json of a folder of clips (diff4splat-clips)"
 

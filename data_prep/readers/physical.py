@@ -28,8 +28,8 @@ from diff4splat.data_prep.readers.places import Place, inside
 from diff4splat.data_prep.readers.shots import Draft, Shot
 from diff4splat.errors import FileFormatError
 from diff4splat.geometry.optics import Optics
-from diff4splat.io.camera_record import FILE, CameraRecord, read_camera_record
-from diff4splat.io.optics_json import optics_json
+from diff4splat.io.cameras.camera_record import FILE, CameraRecord, read_camera_record
+from diff4splat.io.cameras.optics_json import optics_json
 
 LOOKS_LIKE = "camera.json beside its pictures, or folders of these (diff4splat render --dataset)"
 

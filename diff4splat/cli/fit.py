@@ -150,7 +150,7 @@ class Fit:
 
     def initial_scene(self) -> "Scene | None":
         """What to start from."""
-        from diff4splat.io.scene_file import load_scene
+        from diff4splat.io.scene_files.scene_file import load_scene
 
         return None if self.init is None else load_scene(self.init)
 

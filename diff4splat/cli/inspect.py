@@ -73,7 +73,7 @@ def scene_lines(file: Path) -> list[str]:
     """Counts, times, cameras and provenance of a scene file."""
     from dataclasses import asdict
 
-    from diff4splat.io.scene_file import load_scene
+    from diff4splat.io.scene_files.scene_file import load_scene
     from diff4splat.scene.extent import depth_range
 
     scene = load_scene(file)

@@ -45,7 +45,7 @@ class Render:
         """Load, choose cameras and times, render, write."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.cli.renderer import left_out, prepare_renderer
-        from diff4splat.io.scene_file import load_scene
+        from diff4splat.io.scene_files.scene_file import load_scene
         from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, write_view
         from diff4splat.progress.run_log import RunLog
 
@@ -79,17 +79,17 @@ class Render:
         """Render with a physical camera."""
         from diff4splat.cli.console import note
         from diff4splat.cli.render_physical import render_dataset, render_file
-        from diff4splat.outputs.photographs import stopped
+        from diff4splat.outputs.photo_sequence import freeze_time
 
         if self.dataset:
             render_dataset(scene, path, self.optics, self.out, self.time, log)
         else:
-            render_file(stopped(scene, self.time), path, self.optics, self.out, self.frame, log)
+            render_file(freeze_time(scene, self.time), path, self.optics, self.out, self.frame, log)
         note(f"wrote {self.out}")
 
     def chosen_path(self, scene: "Scene") -> "CameraPath":
         """Cameras at the requested size, with their times."""
-        from diff4splat.paths.picture_size import resized
+        from diff4splat.paths.resize import resized
         from diff4splat.paths.settings import PathFrame
         from diff4splat.scene.extent import depth_range
 

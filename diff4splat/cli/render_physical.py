@@ -63,10 +63,10 @@ def render_dataset(
         require_empty,
         write_camera_dataset,
     )
-    from diff4splat.outputs.photographs import stopped
+    from diff4splat.outputs.photo_sequence import freeze_time
 
     require_empty(out)
-    sequences, notes = choose_effects(stopped(scene, time_s), path, options)
+    sequences, notes = choose_effects(freeze_time(scene, time_s), path, options)
     for line in notes:
         note(line)
     settings = to_photo_settings(options)
@@ -85,7 +85,7 @@ def precompile_renderers(
 ) -> None:
     """Compile the renderers of these sequences, unless they are compiled."""
     from diff4splat.cli.renderer import compile_ahead, prepare_renderer
-    from diff4splat.outputs.photographs import needs_rays
+    from diff4splat.outputs.photo_sequence import needs_rays
     from diff4splat.render.trace import warm
 
     traced = [needs_rays(scene, physical_path, settings) for physical_path in sequences]
@@ -96,6 +96,6 @@ def precompile_renderers(
 
 
 def _is_wider_than_half_space(physical_path: "PhysicalPath") -> bool:
-    from diff4splat.outputs.photographs import geometry_kind
+    from diff4splat.outputs.photo_sequence import geometry_kind
 
     return geometry_kind(physical_path) == "distance"

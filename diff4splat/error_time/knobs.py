@@ -12,11 +12,11 @@ from typing import Any
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knob:
+class ApproximationSetting:
     """One approximation: what it may be set to, and against what it is measured."""
 
     name: str
@@ -57,9 +57,9 @@ class Knob:
 class KnobRegistry:
     """Knobs by name, in the order in which they were registered."""
 
-    _knobs: dict[str, Knob] = field(default_factory=dict)
+    _knobs: dict[str, ApproximationSetting] = field(default_factory=dict)
 
-    def register(self, knob: Knob) -> None:
+    def register(self, knob: ApproximationSetting) -> None:
         """Add a knob.
 
         Raises:
@@ -69,7 +69,7 @@ class KnobRegistry:
             raise ConfigError(f"knob {knob.name}: expected a new name, got one that is taken")
         self._knobs[knob.name] = knob
 
-    def knobs(self, names: tuple[str, ...] = ()) -> tuple[Knob, ...]:
+    def knobs(self, names: tuple[str, ...] = ()) -> tuple[ApproximationSetting, ...]:
         """All knobs, or those of the given names.
 
         Raises:

@@ -19,7 +19,7 @@ from diff4splat.evaluation.report.result_store import NAME, ItemStore, run_key
 from diff4splat.evaluation.report.summary import Summary, paired_differences, summarize
 from diff4splat.evaluation.runner import Outcome, require_results, run_items
 from diff4splat.io.atomic import atomic_folder
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.progress.phases import Phases
 
 OUTPUT_FILES = ("results.json", "results.md", "items.png", "differences.png")

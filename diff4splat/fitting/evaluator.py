@@ -16,7 +16,7 @@ from diff4splat.fitting.frame_renderer import Sight, counted
 from diff4splat.fitting.optics.camera_model import CameraModel
 from diff4splat.fitting.pictures import FrameStore
 from diff4splat.metrics.image import psnr
-from diff4splat.metrics.structure import WINDOW_PX, ssim
+from diff4splat.metrics.ssim import WINDOW_PX, ssim
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians

@@ -42,7 +42,7 @@ from diff4splat.fitting.settings import FitSettings
 from diff4splat.fitting.stage_loop import Course, StageLoop
 from diff4splat.fitting.static_detection import error_variation
 from diff4splat.progress.phases import Phases
-from diff4splat.progress.skipped import Omissions
+from diff4splat.progress.skipped import SkippedWorkList
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
@@ -78,7 +78,7 @@ class FitResult:
     held_out: list[FrameQuality]
     training: list[FrameQuality]
     """A few frames that were learnt from."""
-    omissions: Omissions
+    omissions: SkippedWorkList
     sight: Sight
     """What made the pictures."""
     cameras: CameraModel | None
@@ -116,7 +116,7 @@ class _Fit:
         self.schedule = Schedule(self.capture, self.settings.views_per_step, self.settings.seed)
         self.judge = Judge(sight=self.sight, store=self.store)
         self.recorder = Recorder(folder=asked.folder, note=asked.note)
-        self.omissions = Omissions()
+        self.omissions = SkippedWorkList()
         self.fingerprint = fingerprint(self.capture, self.settings, asked.init)
         self.began = time.perf_counter()
 

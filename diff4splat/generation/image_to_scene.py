@@ -32,7 +32,7 @@ def animate_image(
 ) -> tuple[Canonical, Motion]:
     """Gaussians of ``picture`` and where they go; ``context`` are the cameras of the video."""
     why, saved = "the draft is nearer to the truth", f"the draft, {wish.settings.steps} steps"
-    log.left_out("sampled video", why, saved)
+    log.record_skipped("sampled video", why, saved)
     with log.phases.phase("reconstruct"):
         latent = model.networks.vae.encode(picture.rgb.movedim(-1, 0)[None, :, None] * 2 - 1).mean
         video = VideoLatent(latent=latent, picture=picture, cameras=context.cameras[:1])
@@ -63,7 +63,7 @@ def note_guidance(calls: CallCount, unprompted: bool, guidance: Guidance, log: R
     """Say which passes of guidance were left out."""
     if calls.saved:
         why = "no prompt" if unprompted else why_unguided(guidance)
-        log.left_out("guidance pass", why, f"{calls.saved} network calls")
+        log.record_skipped("guidance pass", why, f"{calls.saved} network calls")
 
 
 def input_depth(canonical: Canonical, config: ModelConfig) -> Float[Tensor, "h w"]:

@@ -47,7 +47,7 @@ def canonical_scene(model: Model, video: VideoLatent, min_opacity: float, log: R
         whole = reconstruct_detailed(maps, sight, config.activation, log)
     else:
         why = "the scene is decoded from latents"
-        log.left_out("video decoder", why, "decoding every frame")
+        log.record_skipped("video decoder", why, "decoding every frame")
         base = plane_base(
             video.picture.rgb, video.picture.camera, video.cameras, config.ldrm.grid_stride
         )

@@ -178,7 +178,9 @@ class Diff4SplatPipeline:
             canonical = canonical_scene(self.model, video, request.settings.min_opacity, log)
         told = self._told(canonical, made, request.picture)
         if alone and told is not None:
-            log.left_out("sampled pictures", "the draft is nearer to the truth", "later key frames")
+            log.record_skipped(
+                "sampled pictures", "the draft is nearer to the truth", "later key frames"
+            )
             return canonical, motion_from_offsets(canonical, context.times_s, told)
         return canonical, self._motion(canonical, context, told, log)
 
@@ -227,7 +229,7 @@ class Diff4SplatPipeline:
         if prompt is None:
             built = self.model.networks.text_encoder is not None
             saved = "one call" if built else "the whole network: it was not built"
-            log.left_out("text encoder", "no prompt", saved)
+            log.record_skipped("text encoder", "no prompt", saved)
             return None
         require_prompt(prompt, self.model.config.text.max_bytes)
         with log.phases.phase("encode text"):

@@ -38,9 +38,9 @@ def base_motion(context: CameraPath) -> StaticMotion:
 def leave_out_video(prompt: str | None, steps: int, log: RunLog) -> None:
     """Tell which networks did not run, and that a prompt says nothing to the others."""
     if prompt is not None:
-        log.left_out("text encoder", UNTRAINED_VIDEO, "the whole network: it was not built")
+        log.record_skipped("text encoder", UNTRAINED_VIDEO, "the whole network: it was not built")
     saved = f"{steps} steps of the sampler and four networks"
-    log.left_out("video model and reconstruction", UNTRAINED_VIDEO, saved)
+    log.record_skipped("video model and reconstruction", UNTRAINED_VIDEO, saved)
 
 
 def _no_tokens(raw: Float[Tensor, "1 c t h w"]) -> Float[Tensor, "1 0 0 0 0"]:

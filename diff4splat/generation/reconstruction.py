@@ -78,7 +78,7 @@ def reconstruct_detailed(
     found = canonical_gaussians(maps, sight, config)
     if found.doubled:
         why, saved = "an earlier key frame shows the same points", f"{found.doubled:,} Gaussians"
-        log.left_out("doubled pixels", why, saved)
+        log.record_skipped("doubled pixels", why, saved)
     return Canonical(gaussians=found.gaussians, cells=found.cells, maps=maps, backing=found.backing)
 
 
@@ -94,7 +94,7 @@ def prune_cells(canonical: Canonical, min_opacity: float, log: RunLog) -> Canoni
         )
     if dropped:
         faintest = float(opacities[~kept].max())
-        log.left_out(
+        log.record_skipped(
             "faint Gaussians",
             f"opacity below {min_opacity:g}",
             f"{dropped:,} of {len(kept):,} Gaussians",
@@ -162,7 +162,7 @@ def deform(
     """
     start_s, stop_s = float(key_times_s[0]), float(key_times_s[-1])
     if network.is_identity and told is None:
-        log.left_out(
+        log.record_skipped(
             "deformation network",
             "its output layers are zero, so nothing can move",
             f"{len(key_times_s)} network calls and all key times",

@@ -33,7 +33,7 @@ def prune_static_tracks(scene: Scene, camera: Camera, still_px: float, log: RunL
     if still == 0:
         return scene
     why = f"they move by at most {still_px:g} px"
-    log.left_out("key times of still Gaussians", why, f"{still:,} tracks", still_px)
+    log.record_skipped("key times of still Gaussians", why, f"{still:,} tracks", still_px)
     return replace(scene, motion=keep_moving(scene.motion, moves))
 
 

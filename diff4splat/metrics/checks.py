@@ -13,7 +13,7 @@ from torch import Tensor
 from diff4splat.errors import ShapeError
 
 
-def widen(*tensors: Tensor) -> tuple[Tensor, ...]:
+def promote(*tensors: Tensor) -> tuple[Tensor, ...]:
     """All in their common dtype, but at least float32."""
     dtype = torch.float32
     for tensor in tensors:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from diff4splat.progress.phases import Phases
-from diff4splat.progress.skipped import Omissions, SkippedWork
+from diff4splat.progress.skipped import SkippedWork, SkippedWorkList
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -11,8 +11,8 @@ class RunLog:
     """Handed down through a command; silent unless its phases draw."""
 
     phases: Phases = field(default_factory=Phases)
-    omissions: Omissions = field(default_factory=Omissions)
+    skipped: SkippedWorkList = field(default_factory=SkippedWorkList)
 
-    def left_out(self, what: str, why: str, saved: str, error: float = 0.0) -> None:
+    def record_skipped(self, what: str, why: str, saved: str, error: float = 0.0) -> None:
         """Record one thing that this run did not need."""
-        self.omissions.add(SkippedWork(what=what, why=why, saved=saved, error=error))
+        self.skipped.add(SkippedWork(what=what, why=why, saved=saved, error=error))

@@ -34,7 +34,7 @@ class SkippedWork:
 
 
 @dataclass(slots=True)
-class Omissions:
+class SkippedWorkList:
     """Collects omissions while a command runs."""
 
     _records: list[SkippedWork] = field(default_factory=list)

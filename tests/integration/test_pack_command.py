@@ -9,7 +9,7 @@ from packed_models import TRAINED, packed_folder, ship, trained_folder
 from training_commands import refusal
 
 from diff4splat.cli.main import run
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.pretrained import load_model
 from diff4splat.models.hub.weights import part_file, weights_sha256

@@ -14,10 +14,10 @@ from diff4splat.cli.options.lens import build_lens
 from diff4splat.cli.options.optics import OpticsOptions, require_consistent
 from diff4splat.cli.options.physical_path import choose_effects, choose_optics, to_photo_settings
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.io.camera_record import read_camera_record
+from diff4splat.io.cameras.camera_record import read_camera_record
 from diff4splat.io.exr import read_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.outputs.camera_dataset.sequences import EFFECTS
 from diff4splat.render.physical.api import photograph
 

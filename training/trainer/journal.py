@@ -8,7 +8,7 @@ from typing import Any
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.trainer.board import Board
 from diff4splat.training.trainer.divergence import SNAPSHOT_FILE, write_snapshot

@@ -52,8 +52,8 @@ def _preset(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPa
 
 def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
     """The poses and times of the file, resampled if a frame count or rate is given."""
-    from diff4splat.io.path_files import read_path
-    from diff4splat.paths.picture_size import resized
+    from diff4splat.io.cameras.path_files import read_path
+    from diff4splat.paths.resize import resized
     from diff4splat.paths.spline import resample
 
     if options.amplitude is not None:

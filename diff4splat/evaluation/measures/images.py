@@ -20,7 +20,7 @@ from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.metrics.image import psnr
 from diff4splat.metrics.masked import mean_or_nan
 from diff4splat.metrics.perceptual import perceptual_distance
-from diff4splat.metrics.structure import ssim
+from diff4splat.metrics.ssim import ssim
 from diff4splat.training.batches.scale import valid_depth
 
 Entries = list[Score | Skip]

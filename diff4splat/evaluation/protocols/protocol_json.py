@@ -10,7 +10,7 @@ from pathlib import Path
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.evaluation.protocols.protocol import VERSION, Protocol
-from diff4splat.io.existing import require_file
+from diff4splat.io.require_file import require_file
 from diff4splat.training.typed_json import TypedReader
 
 FORMAT = "diff4splat-evaluation"

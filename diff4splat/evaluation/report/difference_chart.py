@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.io.sheet_canvas import FAINT, Canvas, Style
+from diff4splat.io.figures.page_layout import FAINT, Canvas, Style
 
 _SIZE, _MARGIN, _PLOT_HEIGHT = (960, 420), 40, 280
 _BETTER, _WORSE, _PAPER, _AXIS = (0.34, 0.71, 0.91), (0.84, 0.37, 0.0), 0.1, 0.6

@@ -21,8 +21,8 @@ from diff4splat.evaluation.report.summary import Summary
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.evaluation.systems.baselines import make_baseline
 from diff4splat.evaluation.systems.predictions import ScenePrediction
-from diff4splat.io.depth_colors import colorize, robust_range
-from diff4splat.io.sheet_canvas import FAINT, Canvas, Style, fitted
+from diff4splat.io.figures.depth_colors import colorize, robust_range
+from diff4splat.io.figures.page_layout import FAINT, Canvas, Style, fitted
 
 _CELL, _GAP, _MARGIN = 220, 12, 30
 _TITLE, _BODY, _SMALL = Style(size_px=30), Style(size_px=18), Style(size_px=15, color=FAINT)

@@ -19,18 +19,23 @@ from torch import Tensor
 from diff4splat import __version__
 from diff4splat.errors import ConfigError
 from diff4splat.io.atomic import atomic_folder, write_text
-from diff4splat.io.camera_record import (
+from diff4splat.io.cameras.camera_record import (
     FILE,
     CameraRecord,
+    FrameRecord,
     GeometryKind,
-    TakenFrame,
     write_camera_record,
 )
+from diff4splat.io.cameras.optics_json import optics_json
 from diff4splat.io.exr import write_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.optics_json import optics_json
+from diff4splat.io.photos.images import write_png
 from diff4splat.outputs.camera_dataset.sheet import SheetRow, camera_sheet, thumbnail
-from diff4splat.outputs.photographs import Taken, geometry_kind, photographs, stopped
+from diff4splat.outputs.photo_sequence import (
+    CaptureStats,
+    freeze_time,
+    geometry_kind,
+    render_photographs,
+)
 from diff4splat.paths.physical_path import PhysicalPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.physical.settings import Photograph, PhotoSettings
@@ -65,7 +70,7 @@ class _Sequence:
     folder: Path
 
 
-def write_camera_dataset(job: DatasetJob, folder: Path, log: RunLog) -> dict[str, Taken]:
+def write_camera_dataset(job: DatasetJob, folder: Path, log: RunLog) -> dict[str, CaptureStats]:
     """Film and write everything, whole or not at all; returns what each sequence needed.
 
     Raises:
@@ -100,13 +105,13 @@ def require_empty(folder: Path) -> None:
         )
 
 
-def _write_sequence(job: DatasetJob, own: _Sequence, log: RunLog) -> tuple[Taken, SheetRow]:
-    taken, pictures = Taken(), []
+def _write_sequence(job: DatasetJob, own: _Sequence, log: RunLog) -> tuple[CaptureStats, SheetRow]:
+    taken, pictures = CaptureStats(), []
     count = len(own.filmed)
     shown = set(torch.linspace(0, count - 1, min(count, SHOWN)).round().int().tolist())
     with log.phases.phase(own.name, count) as advance:
-        frames = photographs(
-            stopped(job.scene, job.time_s),
+        frames = render_photographs(
+            freeze_time(job.scene, job.time_s),
             own.filmed,
             ("rgb", own.kind),
             job.settings,
@@ -143,8 +148,8 @@ def _shown(photo: Photograph) -> Float[Tensor, "h w 3"]:
     return torch.where(photo.valid[..., None], photo.rgb, BLIND_GREY)
 
 
-def _write_frame(own: _Sequence, index: int, photo: Photograph) -> TakenFrame:
-    files = TakenFrame(
+def _write_frame(own: _Sequence, index: int, photo: Photograph) -> FrameRecord:
+    files = FrameRecord(
         picture=f"frame_{index:04d}.png", geometry=f"{own.kind}/frame_{index:04d}.exr"
     )
     write_png(photo.rgb, own.folder / files.picture)
@@ -160,7 +165,7 @@ def _write_frame(own: _Sequence, index: int, photo: Photograph) -> TakenFrame:
     return files
 
 
-def _contents(job: DatasetJob, taken: Mapping[str, Taken]) -> dict[str, object]:
+def _contents(job: DatasetJob, taken: Mapping[str, CaptureStats]) -> dict[str, object]:
     """What lies where."""
     first = next(iter(job.sequences.values()))
     return {

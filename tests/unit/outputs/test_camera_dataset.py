@@ -13,13 +13,13 @@ from diff4splat.geometry.lenses.build import equirectangular_camera, fisheye_cam
 from diff4splat.geometry.lenses.equirectangular import Equirectangular
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
-from diff4splat.io.camera_record import read_camera_record
+from diff4splat.io.cameras.camera_record import read_camera_record
 from diff4splat.io.exr import read_depth_exr
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.outputs.camera_dataset import writer
 from diff4splat.outputs.camera_dataset.sequences import EFFECTS, EffectChoice, effect_sequences
 from diff4splat.outputs.camera_dataset.writer import DatasetJob, write_camera_dataset
-from diff4splat.outputs.photographs import geometry_kind, needs_rays
+from diff4splat.outputs.photo_sequence import geometry_kind, needs_rays
 from diff4splat.paths.physical_path import PhysicalPath, filmed
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render

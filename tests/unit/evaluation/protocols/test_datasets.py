@@ -8,7 +8,7 @@ from oracles_clips import make_clip
 from oracles_evaluation import FRAMES, SIZE, tiny_protocol
 
 from diff4splat.data.clip import Clip
-from diff4splat.data.members.encode import Coding
+from diff4splat.data.codecs.encode import Coding
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
 from diff4splat.evaluation.protocols import datasets as opening
