@@ -70,11 +70,11 @@ def read(place: Place, options: ReadOptions) -> Capture:
         notes=(*_notes(records, folders), *repeated),
     )
     made = replace(finish(draft, options), license=_licenses(records))
-    optics = first.filmed.optics
+    optics = first.physical_path.optics
     if optics_json(optics) == optics_json(Optics()):
         return made
-    height, width = first.filmed.path.cameras.size_px
-    tracks = {number: record.filmed.track for number, record in enumerate(records)}
+    height, width = first.physical_path.path.cameras.size_px
+    tracks = {number: record.physical_path.track for number, record in enumerate(records)}
     return replace(
         made,
         optics=coarser_optics(optics, (height, width), options.downscale, place.name),
@@ -84,18 +84,18 @@ def read(place: Place, options: ReadOptions) -> Capture:
 
 def _shots(record: CameraRecord, folder: Path, number: int) -> list[Shot]:
     _require_frames_on_track(record, folder / FILE)
-    path, where = record.filmed.path, str(folder / FILE)
+    path, where = record.physical_path.path, str(folder / FILE)
     mask = None if record.valid is None else _there(folder, record.valid, where)
     return [
         Shot(
-            picture=PictureFile(file=_there(folder, taken.picture, where)),
+            picture=PictureFile(file=_there(folder, taken.image, where)),
             lens=Lens(
                 focal_px=tuple(path.cameras.focal_px[index].tolist()),
                 center_px=tuple(path.cameras.center_px[index].tolist()),
                 size_px=path.cameras.size_px,
             ),
             world_from_camera=path.cameras.world_from_camera[index],
-            time_s=record.filmed.time_s(index),
+            time_s=record.physical_path.time_s(index),
             camera=number,
             mask=mask,
             depth=None
@@ -119,7 +119,7 @@ def _require_frames_on_track(record: CameraRecord, file: Path) -> None:
     Raises:
         FileFormatError: naming the first that is not.
     """
-    track, path = record.filmed.track, record.filmed.path
+    track, path = record.physical_path.track, record.physical_path.path
     if track is None:
         return
     expected, got = track.at(path.times_s), path.cameras.world_from_camera
@@ -139,9 +139,9 @@ def _require_same_optics(records: Sequence[CameraRecord], folders: Sequence[Path
     Raises:
         FileFormatError: naming what differs, and where.
     """
-    known = _flat(optics_json(records[0].filmed.optics))
+    known = _flat(optics_json(records[0].physical_path.optics))
     for record, folder in zip(records[1:], folders[1:], strict=True):
-        other = _flat(optics_json(record.filmed.optics))
+        other = _flat(optics_json(record.physical_path.optics))
         for key in {**known, **other}:
             mine, theirs = known.get(key), other.get(key)
             if mine != theirs:

@@ -1,9 +1,9 @@
-"""Do the contents of a clip agree with each other? Figures that find nearly every wrong reader.
+"""Consistency of the cameras, depth, flow and tracks of a clip, to detect wrong readers.
 
-Poses must be rotations; depth of one frame, carried into another, must be the depth seen there; on
-what stands still, depth and cameras alone give the flow; tracks must lie where cameras, depth and
-flow say, and be visible only where depth lets them. A mirrored axis, a transposed rotation, ray
-length for z, half a pixel or one frame too much: each shows in at least one figure.
+Poses must be rotations. Depth of one frame, reprojected into another, must equal the depth there.
+Flow of static pixels must follow from depth and cameras. Tracks must agree with cameras, depth and
+flow, and be visible only where depth allows. A mirrored axis, a transposed rotation, ray length
+instead of z, or an offset of half a pixel or one frame changes at least one figure.
 """
 
 from dataclasses import dataclass
@@ -23,45 +23,45 @@ from diff4splat.errors import InputError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Consistency:
-    """Errors by what was compared; None where there was nothing to compare."""
+    """Error statistics per comparison; None if the clip lacks the data."""
 
     rotation: ErrorStatistics | None
     """Largest entry of RᵀR − I or of det R − 1, per pose."""
     reprojection: ErrorStatistics | None
-    """Relative depth error between frames of one view, on what stands still."""
+    """Relative depth error between frames of one view, for static pixels."""
     flow_px: ErrorStatistics | None
-    """From stored flow to that of depth and cameras, on what stands still."""
+    """Stored flow against flow from depth and cameras, for static pixels."""
     found_pixel_px: ErrorStatistics | None
-    """From a track to the nearest pixel centre, where it was found."""
+    """Distance of a track to the nearest pixel centre, at its query pixel."""
     found_depth: ErrorStatistics | None
-    """Relative, from a track's z to the depth map, where it was found."""
+    """Relative error of the z of a track against the depth map, at its query pixel."""
     found_flow_px: ErrorStatistics | None
-    """From flow to the step of a track, where it was found."""
+    """Flow against the displacement of a track, at its query pixel."""
     projection_px: ErrorStatistics | None
-    """From projected positions to ``uv``, wherever visible."""
+    """Projected positions against ``uv``, where visible."""
     found_visible: TrueFraction | None
-    """Tracks that are visible where they were found."""
+    """Tracks that are visible at their query pixel."""
     across_views: TrueFraction | None
-    """Points of one view that are not before what another view sees there at the same time."""
+    """Points of one view that are not in front of the surface that another view sees."""
     visible_depth: TrueFraction | None
     """Visible tracks whose z is that of the depth map, within 3 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """The largest errors and the smallest shares that pass."""
+    """Largest errors and smallest fractions that pass."""
 
     rotation: float = 1e-5
     pixels: float = 1e-3
     depth: float = 1e-4
-    """Relative, of tracks where they were found."""
+    """Relative depth error of tracks at their query pixels."""
     reprojection: float = 0.02
-    """Relative, of the median: edges and hidden surfaces differ by far more, whatever the data."""
+    """Median relative error: edges and occluded surfaces always have larger errors."""
     share: float = 0.98
     visible_share: float = 0.98
-    """Of visible tracks at the depth of the map; lower where much is thinner than a pixel."""
+    """Fraction of visible tracks at the depth of the map; lower for structures below a pixel."""
     judge: Literal["max", "median"] = "max"
-    """What of pixels and depth is compared."""
+    """Statistic of pixel and depth errors that is compared."""
 
 
 EXACT = Tolerances()
@@ -71,29 +71,29 @@ MEASURED = Tolerances(pixels=1.0, depth=0.03, share=0.8, visible_share=0.8, judg
 
 
 def measure_consistency(clip: Clip) -> Consistency:
-    """Compare everything in ``clip`` that says something of something else."""
+    """Compare all data of ``clip`` that constrain each other."""
     views = clip.views
-    found = [made for number in range(len(views)) if (made := compare_at_query(clip, number))]
-    seen = [made for view in views if (made := compare_where_visible(clip, view))]
+    at_query = [errors for k in range(len(views)) if (errors := compare_at_query(clip, k))]
+    visible = [errors for view in views if (errors := compare_where_visible(clip, view))]
     return Consistency(
         rotation=error_statistics(rotation_errors(view.cameras) for view in views),
         reprojection=error_statistics(each for view in views for each in over_time(clip, view)),
         flow_px=error_statistics(each for view in views for each in flow_errors(clip, view)),
-        found_pixel_px=error_statistics(each.pixel_px for each in found),
-        found_depth=error_statistics(each.depth for each in found),
-        found_flow_px=error_statistics(each.flow_px for each in found),
-        projection_px=error_statistics(each.projection_px for each in seen),
-        found_visible=true_fraction(each.visible for each in found),
+        found_pixel_px=error_statistics(each.pixel_px for each in at_query),
+        found_depth=error_statistics(each.depth for each in at_query),
+        found_flow_px=error_statistics(each.flow_px for each in at_query),
+        projection_px=error_statistics(each.projection_px for each in visible),
+        found_visible=true_fraction(each.visible for each in at_query),
         across_views=true_fraction(across_views(clip)),
-        visible_depth=true_fraction(each.at_depth for each in seen),
+        visible_depth=true_fraction(each.at_depth for each in visible),
     )
 
 
 def require_consistency(clip: Clip, tolerances: Tolerances = EXACT) -> Consistency:
-    """Return the figures of ``clip`` when all of them pass.
+    """Return the figures of ``clip`` if all of them pass.
 
     Raises:
-        InputError: one does not; says which, by how much, and what usually causes it.
+        InputError: one fails; with the value, the limit and the usual cause.
     """
     figures = measure_consistency(clip)
     for name, limit, hint in _checks(tolerances):
@@ -113,7 +113,7 @@ def require_consistency(clip: Clip, tolerances: Tolerances = EXACT) -> Consisten
 
 
 def _checks(tolerances: Tolerances) -> tuple[tuple[str, float, str], ...]:
-    """Figures in an order in which the first failure is nearest to the cause."""
+    """Checks ordered from causes to consequences."""
     cameras = "look for a mirrored axis, a transposed rotation or camera_from_world"
     pixels = "look for pixel centres half a pixel away or a frame too early or late"
     return (

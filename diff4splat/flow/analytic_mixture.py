@@ -1,4 +1,4 @@
-"""The exact velocity of Gaussian-mixture data: a flow whose answer is known without a network.
+"""The exact velocity of Gaussian-mixture data, in closed form.
 
 Axes: ``b`` batch, ``k`` components, ``d`` dimensions. For clean ~ Σ_k p_k N(mean_k, diag(std_k²))
 and noisy = (1 - level) · clean + level · noise, each component stays Gaussian and
@@ -8,8 +8,8 @@ and noisy = (1 - level) · clean + level · noise, each component stays Gaussian
     velocity    = E[noise - clean | noisy]
                 = Σ_k P(k | noisy) ((level - (1 - level) std_k²) / variance_k · offset_k - mean_k)
 
-(conditional expectation of jointly Gaussian variables). One component has a closed trajectory:
-noisy(level) = (1 - level) mean + sqrt(variance) z with z fixed. Used to measure samplers.
+(conditional expectation of jointly Gaussian variables). The trajectory of one component is
+noisy(level) = (1 - level) mean + sqrt(variance) z with a fixed z. Used to measure samplers.
 """
 
 import math
@@ -29,7 +29,7 @@ class GaussianMixture:
     means: Float[Tensor, "k d"]
     stds: Float[Tensor, "k d"]
     log_weights: Float[Tensor, " k"]
-    """Need not be normalised."""
+    """Unnormalised."""
 
     def __post_init__(self) -> None:
         if self.stds.shape != self.means.shape or self.log_weights.shape != self.means.shape[:1]:
@@ -41,19 +41,19 @@ class GaussianMixture:
             raise ConfigError("GaussianMixture.stds: expected 0 or above")
 
     def velocity(self, noisy: Float[Tensor, "b d"], level: float) -> Float[Tensor, "b d"]:
-        """E[noise - clean | noisy]; usable wherever a network's velocity is."""
-        kept = 1 - level
-        variance = kept**2 * self.stds**2 + level**2
-        # Data thinner than rounding would divide by zero at level 0.
+        """E[noise - clean | noisy], a substitute for the velocity of a network."""
+        clean_weight = 1 - level
+        variance = clean_weight**2 * self.stds**2 + level**2
+        # Very small deviations would divide by zero at level 0.
         variance = variance.clamp_min(torch.finfo(variance.dtype).eps ** 2)
-        offset = noisy[:, None] - kept * self.means
-        fit = (offset.square() / variance + variance.log()).sum(-1)
-        share = torch.softmax(self.log_weights - 0.5 * fit, -1)[..., None]
-        pull = (level - kept * self.stds**2) / variance
-        return (share * (pull * offset - self.means)).sum(1)
+        offset = noisy[:, None] - clean_weight * self.means
+        energy = (offset.square() / variance + variance.log()).sum(-1)
+        posterior = torch.softmax(self.log_weights - 0.5 * energy, -1)[..., None]
+        gain = (level - clean_weight * self.stds**2) / variance
+        return (posterior * (gain * offset - self.means)).sum(1)
 
     def with_weights(self, log_weights: Float[Tensor, " k"]) -> "GaussianMixture":
-        """The same components in other proportions: a condition that prefers some of them."""
+        """The same components with other weights: a condition that prefers some of them."""
         return replace(self, log_weights=log_weights)
 
 

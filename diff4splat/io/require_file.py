@@ -1,4 +1,4 @@
-"""What every reader asks of a path before it opens it."""
+"""Check of a path before a reader opens it."""
 
 from pathlib import Path
 
@@ -6,10 +6,10 @@ from diff4splat.errors import Diff4SplatError, FileFormatError
 
 
 def require_file(file: Path, what: str, error: type[Diff4SplatError] = FileFormatError) -> None:
-    """Refuse a path that is not a file with something in it; ``what`` is the kind expected.
+    """Require a readable, non-empty file; ``what`` names the expected kind in errors.
 
     Raises:
-        error: nothing is there, it is a folder or a device, it is empty, or it may not be read.
+        error: the path does not exist, is a folder or device, is empty, or is not readable.
     """
     try:
         if not file.exists():

@@ -1,4 +1,4 @@
-"""Silence for C libraries that print to the console what we report ourselves."""
+"""Silence C libraries that print errors which Python code already reports."""
 
 import os
 import sys
@@ -8,18 +8,18 @@ from contextlib import contextmanager
 
 @contextmanager
 def silence_native_stderr() -> Iterator[None]:
-    """Send file descriptor 2 to nowhere for the length of the block."""
+    """Redirect file descriptor 2 to the null device inside the block."""
     try:
-        kept = os.dup(2)
+        saved = os.dup(2)
     except OSError:  # a service may run with no stderr at all
         yield
         return
     sys.stderr.flush()
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null_device = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
+        os.dup2(null_device, 2)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(nowhere)
-        os.close(kept)
+        os.dup2(saved, 2)
+        os.close(null_device)
+        os.close(saved)

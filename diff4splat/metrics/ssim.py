@@ -1,12 +1,12 @@
-"""Structural similarity of pictures (Wang et al., IEEE TIP 2004).
+"""Structural similarity of images (Wang et al., IEEE TIP 2004).
 
-Axes: ``*b`` pictures, ``h w`` pixels. RGB in [0, 1].
+Axes: ``*b`` images, ``h w`` pixels. RGB in [0, 1].
 
     SSIM = (2 μ_x μ_y + C1)(2 σ_xy + C2) / ((μ_x² + μ_y² + C1)(σ_x² + σ_y² + C2))
 
 with C1 = 0.01², C2 = 0.03², local moments under an 11×11 Gaussian window of deviation 1.5, and the
-mean over the three channels and over all windows that lie inside the picture, as in the authors'
-own program and in scikit-image.
+mean over the three channels and over all windows inside the image, as in the authors' program and
+in scikit-image.
 """
 
 from jaxtyping import Float
@@ -21,12 +21,12 @@ WINDOW_PX = 11
 def ssim(
     image: Float[Tensor, "*b h w 3"], reference: Float[Tensor, "*b h w 3"]
 ) -> Float[Tensor, "*b"]:
-    """Similarity of each picture: 1 if equal, around 0 if unrelated; differentiable.
+    """SSIM of each image: 1 if equal, around 0 if unrelated; differentiable.
 
     Raises:
         ShapeError: the shapes differ, or a side is below 11 px.
     """
-    # It takes half a second to load: not before somebody measures.
+    # Imported here because loading takes half a second.
     from kornia.metrics import ssim as ssim_map
 
     require_alike("image", image, reference)
@@ -36,8 +36,8 @@ def ssim(
         )
     batch = image.shape[:-3]
     one, other = (
-        picture.reshape(batch.numel(), *picture.shape[-3:]).movedim(-1, 1)
-        for picture in promote(image, reference)
+        rgb.reshape(batch.numel(), *rgb.shape[-3:]).movedim(-1, 1)
+        for rgb in promote(image, reference)
     )
     similarity = ssim_map(one, other, WINDOW_PX, eps=0.0, padding="valid")
     return similarity.mean((1, 2, 3)).reshape(batch)

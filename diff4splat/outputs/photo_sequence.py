@@ -1,6 +1,6 @@
-"""A sequence of photographs, one at a time, and what they needed.
+"""Render the frames of a physical camera path one by one, and collect statistics.
 
-Axes: ``h w`` pixels. Memory holds one frame, however long the path is.
+Axes: ``h w`` pixels. Only one frame is in memory.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -20,12 +20,12 @@ from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 
 MIN_FORWARD_COSINE = 1e-3
-"""Cosine with the axis below which z says nothing: a right angle, but for rounding."""
+"""Smallest cosine to the optical axis for which z-depth is meaningful."""
 
 
 @dataclass(slots=True)
 class CaptureStats:
-    """What the photographs of a sequence were made of; grows while they are taken."""
+    """Statistics of a rendered sequence, updated with every frame."""
 
     samples: int = 1
     intervals: int = 1
@@ -34,26 +34,26 @@ class CaptureStats:
     backends: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     valid: Bool[Tensor, "h w"] | None = None
-    """Pixels that see something in every frame."""
+    """Pixels inside the field of view of the lens in every frame."""
 
     def add(self, photo: Photograph) -> None:
-        """One more."""
+        """Update the statistics with one frame."""
         self.samples = max(self.samples, photo.samples)
         self.intervals = max(self.intervals, photo.intervals)
         self.interval_error_px = max(self.interval_error_px, photo.interval_error_px)
         self.dropped = max(self.dropped, photo.dropped_nonfinite)
         valid = photo.valid.cpu()
         self.valid = valid if self.valid is None else self.valid & valid
-        for known, new in ((self.backends, [photo.backend]), (self.left_out, photo.left_out)):
-            known.extend(name for name in new if name not in known)
+        for names, new in ((self.backends, [photo.backend]), (self.left_out, photo.left_out)):
+            names.extend(name for name in new if name not in names)
 
     @property
     def blind_share(self) -> float:
-        """Of the picture, where the lens sees nothing."""
+        """Fraction of the image outside the field of view of the lens."""
         return 0.0 if self.valid is None else 1 - float(self.valid.float().mean())
 
     def lines(self) -> list[str]:
-        """For people: one line of facts, then what was left out."""
+        """One line of statistics, then one line per skipped effect."""
         if "trace" in self.backends:
             facts = (
                 f"{_counted(self.samples, 'ray')} per pixel; time split into "
@@ -72,51 +72,51 @@ class CaptureStats:
 
 def render_photographs(
     scene: Scene,
-    filmed: PhysicalPath,
+    physical_path: PhysicalPath,
     outputs: Collection[str],
     settings: PhotoSettings,
     advance: Callable[[], None],
-    taken: CaptureStats,
+    stats: CaptureStats,
 ) -> Iterator[Photograph]:
-    """Every frame of ``filmed`` when it is asked for; ``taken`` hears of each."""
-    for index in range(len(filmed)):
+    """Render the frames of ``physical_path`` lazily, and add each to ``stats``."""
+    for index in range(len(physical_path)):
         with torch.no_grad():
             photo = photograph(
                 scene,
-                filmed.camera(index),
-                filmed.time_s(index),
+                physical_path.camera(index),
+                physical_path.time_s(index),
                 outputs=outputs,
                 settings=settings,
             )
-        taken.add(photo)
+        stats.add(photo)
         advance()
         yield photo
 
 
 def freeze_time(scene: Scene, time_s: float | None) -> Scene:
-    """``scene`` with its clock standing still at ``time_s``; as it is without one."""
+    """``scene`` fixed at ``time_s``; unchanged if that is None."""
     if time_s is None:
         return scene
     return replace(scene, gaussians=scene.state_at(time_s), motion=StaticMotion())
 
 
-def needs_rays(scene: Scene, filmed: PhysicalPath, settings: PhotoSettings) -> bool:
-    """Whether any frame has an effect that the rasteriser cannot draw."""
+def needs_rays(scene: Scene, physical_path: PhysicalPath, settings: PhotoSettings) -> bool:
+    """Whether any frame has an effect that the rasteriser cannot render."""
     return any(
-        find_effects(scene, filmed.camera(index), filmed.time_s(index), settings).any
-        for index in range(len(filmed))
+        find_effects(scene, physical_path.camera(index), physical_path.time_s(index), settings).any
+        for index in range(len(physical_path))
     )
 
 
-def geometry_kind(filmed: PhysicalPath) -> GeometryKind:
-    """Depth, or distance for a lens that looks sideways or behind itself: z is no measure there."""
-    camera = filmed.path.cameras[0]
+def geometry_kind(physical_path: PhysicalPath) -> GeometryKind:
+    """``depth``, or ``distance`` for a lens with rays at a right angle or more to its axis."""
+    camera = physical_path.path.cameras[0]
     height, width = camera.size_px
     rows, columns = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
     pixels = torch.stack([columns, rows], -1).double() + 0.5
-    directions, exists = sensor_directions(camera, filmed.optics.lens, pixels)
-    behind = exists & (directions[..., 2] < MIN_FORWARD_COSINE)
-    return "distance" if bool(behind.any()) else "depth"
+    directions, exists = sensor_directions(camera, physical_path.optics.lens, pixels)
+    is_sideways = exists & (directions[..., 2] < MIN_FORWARD_COSINE)
+    return "distance" if bool(is_sideways.any()) else "depth"
 
 
 def _counted(count: int, name: str) -> str:

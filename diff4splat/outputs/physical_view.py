@@ -22,7 +22,7 @@ from diff4splat.scene.scene import Scene
 
 
 def write_physical_view(
-    scene: Scene, filmed: PhysicalPath, file: Path, settings: PhotoSettings, log: RunLog
+    scene: Scene, physical_path: PhysicalPath, file: Path, settings: PhotoSettings, log: RunLog
 ) -> CaptureStats:
     """Take every frame into one file whose suffix says what it holds; returns what they needed.
 
@@ -31,18 +31,20 @@ def write_physical_view(
         OutputError: the file cannot be written.
     """
     suffix = require_view_suffix(file)
-    kind, taken = geometry_kind(filmed), CaptureStats()
+    kind, taken = geometry_kind(physical_path), CaptureStats()
     wanted = (kind,) if suffix == ".exr" else ("rgb",)
-    with log.phases.phase("render", len(filmed)) as advance:
-        frames = render_photographs(scene, filmed, wanted, settings, advance, taken)
+    with log.phases.phase("render", len(physical_path)) as advance:
+        frames = render_photographs(scene, physical_path, wanted, settings, advance, taken)
         if suffix == ".mp4":
-            write_video((frame.rgb for frame in frames), file, frames_per_second(filmed.path))
+            write_video(
+                (frame.rgb for frame in frames), file, frames_per_second(physical_path.path)
+            )
         elif suffix == ".png":
             write_png(next(frames).rgb, file)
         else:
             values = torch.stack([getattr(frame, kind) for frame in frames])
-            optics = json.dumps(optics_json(filmed.optics))
-            write_depth_exr(values, filmed.path, file, quantity=kind, optics=optics)
+            optics = json.dumps(optics_json(physical_path.optics))
+            write_depth_exr(values, physical_path.path, file, quantity=kind, optics=optics)
     return taken
 
 

@@ -1,4 +1,4 @@
-"""Messages about names that nobody knows."""
+"""Error messages about unknown names."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -7,13 +7,13 @@ _LONGEST_QUOTE = 40
 
 
 def quoted(value: object) -> str:
-    """``value`` as it may stand in a one-line message: escaped and not too long."""
+    """``value`` for a one-line message: escaped and shortened."""
     text = repr(value)
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
 
 
 def unknown_name(what: str, got: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
-    """``what: expected one of known; got ...``, with the nearest of all names as advice."""
+    """``what: expected one of known; got ...``, with the closest name as advice."""
     names = list(known)
     nearest = get_close_matches(got, [*names, *also], n=1, cutoff=0.5)
     advice = f"did you mean '{nearest[0]}'?" if nearest else "choose one of these"

@@ -133,7 +133,7 @@ def test_a_data_set_is_written_whole_and_once(
     assert "combined: 2 rays per pixel" in text
     assert set(EFFECTS) < {path.name for path in out.iterdir()}
     own = read_camera_record(out / "combined" / "camera.json")
-    optics = own.filmed.optics
+    optics = own.physical_path.optics
     assert optics.exposure_s == pytest.approx(0.05)
     assert optics.shutter.readout_s == pytest.approx(0.05)
     assert optics.aperture.focus_distance == pytest.approx(WALL_DEPTH, abs=0.3)

@@ -1,4 +1,4 @@
-"""``meta.json``: the note of a clip and its sizes, so that a tar tells all without its manifest."""
+"""``meta.json``: metadata and sizes of a clip, so that a shard is readable without its manifest."""
 
 from dataclasses import asdict
 from typing import Any, get_args
@@ -12,15 +12,15 @@ _FORMAT = "diff4splat-clip"
 
 
 def encode_metadata(note: ClipMetadata, entry: ClipEntry) -> bytes:
-    """JSON whose bytes depend on nothing but the values."""
-    said = asdict(note)
+    """Encode as JSON; equal values give equal bytes."""
+    values = asdict(note)
     document = {"format": _FORMAT, "version": VERSION, **entry_to_json(entry)}
-    document |= {key: said[key] for key in ("source", "caption", "metric", "objects")}
+    document |= {key: values[key] for key in ("source", "caption", "metric", "objects")}
     return dumps(document).encode()
 
 
 def decode_metadata(content: bytes, entry: ClipEntry) -> ClipMetadata:
-    """The note of the clip that ``entry`` describes.
+    """Decode the metadata of the clip that ``entry`` describes.
 
     Raises:
         FileFormatError: damaged, of another version, or of a clip that the entry does not describe.

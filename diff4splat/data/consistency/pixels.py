@@ -1,4 +1,4 @@
-"""What depth, flow and cameras say of each other, pixel by pixel. Computed in double precision."""
+"""Depth, flow and cameras against each other per pixel, in double precision."""
 
 from collections.abc import Iterator
 from itertools import permutations
@@ -15,7 +15,7 @@ from diff4splat.geometry.depth import unproject
 from diff4splat.geometry.rays import pixel_centers
 
 _BEFORE = 0.02
-"""Nearer than what is seen there by this much, relative, is a contradiction."""
+"""Relative depth difference in front of the visible surface that counts as a contradiction."""
 
 
 def rotation_errors(camera: Camera) -> Float[Tensor, " t"]:
@@ -28,35 +28,35 @@ def rotation_errors(camera: Camera) -> Float[Tensor, " t"]:
 def over_time(clip: Clip, view: View) -> Iterator[Float[Tensor, " n"]]:
     """Relative depth errors from each frame to the one half the clip later.
 
-    From frame to frame even wrong cameras move little, and the median would not notice.
+    Adjacent frames would hide wrong cameras, because their displacement is small.
     """
-    still = static_pixels(clip, view)
-    if still is None:
+    static = static_pixels(clip, view)
+    if static is None:
         return
     step = max(1, clip.frames // 2)
     for here, there in enumerate(range(step, clip.frames)):
-        points = _points(view, here, still[here])
-        z, seen = _carried(view, there, points, still[there])
-        yield ((z - seen.depth).abs() / seen.depth)[seen.smooth & (z > 0)]
+        points = _points(view, here, static[here])
+        z, sampled = _reproject(view, there, points, static[there])
+        yield ((z - sampled.depth).abs() / sampled.depth)[sampled.smooth & (z > 0)]
 
 
 def across_views(clip: Clip) -> Iterator[Bool[Tensor, " n"]]:
-    """Whether points of one view lie at, or hidden behind, what each other sees there and then."""
+    """Whether points of one view lie on or behind the surface that each other view sees."""
     for here, there in permutations(clip.views, 2):
         for frame in range(clip.frames):
             every = torch.ones(clip.size_px, dtype=torch.bool)
-            z, seen = _carried(there, frame, _points(here, frame, every), every)
-            yield (z >= seen.depth * (1 - _BEFORE))[seen.smooth & (z > 0)]
+            z, sampled = _reproject(there, frame, _points(here, frame, every), every)
+            yield (z >= sampled.depth * (1 - _BEFORE))[sampled.smooth & (z > 0)]
 
 
 def flow_errors(clip: Clip, view: View) -> Iterator[Float[Tensor, " n"]]:
-    """Pixels between stored flow and that of depth and cameras, frame by frame."""
-    still = static_pixels(clip, view)
-    if still is None or view.flow is None:
+    """Distance in pixels between stored flow and flow from depth and cameras, per frame."""
+    static = static_pixels(clip, view)
+    if static is None or view.flow is None:
         return
     centers = pixel_centers(clip.size_px, view.cameras.focal_px.double())
     for frame in range(clip.frames - 1):
-        shown = still[frame] & view.flow.known[frame] & (view.depth[frame] > 0)
+        shown = static[frame] & view.flow.known[frame] & (view.depth[frame] > 0)
         uv, z = project(_camera(view, frame + 1), _points(view, frame, shown))
         stored = view.flow.to_next[frame][shown].double()
         yield (stored - (uv - centers[shown])).norm(dim=-1)[z > 0]
@@ -72,10 +72,10 @@ def _points(view: View, frame: int, chosen: Bool[Tensor, "h w"]) -> Float[Tensor
     return unproject(_camera(view, frame), depth)[chosen & (depth > 0)]
 
 
-def _carried(
+def _reproject(
     view: View, frame: int, points: Float[Tensor, "n 3"], usable: Bool[Tensor, "h w"]
 ) -> tuple[Float[Tensor, " n"], Sampled]:
-    """The z of the points in a frame, and the depth of its usable pixels where they fall."""
+    """Depth z of the points in a frame, and the depth of its usable pixels at their projections."""
     uv, z = project(_camera(view, frame), points)
     depth = torch.where(usable, view.depth[frame].double(), 0.0)
     return z, sample(depth, uv)

@@ -1,6 +1,6 @@
-"""Depth between pixel centres. Axes: ``n`` places, ``h w`` pixels; ``uv`` is (x, y) in pixels.
+"""Interpolated depth. Axes: ``n`` points, ``h w`` pixels; ``uv`` is (x, y) in pixels.
 
-1/z is linear in the picture on every plane, so depth is interpolated by its inverse.
+On a plane, 1/z is linear in pixel coordinates, so inverse depth is interpolated.
 """
 
 from dataclasses import dataclass
@@ -10,34 +10,34 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 _SAME_SURFACE = 1.05
-"""Largest ratio among four neighbours; more is an edge, between whose sides nothing lies."""
+"""Largest depth ratio of four neighbours on one surface; more is an edge."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sampled:
-    """Depth around some places."""
+    """Interpolated depth at points."""
 
     depth: Float[Tensor, " n"]
-    """Between the four nearest centres; 1 where not ``smooth``."""
+    """Interpolated from the four nearest centres; 1 where not ``smooth``."""
     smooth: Bool[Tensor, " n"]
-    """The four are inside the picture and of one surface."""
+    """Whether all four are inside the image and on one surface."""
     corners: Float[Tensor, "n 4"]
-    """Depth at the four centres, 0 outside the picture."""
+    """Depth at the four centres; 0 outside the image."""
 
 
 def sample(depth: Float[Tensor, "h w"], uv: Float[Tensor, "n 2"]) -> Sampled:
-    """Look up depth around ``uv``, wherever that is."""
+    """Interpolate depth at ``uv``, inside or outside the image."""
     height, width = depth.shape
     limit = torch.tensor([width, height], dtype=uv.dtype)
-    # Whatever is no place at all is outside too.
-    place = (uv - 0.5).nan_to_num(nan=-2).maximum(torch.full_like(limit, -2)).minimum(limit + 1)
-    low = place.floor()
-    part = place - low
-    # A frame of zeros around the picture makes what is outside look like what has no depth.
-    framed = torch.nn.functional.pad(depth, (2, 3, 2, 3))
+    # NaN counts as outside.
+    point = (uv - 0.5).nan_to_num(nan=-2).maximum(torch.full_like(limit, -2)).minimum(limit + 1)
+    low = point.floor()
+    part = point - low
+    # Zero padding makes points outside equal to points without depth.
+    padded = torch.nn.functional.pad(depth, (2, 3, 2, 3))
     column, row = (low.long() + 2).unbind(-1)
     corners = torch.stack(
-        [framed[row + down, column + right] for down in (0, 1) for right in (0, 1)], -1
+        [padded[row + down, column + right] for down in (0, 1) for right in (0, 1)], -1
     )
     right, down = part.unbind(-1)
     weights = torch.stack(

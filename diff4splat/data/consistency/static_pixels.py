@@ -1,4 +1,4 @@
-"""Which pixels show what stands still in the world, as far as a clip says."""
+"""Pixels of static surfaces, as far as a clip determines them."""
 
 import torch
 from jaxtyping import Bool
@@ -7,28 +7,28 @@ from torch import Tensor
 from diff4splat.data.clip import Clip, View
 
 _STILL = 1e-6
-"""Largest movement of a track, relative to its distance from the first camera plus one."""
+"""Largest displacement of a static track, relative to its distance from the first camera + 1."""
 
 
 def static_pixels(clip: Clip, view: View) -> Bool[Tensor, "t h w"] | None:
-    """True where nothing moves but the camera; None when the clip does not tell."""
+    """Mask of static pixels; None if the clip has no instances or no static ones."""
     if clip.note.is_static:
         return torch.ones(view.depth.shape, dtype=torch.bool)
-    still = static_instances(clip)
-    if view.instances is None or not still:
+    static = static_instances(clip)
+    if view.instances is None or not static:
         return None
-    return torch.isin(view.instances.long(), torch.tensor(sorted(still)))
+    return torch.isin(view.instances.long(), torch.tensor(sorted(static)))
 
 
 def static_instances(clip: Clip) -> frozenset[int]:
-    """Objects noted without motion, and unnoted ones of which no track ever moves."""
+    """Objects with a note without motion, and objects without a note whose tracks are static."""
     noted = {each.instance for each in clip.note.objects}
-    still = {each.instance for each in clip.note.objects if not each.motion}
+    static = {each.instance for each in clip.note.objects if not each.motion}
     if clip.tracks is not None and len(clip.tracks.instances):
         positions = clip.tracks.positions.double()
-        moved = (positions - positions[:1]).norm(dim=-1).amax(0)
-        moves = moved > _STILL * (1 + positions[0].norm(dim=-1))
+        displacement = (positions - positions[:1]).norm(dim=-1).amax(0)
+        moves = displacement > _STILL * (1 + positions[0].norm(dim=-1))
         every = set(clip.tracks.instances.tolist())
         moving = set(clip.tracks.instances[moves].tolist())
-        still |= every - moving - noted
-    return frozenset(still - {0})
+        static |= every - moving - noted
+    return frozenset(static - {0})

@@ -1,4 +1,4 @@
-"""Many errors as a few figures."""
+"""Summary statistics of errors."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,17 +10,17 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorStatistics:
-    """Errors; never NaN."""
+    """Statistics of errors; never NaN."""
 
     max: float
     median: float
     count: int
-    """How many were compared, at least 1."""
+    """Number of comparisons, at least 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrueFraction:
-    """How many of those compared agree."""
+    """Fraction of comparisons that agree."""
 
     share: float
     """0 to 1."""
@@ -28,7 +28,7 @@ class TrueFraction:
 
 
 def error_statistics(errors: Iterable[Float[Tensor, " _"]]) -> ErrorStatistics | None:
-    """Largest and lower median; an error that is not a number counts as infinite."""
+    """Maximum and lower median; NaN counts as infinite."""
     together = torch.cat([torch.zeros(0, dtype=torch.float64), *errors])
     if not len(together):
         return None
@@ -38,7 +38,7 @@ def error_statistics(errors: Iterable[Float[Tensor, " _"]]) -> ErrorStatistics |
 
 
 def true_fraction(agrees: Iterable[Bool[Tensor, " _"]]) -> TrueFraction | None:
-    """How many are True."""
+    """Fraction of True values."""
     together = torch.cat([torch.zeros(0, dtype=torch.bool), *agrees])
     if not len(together):
         return None

@@ -1,6 +1,6 @@
-"""What tracks and everything else say of each other. Computed in double precision.
+"""Tracks against cameras, depth and flow, in double precision.
 
-Axes: ``t`` frames, ``n`` tracks, ``m`` of them found in the view at hand.
+Axes: ``t`` frames, ``n`` tracks, ``m`` of them with their query pixel in the view.
 """
 
 from dataclasses import dataclass
@@ -14,33 +14,33 @@ from diff4splat.data.consistency.sampling import sample
 from diff4splat.geometry.camera import project
 
 _SAME_DEPTH = 0.03
-"""Relative; what is visible lies this close to the depths around it."""
+"""Largest relative difference between a visible point and the depths around it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QueryErrors:
-    """The tracks that were chosen in one view, at the pixels where they were."""
+    """Errors of tracks at their query pixels in one view."""
 
     pixel_px: Float[Tensor, " m"]
-    """From ``uv`` to the nearest pixel centre."""
+    """Distance of ``uv`` to the nearest pixel centre."""
     depth: Float[Tensor, " m"]
-    """Relative error of z; 1 where the depth map has none."""
+    """Relative error of z; 1 where depth is unknown."""
     flow_px: Float[Tensor, " k"]
-    """From flow to the step of ``uv``, for those with known flow there."""
+    """Flow against the displacement of ``uv``, where flow is known."""
     visible: Bool[Tensor, " m"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibleErrors:
-    """All tracks in one view, wherever they are visible."""
+    """Errors of all tracks in one view, where they are visible."""
 
     projection_px: Float[Tensor, " k"]
     at_depth: Bool[Tensor, " k"]
-    """The depths of the four nearest pixels span z; at edges that is all one can ask."""
+    """Whether the depths of the four nearest pixels span z; also valid at edges."""
 
 
 def compare_at_query(clip: Clip, number: int) -> QueryErrors | None:
-    """The tracks found in view ``number``; None when it has none."""
+    """Errors of the tracks whose query pixel is in view ``number``; None without tracks."""
     view, tracks = clip.views[number], clip.tracks
     if tracks is None or view.track_uv is None or view.track_visible is None:
         return None
@@ -61,7 +61,7 @@ def compare_at_query(clip: Clip, number: int) -> QueryErrors | None:
 
 
 def compare_where_visible(clip: Clip, view: View) -> VisibleErrors | None:
-    """All tracks in ``view``; None when it does not say where it sees them."""
+    """Errors of all tracks in ``view``; None without track projections."""
     if clip.tracks is None or view.track_uv is None or view.track_visible is None:
         return None
     uv, z = _positions(view, clip.tracks)
@@ -85,10 +85,10 @@ def _flow_steps(
     frames: Int[Tensor, " m"],
     pixel: tuple[Int[Tensor, " m"], Int[Tensor, " m"]],
 ) -> Float[Tensor, " k"]:
-    """Pixels between flow and the step of uv, of tracks with known flow where they were found."""
+    """Flow against the displacement of ``uv`` at query pixels with known flow."""
     if view.flow is None or view.track_uv is None or not len(view.flow.known):
         return torch.zeros(0, dtype=torch.float64)
-    # The last frame has no next: look up any and leave it out.
+    # The last frame has no next one: look up any frame, and mask it out.
     before = frames.clamp(max=len(view.flow.known) - 1)
     known = view.flow.known[before, *pixel] & (before == frames)
     step = view.track_uv[before + 1, chosen].double() - view.track_uv[before, chosen].double()

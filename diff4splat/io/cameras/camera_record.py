@@ -1,8 +1,8 @@
-"""``camera.json``: the exact truth about a sequence of pictures that was taken of a scene.
+"""``camera.json``: exact cameras, optics and settings of a rendered image sequence.
 
-Axes: ``t`` frames. Whoever reads it can take the same pictures again from the same scene. Every
-number is double precision. Poses are ``world_from_camera`` in OpenCV axes; focal lengths are pixels
-per unit of the lens's image plane, which the lens's ``formula`` names.
+Axes: ``t`` frames. The record is enough to render the same images from the same scene. Every number
+is double precision. Poses are ``world_from_camera`` in OpenCV axes; focal lengths are pixels
+per unit of the image plane of the lens, which its ``formula`` defines.
 """
 
 import json
@@ -55,47 +55,47 @@ CONVENTIONS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrameRecord:
+class FrameFiles:
     """The files of one frame, named from the folder of ``camera.json``."""
 
-    picture: str
+    image: str
     geometry: str | None = None
-    """Depth or distance."""
+    """File with depth or distance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRecord:
-    """Everything about one sequence.
+    """Record of one sequence.
 
     Raises:
-        InputError: another number of files than of frames.
+        InputError: the numbers of files and frames differ.
     """
 
     effect: str
-    filmed: PhysicalPath
-    frames: tuple[FrameRecord, ...]
+    physical_path: PhysicalPath
+    frames: tuple[FrameFiles, ...]
     geometry: GeometryKind
     settings: PhotoSettings
     scene: Provenance
     generator: str
     valid: str | None = None
-    """Picture that is black where the lens sees nothing."""
+    """Mask image, black outside the field of view of the lens."""
     scene_time_s: float | None = None
-    """Where the clock of the scene was stopped."""
+    """Fixed scene time of all frames; None if time advances."""
     intervals: int = 1
-    """Into how many parts the time of one picture was split at most."""
+    """Largest number of time intervals per image."""
     interval_error_px: float = 0.0
 
     def __post_init__(self) -> None:
-        if len(self.frames) != len(self.filmed):
+        if len(self.frames) != len(self.physical_path):
             raise InputError(
-                f"camera record: expected files of {len(self.filmed)} frames, got those of "
+                f"camera record: expected files of {len(self.physical_path)} frames, got those of "
                 f"{len(self.frames)}"
             )
 
 
 def write_camera_record(record: CameraRecord, file: Path) -> None:
-    """Write ``record`` whole or not at all.
+    """Write ``record`` atomically.
 
     Raises:
         OutputError: the file cannot be written.
@@ -104,11 +104,11 @@ def write_camera_record(record: CameraRecord, file: Path) -> None:
 
 
 def read_camera_record(file: Path) -> CameraRecord:
-    """The record in a file; memory, cutoffs and colours of the settings are the defaults.
+    """Read a record; memory limits, cutoffs and colours of the settings are the defaults.
 
     Raises:
         FileFormatError: missing, damaged, of another format or version, or with a value that is
-            missing, of another kind, or impossible; names it.
+            missing, of another type, or out of range.
     """
     require_file(file, f"a {FORMAT} file")
     try:
@@ -124,8 +124,8 @@ def read_camera_record(file: Path) -> CameraRecord:
 
 
 def _document(record: CameraRecord) -> dict[str, object]:
-    cameras, times_s = record.filmed.path.cameras, record.filmed.path.times_s
-    track = record.filmed.track
+    cameras, times_s = record.physical_path.path.cameras, record.physical_path.path.times_s
+    track = record.physical_path.track
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -136,21 +136,21 @@ def _document(record: CameraRecord) -> dict[str, object]:
         "scene_time_s": record.scene_time_s,
         "conventions": CONVENTIONS,
         "size_px": list(cameras.size_px),
-        "optics": optics_json(record.filmed.optics),
+        "optics": optics_json(record.physical_path.optics),
         "sampling": photo_settings_json(record.settings)
         | {"intervals": record.intervals, "interval_error_px": record.interval_error_px},
         "geometry": record.geometry,
         "valid": record.valid,
         "frames": [
             {
-                "file": taken.picture,
-                record.geometry: taken.geometry,
+                "file": frame.image,
+                record.geometry: frame.geometry,
                 "time_s": float(time_s),
                 "focal_px": camera.focal_px.tolist(),
                 "center_px": camera.center_px.tolist(),
                 "world_from_camera": camera.world_from_camera.tolist(),
             }
-            for taken, time_s, camera in zip(record.frames, times_s, cameras, strict=True)
+            for frame, time_s, camera in zip(record.frames, times_s, cameras, strict=True)
         ],
         "track": None if track is None else track_json(track),
     }
@@ -165,14 +165,14 @@ def _record(root: JsonObject, where: str) -> CameraRecord:
     sampling, track = take_object(root, "sampling", where), root.get("track")
     return CameraRecord(
         effect=take_text(root, "effect", where),
-        filmed=PhysicalPath(
+        physical_path=PhysicalPath(
             path=_path(frames, _size_px(root, where), where),
             optics=read_optics(root.get("optics"), f"{where}: 'optics'"),
             track=None if track is None else read_track(track, f"{where}: 'track'"),
         ),
         frames=tuple(
-            FrameRecord(
-                picture=take_text(frame, "file", f"{where}: frame {index}"),
+            FrameFiles(
+                image=take_text(frame, "file", f"{where}: frame {index}"),
                 geometry=optional_text(frame, geometry, f"{where}: frame {index}"),
             )
             for index, frame in enumerate(frames)
@@ -190,18 +190,22 @@ def _record(root: JsonObject, where: str) -> CameraRecord:
 
 def _path(frames: list[dict[str, object]], size_px: tuple[int, int], where: str) -> CameraPath:
     names = [f"{where}: frame {index}" for index in range(len(frames))]
-    both = list(zip(frames, names, strict=True))
+    named = list(zip(frames, names, strict=True))
     path = CameraPath(
         cameras=Camera(
-            focal_px=torch.stack([take_numbers(own, "focal_px", 2, name) for own, name in both]),
-            center_px=torch.stack([take_numbers(own, "center_px", 2, name) for own, name in both]),
+            focal_px=torch.stack(
+                [take_numbers(frame, "focal_px", 2, name) for frame, name in named]
+            ),
+            center_px=torch.stack(
+                [take_numbers(frame, "center_px", 2, name) for frame, name in named]
+            ),
             world_from_camera=torch.stack(
-                [take_pose(own, "world_from_camera", name) for own, name in both]
+                [take_pose(frame, "world_from_camera", name) for frame, name in named]
             ),
             size_px=size_px,
         ),
         times_s=torch.tensor(
-            [take_number(own, "time_s", name) for own, name in both], dtype=torch.float64
+            [take_number(frame, "time_s", name) for frame, name in named], dtype=torch.float64
         ),
     )
     return require_usable(path, "frames")
@@ -217,12 +221,12 @@ def _size_px(root: JsonObject, where: str) -> tuple[int, int]:
     return height, width
 
 
-def _provenance(own: JsonObject, where: str) -> Provenance:
-    """What matters to others; the rest describes the scene file."""
+def _provenance(source: JsonObject, where: str) -> Provenance:
+    """Generator, model and licence; the other fields describe the scene file."""
     return Provenance(
-        generator=take_text(own, "generator", where),
-        model=optional_text(own, "model", where) or "none",
-        license=optional_text(own, "license", where) or "unknown",
+        generator=take_text(source, "generator", where),
+        model=optional_text(source, "model", where) or "none",
+        license=optional_text(source, "license", where) or "unknown",
     )
 
 

@@ -1,4 +1,4 @@
-"""How photographs were taken, as plain JSON values: what their bits depend on."""
+"""``PhotoSettings`` as JSON values: the settings that determine the pixels."""
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.strict_json import (
@@ -13,7 +13,7 @@ from diff4splat.render.physical.settings import PhotoSettings
 
 
 def photo_settings_json(settings: PhotoSettings) -> dict[str, object]:
-    """``settings`` without memory, cutoffs and colours; null is the default of each."""
+    """``settings`` without memory limits, cutoffs and colours; null means the default."""
     return {
         "samples": settings.samples,
         "seed": settings.seed,
@@ -25,21 +25,21 @@ def photo_settings_json(settings: PhotoSettings) -> dict[str, object]:
     }
 
 
-def read_photo_settings(own: JsonObject, where: str) -> PhotoSettings:
-    """The settings that ``photo_settings_json`` wrote.
+def read_photo_settings(source: JsonObject, where: str) -> PhotoSettings:
+    """Read the settings that ``photo_settings_json`` wrote.
 
     Raises:
-        FileFormatError: a value is missing, of another kind, or impossible; names it.
+        FileFormatError: a value is missing, of another type, or out of range.
     """
     try:
         return PhotoSettings(
-            samples=optional_whole(own, "samples", where, least=1),
-            seed=take_whole(own, "seed", where),
-            pixel_area=take_flag(own, "pixel_area", where),
-            smoothing_px2=optional_number(own, "smoothing_px2", where),
-            tolerance_px=take_number(own, "tolerance_px", where),
-            rows_per_chunk=optional_whole(own, "rows_per_chunk", where, least=1),
-            most_intervals=take_whole(own, "most_intervals", where, least=1),
+            samples=optional_whole(source, "samples", where, least=1),
+            seed=take_whole(source, "seed", where),
+            pixel_area=take_flag(source, "pixel_area", where),
+            smoothing_px2=optional_number(source, "smoothing_px2", where),
+            tolerance_px=take_number(source, "tolerance_px", where),
+            rows_per_chunk=optional_whole(source, "rows_per_chunk", where, least=1),
+            most_intervals=take_whole(source, "most_intervals", where, least=1),
         )
     except ConfigError as error:
         raise FileFormatError(f"{where}: {error}; repair the file") from error

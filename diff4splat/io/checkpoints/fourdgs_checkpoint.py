@@ -5,9 +5,9 @@
     point_cloud/iteration_N/deformation_table.pth    one truth value per Gaussian, or no file
     cfg_args                                         settings as text, or no file
 
-Their planes are ``1 c rj ri`` over a box stored as (high, low); their times run from 0 to 1 and are
-looked up on the upper half of the time nodes. ``HexPlanes`` holds both as they are. All Gaussians
-move: their renderer does not look at the table. Nothing in the files is run.
+Planes have the shape ``1 c rj ri`` over a box stored as (high, low). Times from 0 to 1 use the
+upper half of the time nodes. ``HexPlanes`` stores both unchanged. All Gaussians move: the program's
+renderer ignores the table. No code in the files is run.
 """
 
 import re
@@ -43,7 +43,7 @@ _PLANE = re.compile(r"grid\.grids\.(\d{1,2})\.([0-5])")
 _TRUNK = re.compile(r"feature_out\.(\d{1,2})\.(?:weight|bias)")
 _HEAD = re.compile(rf"(?:{'|'.join(_HEADS.values())})\.[13]\.(?:weight|bias)")
 _UNUSED = re.compile(r"timenet\.\d\.(?:weight|bias)|\w+_poc")
-"""Parts that the program stores and never reads."""
+"""Entries that the program stores and never reads."""
 
 
 def read_fourdgs_checkpoint(
@@ -77,7 +77,7 @@ def read_fourdgs_checkpoint(
 
 
 def _iteration(folder: Path) -> Path:
-    """The folder that holds the files."""
+    """The folder with the files."""
     if (folder / "point_cloud.ply").exists():
         return folder
     found = [*folder.glob("iteration_*"), *folder.glob("point_cloud/iteration_*")]
@@ -91,7 +91,7 @@ def _iteration(folder: Path) -> Path:
 
 
 def _read_gaussians(file: Path) -> Gaussians:
-    """As any PLY, but with quaternions as long as they are stored."""
+    """Read a PLY file; quaternions keep their stored lengths."""
     require_file(file, "a PLY file")
     data = file.read_bytes()
     try:
@@ -118,7 +118,7 @@ def _load(file: Path, kind: type) -> Any:
 
 
 def _require_table(file: Path, count: int) -> None:
-    """The table is of no use, but one of other Gaussians shows that files were mixed."""
+    """Check the unused table: a wrong size shows that files of several models were mixed."""
     if not file.exists():
         return
     table = _load(file, Tensor)
@@ -130,7 +130,7 @@ def _require_table(file: Path, count: int) -> None:
 
 
 def _net(state: Mapping[object, object]) -> dict[str, Tensor]:
-    """The tensors of the field, by name; refuses what would change it."""
+    """Tensors of the field by name; rejects unknown entries."""
     known, unknown = {}, []
     for name, value in state.items():
         part = str(name).removeprefix(_NET)
@@ -175,7 +175,7 @@ def _levels(net: Mapping[str, Tensor]) -> tuple[tuple[Tensor, ...], ...]:
 
 
 def _trunk(net: Mapping[str, Tensor]) -> tuple[Layer, ...]:
-    """Every second part of their sequence is a layer, beginning with the first."""
+    """Linear layers of the trunk: every second entry of the sequence."""
     found = [int(match[1]) for name in net if (match := _TRUNK.fullmatch(name))]
     return tuple(_layer(net, f"feature_out.{k}") for k in range(0, max(found, default=0) + 1, 2))
 

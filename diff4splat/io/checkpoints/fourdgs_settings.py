@@ -1,7 +1,7 @@
-"""Which parts of a field 4DGaussians used, from the ``cfg_args`` text beside its checkpoints.
+"""The active heads of a 4DGaussians model, from the ``cfg_args`` text beside its checkpoints.
 
-The file is the printed form of a Python ``Namespace``. It is parsed, never evaluated: only the
-literal values that are asked for are looked at.
+The file is the printed form of a Python ``Namespace``. It is parsed, never evaluated, and only
+literal values are read.
 """
 
 import ast
@@ -10,7 +10,7 @@ from pathlib import Path
 from diff4splat.errors import FileFormatError
 
 DEFAULT_HEADS = ("position", "rotation", "scale")
-"""What the program uses unless it is told otherwise."""
+"""Heads that the program uses by default."""
 _SWITCHED_OFF_BY = {
     "position": "no_dx",
     "rotation": "no_dr",
@@ -19,17 +19,17 @@ _SWITCHED_OFF_BY = {
     "color": "no_dshs",
 }
 _REFUSED = ("apply_rotation", "static_mlp", "empty_voxel", "no_grid", "grid_pe")
-"""Switches that change the field; the program's comments call most of them useless."""
+"""Experimental switches that change the field, and are not supported."""
 _LARGEST_BYTES = 1 << 20
 
 
 def heads_in_use(folder: Path) -> tuple[str, ...]:
-    """The heads that a run used, from ``cfg_args`` in ``folder`` or the two folders above it.
+    """Active heads of a run, from ``cfg_args`` in ``folder`` or the two folders above it.
 
-    Without such a file they are the program's default.
+    Without such a file, the defaults of the program.
 
     Raises:
-        FileFormatError: the file is of another kind, or the run used an experimental switch.
+        FileFormatError: the file has another format, or the run used an experimental switch.
     """
     for place in (folder, *folder.resolve().parents[:2]):
         file = place / "cfg_args"
@@ -39,7 +39,7 @@ def heads_in_use(folder: Path) -> tuple[str, ...]:
 
 
 def _switches(file: Path) -> dict[str, object]:
-    """The literal values by name; those that are no literals are left out."""
+    """Literal values by name; other values are skipped."""
     try:
         if file.stat().st_size > _LARGEST_BYTES:
             raise ValueError("larger than any settings")
@@ -64,6 +64,6 @@ def _heads(switches: dict[str, object], file: Path) -> tuple[str, ...]:
         if switches.get(name):
             raise FileFormatError(f"{file}: expected a run without {name}, got {switches[name]!r}")
     off = {head for head, name in _SWITCHED_OFF_BY.items() if switches.get(name, True) is True}
-    # A switch that is not there has its default: the first three heads on, the others off.
+    # A missing switch has its default: the first three heads on, the others off.
     off -= {head for head in DEFAULT_HEADS if _SWITCHED_OFF_BY[head] not in switches}
     return tuple(head for head in _SWITCHED_OFF_BY if head not in off)

@@ -1,8 +1,8 @@
-"""Native 4D Gaussians from the raw numbers that their authors' programs optimise.
+"""Native 4D Gaussians from the unactivated tensors of the authors' program.
 
 Axes: ``n`` Gaussians. Yang et al. (ICLR 2024, arXiv 2310.10642) keep logarithms of scales, logits
-of opacities, and colours as one list with the index 16 · order in time + harmonic. Only numbers
-come in here; no file is opened, because their checkpoints are pickles.
+of opacities, and colours as one list with the index 16 · order in time + harmonic.
+``native_4dgs_checkpoint`` reads their files.
 """
 
 from dataclasses import dataclass, fields
@@ -19,7 +19,7 @@ from diff4splat.scene.motion.spacetime_covariance import SpacetimeCovariance
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawSpacetime:
-    """Unactivated values, in the shapes of the authors' arrays."""
+    """Unactivated values, in the shapes of the program's tensors."""
 
     positions: Float[Tensor, "n 3"]
     times_s: Float[Tensor, "n 1"]
@@ -35,7 +35,7 @@ class RawSpacetime:
 
 
 def from_raw_4d(raw: RawSpacetime) -> SpacetimeGaussians:
-    """Activated Gaussians, for ``to_spacetime``; made with 4D rotations (their ``rot_4d``).
+    """Activate the values, for ``to_spacetime``; needs 4D rotations (the program's ``rot_4d``).
 
     Raises:
         InputError: a number is not finite.

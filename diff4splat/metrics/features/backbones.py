@@ -1,9 +1,9 @@
-"""The two networks that LPIPS looks through: VGG16 and AlexNet, as far as their last ReLU.
+"""The backbones of LPIPS: VGG16 and AlexNet, up to their last ReLU.
 
 Layers are numbered as in torchvision's ``features``: convolution ``i`` is followed by its ReLU
 ``i + 1``. LPIPS (https://github.com/richzhang/PerceptualSimilarity, ``pretrained_networks.py``)
-cuts them into five slices, keeps those numbers in its weight names, ``net.slice2.5.weight``, and
-takes the output of every slice.
+splits them into five slices, keeps those numbers in its weight names (``net.slice2.5.weight``), and
+uses the output of every slice.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True)
 class Convolution:
-    """With bias, and a ReLU behind it."""
+    """Convolution with bias, followed by a ReLU."""
 
     index: int
     inputs: int
@@ -26,7 +26,7 @@ class Convolution:
 
 @dataclass(frozen=True, slots=True)
 class MaxPool:
-    """Largest of a window."""
+    """Max pooling."""
 
     kernel: int
     stride: int = 2
@@ -34,20 +34,20 @@ class MaxPool:
 
 @dataclass(frozen=True, slots=True)
 class Backbone:
-    """A network cut into slices."""
+    """A network as a sequence of slices."""
 
     name: str
     slices: tuple[tuple[Convolution | MaxPool, ...], ...]
     least_px: int
-    """Smaller pictures leave the last slice without a pixel."""
+    """Smallest image side; smaller images leave no pixel in the last slice."""
 
     @property
     def channels(self) -> tuple[int, ...]:
-        """Of each slice's output."""
+        """Channels of the output of each slice."""
         return tuple(layers[-1].outputs for layers in self.slices)
 
     def convolutions(self) -> dict[str, Convolution]:
-        """Every convolution by the name that LPIPS gives it, such as ``net.slice1.0``."""
+        """Every convolution by its LPIPS name, such as ``net.slice1.0``."""
         return {
             f"net.slice{number}.{layer.index}": layer
             for number, layers in enumerate(self.slices, 1)
@@ -55,24 +55,24 @@ class Backbone:
             if isinstance(layer, Convolution)
         }
 
-    def outputs(self, picture: Tensor, weights: dict[str, Tensor]) -> list[Tensor]:
-        """What each slice makes of ``n 3 h w`` pictures."""
-        found = []
+    def outputs(self, images: Tensor, weights: dict[str, Tensor]) -> list[Tensor]:
+        """Outputs of all slices for ``n 3 h w`` images."""
+        outputs = []
         for number, layers in enumerate(self.slices, 1):
             for layer in layers:
-                picture = _apply(layer, f"net.slice{number}", picture, weights)
-            found.append(picture)
-        return found
+                images = _apply(layer, f"net.slice{number}", images, weights)
+            outputs.append(images)
+        return outputs
 
 
 def _apply(
-    layer: Convolution | MaxPool, prefix: str, picture: Tensor, weights: dict[str, Tensor]
+    layer: Convolution | MaxPool, prefix: str, images: Tensor, weights: dict[str, Tensor]
 ) -> Tensor:
     if isinstance(layer, MaxPool):
-        return torch.nn.functional.max_pool2d(picture, layer.kernel, layer.stride)
+        return torch.nn.functional.max_pool2d(images, layer.kernel, layer.stride)
     name = f"{prefix}.{layer.index}"
     return torch.nn.functional.conv2d(
-        picture,
+        images,
         weights[f"{name}.weight"],
         weights[f"{name}.bias"],
         stride=layer.stride,
@@ -111,4 +111,4 @@ ALEXNET = Backbone(
     ),
     least_px=31,
 )
-BACKBONES = {trunk.name: trunk for trunk in (VGG16, ALEXNET)}
+BACKBONES = {backbone.name: backbone for backbone in (VGG16, ALEXNET)}

@@ -31,5 +31,5 @@ def load_features(spec: str | None = None) -> PerceptualFeatures:
             f"perceptual features: expected {' or '.join(f'{name}:FILE' for name in BACKBONES)}, "
             f"or two files joined by a comma, got {spec!r}; leave it out for the stand-in"
         )
-    trunk = BACKBONES[network]
-    return Lpips(trunk, read_lpips_weights([Path(file) for file in files], trunk))
+    backbone = BACKBONES[network]
+    return Lpips(backbone, read_lpips_weights([Path(file) for file in files], backbone))

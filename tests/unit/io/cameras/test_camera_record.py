@@ -12,7 +12,7 @@ from diff4splat.errors import FileFormatError, InputError
 from diff4splat.geometry.optics import Aperture, Optics
 from diff4splat.io.cameras.camera_record import (
     CameraRecord,
-    FrameRecord,
+    FrameFiles,
     read_camera_record,
     write_camera_record,
 )
@@ -25,9 +25,9 @@ def record(frames: int = 2) -> CameraRecord:
     optics = Optics(aperture=Aperture(radius=0.1, focus_distance=2.0))
     return CameraRecord(
         effect="depth-of-field",
-        filmed=filmed(scene.path, optics),
+        physical_path=filmed(scene.path, optics),
         frames=tuple(
-            FrameRecord(picture=f"{index}.png", geometry=f"depth/{index}.exr")
+            FrameFiles(image=f"{index}.png", geometry=f"depth/{index}.exr")
             for index in range(frames)
         ),
         geometry="depth",
@@ -47,11 +47,12 @@ def test_everything_comes_back_bit_for_bit(tmp_path: Path) -> None:
     back = read_camera_record(tmp_path / "camera.json")
     for name in ("focal_px", "center_px", "world_from_camera"):
         assert torch.equal(
-            getattr(back.filmed.path.cameras, name), getattr(own.filmed.path.cameras, name)
+            getattr(back.physical_path.path.cameras, name),
+            getattr(own.physical_path.path.cameras, name),
         )
-    assert torch.equal(back.filmed.path.times_s, own.filmed.path.times_s)
-    assert torch.equal(back.filmed.track.times_s, own.filmed.track.times_s)
-    assert back.filmed.optics.aperture == own.filmed.optics.aperture
+    assert torch.equal(back.physical_path.path.times_s, own.physical_path.path.times_s)
+    assert torch.equal(back.physical_path.track.times_s, own.physical_path.track.times_s)
+    assert back.physical_path.optics.aperture == own.physical_path.optics.aperture
     for name in ("effect", "frames", "geometry", "settings", "scene", "generator", "valid"):
         assert getattr(back, name) == getattr(own, name)
     for name in ("scene_time_s", "intervals", "interval_error_px"):
@@ -72,21 +73,21 @@ def test_a_camera_may_have_no_way_and_no_depth(tmp_path: Path) -> None:
     own = record(1)
     own = replace(
         own,
-        filmed=replace(own.filmed, track=None),
-        frames=(FrameRecord(picture="0.png"),),
+        physical_path=replace(own.physical_path, track=None),
+        frames=(FrameFiles(image="0.png"),),
         valid=None,
         scene_time_s=None,
     )
     write_camera_record(own, tmp_path / "camera.json")
     back = read_camera_record(tmp_path / "camera.json")
-    assert back.filmed.track is None
+    assert back.physical_path.track is None
     assert back.frames == own.frames
     assert (back.valid, back.scene_time_s) == (None, None)
 
 
 def test_files_and_frames_are_as_many() -> None:
     with pytest.raises(InputError, match="expected files of 2 frames, got those of 1"):
-        replace(record(), frames=(FrameRecord(picture="0.png"),))
+        replace(record(), frames=(FrameFiles(image="0.png"),))
 
 
 @pytest.mark.parametrize(
