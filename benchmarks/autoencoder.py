@@ -15,8 +15,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
 from diff4splat.generation.input_image import choose_focal, prepare_image
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb

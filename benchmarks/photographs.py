@@ -33,9 +33,9 @@ from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.geometry.rays import pixel_centers
-from diff4splat.io.images import write_png
-from diff4splat.io.ply import read_ply, write_ply
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.ply.ply_file import read_ply, write_ply
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
 from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings

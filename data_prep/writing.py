@@ -13,8 +13,8 @@ from pathlib import Path
 
 import torch
 
+from diff4splat.data.codecs.encode import EncodedClip, encode_clip
 from diff4splat.data.manifest import read_manifest
-from diff4splat.data.members.encode import EncodedClip, encode_clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.synthetic.captioning import SOURCE
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip

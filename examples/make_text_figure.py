@@ -11,7 +11,7 @@ import torch
 from diff4splat import Diff4SplatPipeline
 from diff4splat.generation.image_size import find_image_size
 from diff4splat.generation.input_image import load_image
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.render.api import render
 
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)

@@ -12,9 +12,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.configs.small import small_recipe
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol import Protocol
-from diff4splat.evaluation.protocol_json import LoadedProtocol
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol
 from diff4splat.flow.guidance import Guidance
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_sampling import Conditions, sample_video

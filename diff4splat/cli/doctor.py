@@ -1,6 +1,6 @@
-"""``diff4splat doctor``: what this installation has, whether it works, and what could be added.
+"""``diff4splat doctor``: versions, back ends and extras of this installation, and a self-test.
 
-The table goes to standard output line by line, so that it tells something however far it gets.
+The table is printed line by line, so that a crash still leaves the lines before it.
 """
 
 import os
@@ -27,7 +27,7 @@ EXTRAS = (
     ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),
     ("gsplat", "pictures on a GPU", "pip install 'diff4splat[cuda]'"),
 )
-"""(package, what it is for, how to add it)."""
+"""(package, purpose, install command)."""
 _WIDTH = 20
 
 Rows = Iterable[tuple[str, str]]
@@ -35,10 +35,10 @@ Rows = Iterable[tuple[str, str]]
 
 @dataclass(frozen=True, kw_only=True)
 class Doctor:
-    """Check the installation: versions, back ends, extras, and that a picture comes out right."""
+    """Check the installation: versions, back ends, extras, and a test render."""
 
     warm: bool = False
-    """Only compile, which otherwise happens before the first picture, rays, field and world."""
+    """Compile all kernels now instead of before their first use."""
 
     def run(self) -> None:
         """Print the table, or compile."""
@@ -83,13 +83,13 @@ def precompile_group(name: str) -> None:
 
 
 def print_rows(rows: Rows) -> None:
-    """One aligned line each, as soon as it is known."""
+    """Print one aligned line each, as soon as it is available."""
     for name, value in rows:
         print(f"{name:<{_WIDTH}}{value}", flush=True)
 
 
 def machine_rows() -> Rows:
-    """What can be told without any library."""
+    """Rows that need no library."""
     from diff4splat import __version__
 
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
@@ -101,16 +101,16 @@ def machine_rows() -> Rows:
 
 
 def cpu_name() -> str:
-    """As people know it where the system tells, else the architecture."""
+    """The model name if the system has one, else the architecture."""
     try:
-        found = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+        match = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     except OSError:
-        found = None
-    return found[1] if found else platform.processor() or platform.machine()
+        match = None
+    return match[1] if match else platform.processor() or platform.machine()
 
 
 def torch_rows() -> Rows:
-    """PyTorch and what it computes on."""
+    """PyTorch and its devices."""
     import torch
 
     threads = torch.get_num_threads()
@@ -124,7 +124,7 @@ def torch_rows() -> Rows:
 
 
 def backend_rows() -> Rows:
-    """What every back end says to a picture on the CPU, and on the GPU if there is one."""
+    """State of every rendering back end on the CPU, and on the GPU if available."""
     import torch
 
     from diff4splat.render.backends import BACKENDS
@@ -138,13 +138,13 @@ def backend_rows() -> Rows:
 
 
 def compiled_rows() -> Rows:
-    """What else has kernels to compile."""
+    """State of the other compiled kernels."""
     yield TRACER, installation.tracer_readiness()
     yield HEXPLANE, readiness(HEXPLANE)
     yield WORLDS, readiness(WORLDS)
 
 
 def extra_rows() -> Rows:
-    """Optional packages: the version, or how to add one."""
+    """Optional packages: the version, or the install command."""
     for package, purpose, command in EXTRAS:
         yield package, installation.version(package) or f"not installed; for {purpose}: {command}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Fit:
     def run(self) -> None:
         """Check, read, fit, write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
+        from diff4splat.cli.installation import single_gaussian
         from diff4splat.cli.precompile import precompile_renderer, precompile_tracer
         from diff4splat.fitting.checkpoint import CHECKPOINT_FILE
         from diff4splat.fitting.fit import fit_scene
@@ -93,7 +93,7 @@ class Fit:
         for line in capture.notes:
             note(line)
         if self.renderer in ("auto", "raster"):
-            precompile_renderer(speck("cpu"), log.phases)
+            precompile_renderer(single_gaussian("cpu"), log.phases)
         renderer = FrameRenderer(capture=capture, backend=self.renderer, settings=settings.camera)
         if renderer.traced:
             precompile_tracer(log.phases)
@@ -150,7 +150,7 @@ class Fit:
 
     def initial_scene(self) -> "Scene | None":
         """The initial scene, if any."""
-        from diff4splat.io.scene_file import load_scene
+        from diff4splat.io.scene_files.scene_file import load_scene
 
         return None if self.init is None else load_scene(self.init)
 

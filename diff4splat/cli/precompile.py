@@ -5,7 +5,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from diff4splat.evaluation.protocol import SourceRange
+    from diff4splat.evaluation.protocols.protocol import SourceRange
     from diff4splat.kernels.group import KernelGroup
     from diff4splat.progress.phases import Phases
     from diff4splat.render.settings import RenderJob

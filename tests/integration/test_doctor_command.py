@@ -19,7 +19,7 @@ from diff4splat.cli.precompile import GROUPS, precompile_sources
 from diff4splat.data_prep.synthetic.renderer.jit import GROUP as WORLDS
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.kernels.group import KernelGroup
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.backends import BACKENDS

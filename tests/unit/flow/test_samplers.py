@@ -18,8 +18,8 @@ from oracles_flow import (
 )
 
 from diff4splat.errors import ConfigError, ShapeError
+from diff4splat.flow.analytic_mixture import GaussianMixture, random_mixture
 from diff4splat.flow.levels import log_snr_levels, make_levels, uniform_levels
-from diff4splat.flow.mixture import GaussianMixture, random_mixture
 from diff4splat.flow.samplers import SAMPLERS, Sampler, find_sampler, integrate
 
 samplers = pytest.mark.parametrize("sampler", SAMPLERS.values(), ids=SAMPLERS)

@@ -60,7 +60,7 @@ def says(model: Model, right: float) -> MotionUNet:
 
 
 def left_out(log: RunLog) -> set[str]:
-    return {omission.what for omission in log.omissions}
+    return {omission.what for omission in log.skipped}
 
 
 def wish(text: bool = False, seed: int = 0, **changes: object) -> MotionRequest:

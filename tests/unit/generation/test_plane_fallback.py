@@ -78,7 +78,7 @@ def test_no_network_runs_and_the_log_says_so(
 ) -> None:
     forbid_networks(partly, monkeypatch)
     _, log = generate(partly)
-    told = {one.what: one for one in log.omissions}
+    told = {one.what: one for one in log.skipped}
     assert told["video model and reconstruction"].why == WHY
     assert told["video model and reconstruction"].error == 0
     assert "text encoder" not in told
@@ -90,7 +90,7 @@ def test_a_prompt_is_checked_and_reported_as_left_out(
 ) -> None:
     forbid_networks(partly, monkeypatch)
     scene, log = generate(partly, "waves")
-    assert {one.what: one.why for one in log.omissions}["text encoder"] == WHY
+    assert {one.what: one.why for one in log.skipped}["text encoder"] == WHY
     assert scene.provenance.prompt == "waves"
     with pytest.raises(InputError, match="prompt"):
         generate(partly, "")
@@ -108,7 +108,7 @@ def test_otherwise_everything_runs(partly: Model, trained: tuple[str, ...]) -> N
     seen = outputs_of(model.networks.ldrm)
     scene, log = generate(model)
     assert len(seen) == 1
-    assert "video model and reconstruction" not in {one.what for one in log.omissions}
+    assert "video model and reconstruction" not in {one.what for one in log.skipped}
     with pytest.raises(AssertionError):
         assert_equal(scene, generate(random_model())[0])
 

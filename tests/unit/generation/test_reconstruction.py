@@ -54,14 +54,14 @@ def test_pruning_keeps_the_cells_of_what_it_keeps() -> None:
     assert 0 < len(pruned.cells) < len(whole.cells)
     assert torch.equal(pruned.gaussians.means, whole.gaussians.means[pruned.cells])
     assert float(pruned.gaussians.opacities.min()) >= 0.01
-    (omission,) = log.omissions
+    (omission,) = log.skipped
     assert omission.error > 1 / 255, "what a renderer would have drawn is an error"
 
 
 def test_dropping_what_no_renderer_draws_costs_nothing() -> None:
     log = RunLog()
     prune_cells(canonical(), 1 / 255, log)
-    assert [omission.error for omission in log.omissions] == [0.0]
+    assert [omission.error for omission in log.skipped] == [0.0]
 
 
 @torch.no_grad()
@@ -82,7 +82,7 @@ def test_a_network_that_cannot_move_anything_is_not_run() -> None:
     motion = deform(network, canonical(), KEY_TIMES_S, UNITS, log)
     assert isinstance(motion, StaticMotion)
     assert motion.time_range_s == (0.0, 2.0)
-    assert [omission.what for omission in log.omissions] == ["deformation network"]
+    assert [omission.what for omission in log.skipped] == ["deformation network"]
 
 
 def test_what_the_video_model_tells_is_added() -> None:

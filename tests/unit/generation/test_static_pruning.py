@@ -82,7 +82,7 @@ def test_what_is_dropped_moved_by_less_than_promised() -> None:
     dropped[trimmed.motion.moving_index] = False
     assert 20 < int(dropped.sum()) < COUNT - 20
     assert float(moved_px(scene, CAMERA)[dropped].max()) <= 0.5
-    (omission,) = log.omissions
+    (omission,) = log.skipped
     assert omission.error == 0.5
     pixels, _ = project(CAMERA, trimmed.state_at(1.0).means[dropped])
     torch.testing.assert_close(pixels, project(CAMERA, scene.gaussians.means[dropped])[0])

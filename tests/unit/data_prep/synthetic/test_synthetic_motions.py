@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from diff4splat.data_prep.synthetic.captions.vocabulary import VERBS
+from diff4splat.captions.vocabulary import VERBS
 from diff4splat.data_prep.synthetic.motions.context import (
     MotionContext,
     MotionResult,
