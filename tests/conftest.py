@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 # As the command line does, and before torch is loaded: waiting threads sleep.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -21,9 +22,23 @@ def _seeded() -> None:
     torch.manual_seed(0)
 
 
-@pytest.fixture
-def as_shipped() -> Iterator[None]:
+@contextmanager
+def unchecked() -> Iterator[None]:
     """Annotations off, as users run it: what remains is the validation we wrote ourselves."""
     jaxtyping.config.update("jaxtyping_disable", True)
     yield
     jaxtyping.config.update("jaxtyping_disable", False)
+
+
+@pytest.fixture
+def as_shipped() -> Iterator[None]:
+    """Annotations off for one test."""
+    with unchecked():
+        yield
+
+
+@pytest.fixture(scope="module")
+def module_as_shipped() -> Iterator[None]:
+    """Annotations off for all tests of a file and what they share: for hundreds of steps."""
+    with unchecked():
+        yield
