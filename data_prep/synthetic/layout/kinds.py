@@ -11,8 +11,6 @@ from dataclasses import dataclass
 class SceneKind:
     """One kind of place."""
 
-    phrase: str
-    """Name in captions."""
     area_radius_m: tuple[float, float]
     tilt_deg: tuple[float, float]
     """Tilt of the camera."""

@@ -14,7 +14,7 @@ from diff4splat.errors import FileFormatError
 from diff4splat.evaluation.protocols import datasets as opening
 from diff4splat.evaluation.protocols.datasets import open_clips
 from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol
-from diff4splat.training.recipe import DataSettings, SourceSettings
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
 
 
 def test_shards_lie_beside_the_protocol_file(tmp_path: Path) -> None:
