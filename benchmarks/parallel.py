@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING
 from diff4splat.progress.phases import peak_memory_bytes
 
 if TYPE_CHECKING:
-    from diff4splat.training.recipe import StageRecipe
+    from diff4splat.training.recipe.stage import StageRecipe
     from diff4splat.training.stage import Stage
-    from diff4splat.training.trainer.samples import Samples
+    from diff4splat.training.trainer.loading.samples import Samples
 
 MODES = (("none", 1), ("ddp", 2), ("fsdp2", 2))
 WARM_UP, TIMEOUT_S = 3, 1800
@@ -58,8 +58,8 @@ def work(mode: str, options: argparse.Namespace) -> None:
     """One process of one mode: train, then leave its figures in a file."""
     import torch
 
-    from diff4splat.training.recipe import TrainerSettings
-    from diff4splat.training.trainer.run import run_stage
+    from diff4splat.training.recipe.trainer import TrainerSettings
+    from diff4splat.training.trainer.loop.fit import fit_stage
     from diff4splat.training.trainer.settings import RunSettings
 
     make, idle = find_factory(options.factory), peak_memory_bytes()
@@ -87,7 +87,7 @@ def work(mode: str, options: argparse.Namespace) -> None:
     )
     steps = WARM_UP + options.steps
     recipe = replace(recipe, steps=steps, data=replace(recipe.data, workers=0))
-    run_stage(stage, Watched(), recipe, run)
+    fit_stage(stage, Watched(), recipe, run)
     rank = os.environ.get("RANK", "0")
     (folder / f"peak-{rank}.json").write_text(json.dumps(peak))
 

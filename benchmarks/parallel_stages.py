@@ -8,7 +8,7 @@ from diff4splat.configs.recipes import recipe_by_name, with_clips
 from diff4splat.metrics.features.load import load_features
 from diff4splat.models.factory import create_networks
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import Stage
 from diff4splat.training.stages.factory import create_stage
 from diff4splat.training.stages.model_stage import StagePlan
@@ -19,9 +19,9 @@ def static() -> tuple[Stage, ClipSamples, StageRecipe]:
     return _stage("static-low")
 
 
-def generator() -> tuple[Stage, ClipSamples, StageRecipe]:
+def video_diffusion() -> tuple[Stage, ClipSamples, StageRecipe]:
     """The video model and the text encoder."""
-    return _stage("generator")
+    return _stage("video_diffusion")
 
 
 def _stage(name: str) -> tuple[Stage, ClipSamples, StageRecipe]:

@@ -1,4 +1,4 @@
-"""The stage that ``parallel.py`` measures unless told otherwise."""
+"""The stage that ``parallel.py`` measures by default."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.recipe.losses import AutoencoderLosses
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import TOTAL, Stage
 
 WIDTH, BLOCKS = 1024, 12
@@ -66,5 +67,11 @@ class ToyStage(Stage):
 def toy_recipe() -> StageRecipe:
     """Four samples per step, in micro batches of two."""
     return StageRecipe(
-        name="toy", kind="vae", steps=10, global_batch=4, micro_batch=2, trained=("body",)
+        name="toy",
+        kind="vae",
+        steps=10,
+        global_batch=4,
+        micro_batch=2,
+        trained=("body",),
+        losses=AutoencoderLosses(),
     )

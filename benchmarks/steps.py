@@ -18,8 +18,8 @@ from pathlib import Path
 
 from diff4splat.configs.recipes import recipe_by_name, with_clips
 from diff4splat.io.atomic import write_text
-from diff4splat.training.recipe import Recipe
-from diff4splat.training.stage_run import StageRun, train_stage
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.train_stage import StageRequest, train_stage
 
 WARM_UP = 3
 HEAD = "| stage | clips | s per step | waiting | samples per s |\n|---|---|---|---|---|\n"
@@ -27,14 +27,14 @@ HEAD = "| stage | clips | s per step | waiting | samples per s |\n|---|---|---|-
 
 def measure(recipe: Recipe, stage: str, folder: Path, steps: int) -> list[dict[str, float]]:
     """Log rows of the steps that count."""
-    asked = StageRun(
+    request = StageRequest(
         recipe=recipe,
         stage=stage,
         folder=folder,
         ignore_gates=True,
         stop_after_steps=steps + WARM_UP,
     )
-    train_stage(asked)
+    train_stage(request)
     rows = [json.loads(line) for line in (folder / stage / "log.jsonl").read_text().splitlines()]
     return [row for row in rows if row["event"] == "step"][WARM_UP:]
 

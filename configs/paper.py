@@ -10,20 +10,19 @@ from dataclasses import replace
 from diff4splat.configs.stages import (
     dynamic_data,
     dynamic_stage,
-    generator_stage,
     joint_stage,
     later,
     reconstruction_gates,
     static_stage,
+    video_diffusion_stage,
 )
 from diff4splat.models.config.sizes import paper_size
-from diff4splat.training.recipe import (
-    DataSettings,
-    OptimizerSettings,
-    Recipe,
-    StageRecipe,
-    TrainerSettings,
-)
+from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.recipe.losses import AutoencoderLosses
+from diff4splat.training.recipe.optimizer import OptimizerSettings
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.recipe.trainer import TrainerSettings
 
 
 def paper_recipe() -> Recipe:
@@ -39,6 +38,7 @@ def paper_recipe() -> Recipe:
         global_batch=64,
         micro_batch=1,
         trained=("vae",),
+        losses=AutoencoderLosses(),
         optimizer=OptimizerSettings(learning_rate=1e-4),
         data=dynamic_data(replace(data, views=1, tracks=0)),
     )
@@ -51,12 +51,12 @@ def paper_recipe() -> Recipe:
     )
     high = later(low, "static-high", (512, 512), 1.0)
     dynamic = replace(dynamic_stage(high, data.tracks), steps=20_000)
-    generator = replace(generator_stage(dynamic), steps=100_000, level_shift=5.0)
-    joint = replace(joint_stage(dynamic), steps=5_000, level_shift=5.0)
+    video = replace(video_diffusion_stage(dynamic), steps=100_000, timestep_shift=5.0)
+    joint = replace(joint_stage(dynamic), steps=5_000, timestep_shift=5.0)
     return Recipe(
         name="paper",
         seed=0,
         model=model,
-        stages=(vae, low, high, dynamic, generator, joint),
+        stages=(vae, low, high, dynamic, video, joint),
         trainer=TrainerSettings(precision="bfloat16", parallel="fsdp2"),
     )

@@ -9,8 +9,9 @@ from diff4splat.configs.paper import paper_recipe
 from diff4splat.configs.small import small_recipe
 from diff4splat.configs.test import test_recipe
 from diff4splat.errors import ConfigError
-from diff4splat.training.recipe import DataSettings, Recipe, SourceSettings
-from diff4splat.training.recipe_json import recipe_from_json
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_from_json
 
 RECIPES: Mapping[str, Callable[[], Recipe]] = MappingProxyType(
     {"test": test_recipe, "small": small_recipe, "paper": paper_recipe}
@@ -50,7 +51,7 @@ def find_recipe(name_or_file: str) -> Recipe:
 
 
 def with_clips(recipe: Recipe, folder: Path) -> Recipe:
-    """The recipe with every source replaced by a folder of shards; shares of still clips stay."""
+    """The recipe with every source replaced by a folder of shards; shares of static clips stay."""
     stages = [
         replace(stage, data=_from_folder(stage.data, folder.resolve())) for stage in recipe.stages
     ]
@@ -58,7 +59,7 @@ def with_clips(recipe: Recipe, folder: Path) -> Recipe:
 
 
 def with_latents(recipe: Recipe, stage: str, folders: Sequence[Path]) -> Recipe:
-    """The recipe whose generator ``stage`` learns from folders of encoded clips."""
+    """The recipe whose video diffusion ``stage`` learns from folders of encoded clips."""
     before = recipe.stage(stage)
     share = before.data.sources[0].still_share
     sources = tuple(

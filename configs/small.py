@@ -10,29 +10,33 @@ from dataclasses import replace
 from diff4splat.configs.stages import (
     dynamic_data,
     dynamic_stage,
-    generator_stage,
     motion_stage,
     reconstruction_gates,
     static_stage,
+    video_diffusion_stage,
 )
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.config.sizes import small_size
-from diff4splat.training.recipe import (
-    DataSettings,
-    Gate,
-    LossWeights,
-    OptimizerSettings,
-    Recipe,
-    StageRecipe,
-    TrainerSettings,
+from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.recipe.losses import (
+    AutoencoderLosses,
+    DepthLosses,
+    DynamicLosses,
+    FlowLosses,
+    MotionDiffusionLosses,
+    MotionLosses,
+    ReconstructionLosses,
 )
+from diff4splat.training.recipe.optimizer import OptimizerSettings
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import Gate, StageRecipe
+from diff4splat.training.recipe.trainer import TrainerSettings
 
-RECONSTRUCTION = LossWeights(
-    photometric=4.0, perceptual=0.0, depth_log=0.5, motion_size=0.0, motion_width=0.2
-)
-"""Without the paper's pull to standstill, which costs more than half of what motion gains."""
+RECONSTRUCTION = ReconstructionLosses(photometric=4.0, perceptual=0.0, depth_log=0.5)
+MOTION = MotionLosses(displacement_l1=0.0, huber_delta=0.2)
+"""Without the paper's L1 norm of displacements, which costs more than half of what motion gains."""
 TRACKS = 512
-"""Points from which it is read where things go, also where none of them is judged."""
+"""Points that give the true motion, also where no stage evaluates them."""
 TRACK_GATE = Gate(measure="track_share", bound=0.8, direction="at_most")
 
 
@@ -46,30 +50,32 @@ def small_recipe() -> Recipe:
         size_px=model.size_px,
         frames=model.frames,
         input_stride=2,
-        track_stride=TIME_STRIDE,
+        keyframe_stride=TIME_STRIDE,
         augment=True,
         views=2,
         target_frames=4,
     )
     vae = _autoencoder(data)
-    sight = _sight(vae, data)
-    static = replace(sight, name="static-low", kind="static", steps=400)
-    motion = _motion(static, data.tracks)
+    pretrain = _posed_video_pretrain(vae, data)
+    static = replace(pretrain, name="static-low", kind="static", steps=400)
     dynamic = _dynamic(static, data.tracks)
+    video = _video_diffusion(dynamic)
     return Recipe(
         name="small",
         seed=0,
         model=model,
-        stages=(vae, sight, static, motion, dynamic, *_generating(dynamic)),
+        stages=(
+            vae,
+            pretrain,
+            static,
+            _motion(static, data.tracks),
+            dynamic,
+            _monocular_depth(dynamic),
+            video,
+            _motion_diffusion(video),
+        ),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
-
-
-def _generating(dynamic: StageRecipe) -> tuple[StageRecipe, ...]:
-    """What comes after the reconstruction of true videos."""
-    single, generator = _single(dynamic), _generator(dynamic)
-    told = _told(single)
-    return single, _depth(single), told, generator, _branch(generator), _joint(told)
 
 
 def _autoencoder(data: DataSettings) -> StageRecipe:
@@ -80,36 +86,37 @@ def _autoencoder(data: DataSettings) -> StageRecipe:
         global_batch=4,
         micro_batch=4,
         trained=("vae",),
-        losses=LossWeights(perceptual=0.0),
+        losses=AutoencoderLosses(perceptual=0.0),
         optimizer=OptimizerSettings(learning_rate=2e-4, warmup_steps=20),
         data=dynamic_data(replace(data, target_frames=1, tracks=0)),
         gates=(Gate(measure="psnr", bound=28.0),),
     )
 
 
-def _sight(vae: StageRecipe, data: DataSettings) -> StageRecipe:
-    """LDRM from pictures and cameras alone; may run beside the autoencoder."""
+def _posed_video_pretrain(vae: StageRecipe, data: DataSettings) -> StageRecipe:
+    """LDRM from images and cameras alone; may run beside the autoencoder."""
     return replace(
         static_stage(vae, data),
-        name="sight",
-        kind="sight",
+        name="posed_video_pretrain",
+        kind="posed_video_pretrain",
         steps=2_000,
         micro_batch=2,
         losses=RECONSTRUCTION,
         optimizer=OptimizerSettings(learning_rate=8e-4, warmup_steps=200),
-        true_pictures=True,
+        use_ground_truth_frames=True,
         gates=reconstruction_gates(psnr=16.0, depth_correlation=0.5),
     )
 
 
 def _motion(static: StageRecipe, tracks: int) -> StageRecipe:
-    """Many times per clip: without rendering another one costs little."""
+    """Many times per clip: without rendering another time costs little."""
     stage = motion_stage(static, tracks)
     return replace(
         stage,
         steps=800,
         global_batch=8,
         micro_batch=8,
+        losses=MOTION,
         data=replace(stage.data, target_frames=8),
         optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
         gates=(TRACK_GATE,),
@@ -117,106 +124,67 @@ def _motion(static: StageRecipe, tracks: int) -> StageRecipe:
 
 
 def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
-    """Who moves is known by now, so that who does not is held to it."""
+    """The moving objects are known by now, so a smaller delta holds the others still."""
     return replace(
         dynamic_stage(static, tracks),
         steps=400,
-        losses=replace(static.losses, motion_width=0.05),
+        losses=DynamicLosses(
+            reconstruction=RECONSTRUCTION, motion=replace(MOTION, huber_delta=0.05)
+        ),
         optimizer=replace(static.optimizer, learning_rate=4e-4, warmup_steps=20),
-        true_pictures=False,
+        use_ground_truth_frames=False,
         gates=(*static.gates, TRACK_GATE),
     )
 
 
-def _single(dynamic: StageRecipe) -> StageRecipe:
-    """LDRM from one picture too: what drafts are made from. Depth needs no second moment."""
-    data = replace(dynamic.data, target_frames=2, moving_targets=False, tracks=0)
+def _monocular_depth(dynamic: StageRecipe) -> StageRecipe:
+    """Depth of single images: seven of each clip, without rendering."""
     return replace(
         dynamic,
-        name="single",
-        kind="static",
-        steps=1_500,
+        name="monocular_depth",
+        kind="monocular_depth",
+        steps=6_000,
         global_batch=8,
         micro_batch=8,
-        trained=("ldrm",),
-        data=data,
-        single_share=0.75,
-        true_pictures=True,
+        trained=("monocular_depth",),
+        losses=DepthLosses(),
+        optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
+        data=replace(dynamic.data, target_frames=4, tracks=0),
         gates=(),
     )
 
 
-def _depth(single: StageRecipe) -> StageRecipe:
-    """Depth of pictures without a video: seven of each clip, none of them rendered."""
-    return replace(
-        single,
-        name="depth",
-        kind="depth",
-        steps=6_000,
-        global_batch=8,
-        micro_batch=8,
-        optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
-        losses=LossWeights(depth_log=1.0, depth_edges=0.5, depth_shift=1.0, sky=0.2),
-        data=replace(single.data, target_frames=4, moving_targets=True),
-    )
+def _video_diffusion(dynamic: StageRecipe) -> StageRecipe:
+    """Captions name left and right, so clips are mirrored with their captions when encoded.
 
-
-def _told(single: StageRecipe) -> StageRecipe:
-    """LDRM from one picture, judged along the path while things move: what they and edges hide."""
-    return replace(
-        single,
-        name="told",
-        kind="told",
-        steps=2_500,
-        losses=replace(single.losses, photometric=12.0),
-        optimizer=replace(single.optimizer, learning_rate=2e-4),
-        data=replace(single.data, target_frames=4, moving_targets=True, tracks=TRACKS),
-    )
-
-
-def _generator(dynamic: StageRecipe) -> StageRecipe:
-    """Captions speak of left and right, so clips are not mirrored here, but where they are encoded.
-
-    Most of what text decides is decided where there is much noise.
+    Text decides most at high noise levels.
     """
-    stage = generator_stage(dynamic)
+    stage = video_diffusion_stage(dynamic)
     return replace(
         stage,
         steps=6_000,
         global_batch=16,
         micro_batch=16,
         optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=100),
-        losses=replace(stage.losses, flow_level=0.4, flow_energy=0.5, flow_motion=200.0),
+        losses=FlowLosses(min_level_weighting=0.4, channel_power_exponent=0.5, hidden_weight=8.0),
         data=replace(stage.data, augment=False, tracks=TRACKS),
-        level_shift=3.0,
-        vary_captions=True,
+        timestep_shift=3.0,
+        augment_captions=True,
     )
 
 
-def _branch(generator: StageRecipe) -> StageRecipe:
-    """The motion branch; small beside the video model, so that it sees far more clips.
+def _motion_diffusion(video: StageRecipe) -> StageRecipe:
+    """The motion network: small beside the video model, so it trains on far more clips.
 
-    Where things are has to be learnt from the picture; at low levels the motion itself shows it.
+    It has to learn object positions from the image; at low levels the noisy motion shows them.
     """
     return replace(
-        generator,
-        name="branch",
-        kind="branch",
+        video,
+        name="motion_diffusion",
+        kind="motion_diffusion",
         steps=4_000,
-        trained=("dit",),
-        losses=replace(generator.losses, flow_motion=1.0, moves=10.0),
-        data=replace(generator.data, moments=True),
-        level_shift=16.0,
-    )
-
-
-def _joint(told: StageRecipe) -> StageRecipe:
-    """The reconstruction, on motion as the branch makes it; right or wrong, it is what is shown."""
-    return replace(
-        told,
-        name="joint",
-        kind="generated",
-        steps=400,
-        data=replace(told.data, augment=False),
-        optimizer=replace(told.optimizer, learning_rate=1e-4, warmup_steps=20),
+        trained=("motion_unet",),
+        losses=MotionDiffusionLosses(min_level_weighting=0.4, motion_mask=10.0),
+        data=replace(video.data, keyframes_only=True),
+        timestep_shift=16.0,
     )

@@ -1,6 +1,6 @@
 """The order of stages that every recipe keeps, and what differs between them.
 
-    vae → static-low → static-high → dynamic → generator → joint
+    vae → static-low → static-high → dynamic → video_diffusion → joint
 
 The middle three are the paper's (40,000, 40,000 and 20,000 steps). The autoencoder comes first and
 the video model after them because no public weights are assumed; both are trained by the paper in
@@ -9,7 +9,15 @@ some other way that it does not describe.
 
 from dataclasses import replace
 
-from diff4splat.training.recipe import DataSettings, Gate, SourceSettings, StageRecipe
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
+from diff4splat.training.recipe.losses import (
+    DynamicLosses,
+    FlowLosses,
+    JointLosses,
+    MotionLosses,
+    ReconstructionLosses,
+)
+from diff4splat.training.recipe.stage import Gate, StageRecipe
 
 STILL = (SourceSettings(still_share=1.0),)
 """Clips in which only the camera moves."""
@@ -23,42 +31,71 @@ def static_data(data: DataSettings) -> DataSettings:
 
 
 def dynamic_data(data: DataSettings) -> DataSettings:
-    """The same samples from moving and still clips."""
+    """The same samples from moving and static clips."""
     return replace(data, sources=MIXED)
 
 
 def static_stage(vae: StageRecipe, data: DataSettings) -> StageRecipe:
-    """LDRM alone, on what stands still."""
-    data = static_data(data)
-    return replace(vae, name="static-low", kind="static", trained=("ldrm",), data=data)
+    """LDRM alone, on static clips."""
+    return replace(
+        vae,
+        name="static-low",
+        kind="static",
+        trained=("ldrm",),
+        losses=ReconstructionLosses(),
+        data=static_data(data),
+    )
 
 
 def motion_stage(static: StageRecipe, tracks: int) -> StageRecipe:
-    """Deformation alone, from followed points on moving and still clips."""
-    data = dynamic_data(replace(static.data, tracks=tracks))
-    return replace(static, name="motion", kind="motion", trained=("deformation",), data=data)
+    """Deformation alone, from tracked points of moving and static clips."""
+    return replace(
+        static,
+        name="motion",
+        kind="motion",
+        trained=("deformation",),
+        losses=MotionLosses(),
+        data=dynamic_data(replace(static.data, tracks=tracks)),
+    )
 
 
 def dynamic_stage(static: StageRecipe, tracks: int) -> StageRecipe:
-    """Deformation too, on moving and still clips with followed points."""
-    data = dynamic_data(replace(static.data, tracks=tracks))
-    trained = ("ldrm", "deformation")
-    return replace(static, name="dynamic", kind="dynamic", trained=trained, data=data)
-
-
-def generator_stage(dynamic: StageRecipe) -> StageRecipe:
-    """The video model; it looks at the input view alone, so nothing else is read or drawn."""
-    data = replace(dynamic.data, views=1, target_frames=1, tracks=0)
-    trained = ("text_encoder", "dit")
+    """LDRM and deformation, on moving and static clips with tracked points."""
     return replace(
-        dynamic, name="generator", kind="generator", trained=trained, data=data, gates=()
+        static,
+        name="dynamic",
+        kind="dynamic",
+        trained=("ldrm", "deformation"),
+        losses=DynamicLosses(reconstruction=static.losses),
+        data=dynamic_data(replace(static.data, tracks=tracks)),
+    )
+
+
+def video_diffusion_stage(dynamic: StageRecipe) -> StageRecipe:
+    """Video diffusion; it uses the input view alone, so samples hold nothing else."""
+    return replace(
+        dynamic,
+        name="video_diffusion",
+        kind="video_diffusion",
+        trained=("text_encoder", "dit"),
+        losses=FlowLosses(),
+        data=replace(dynamic.data, views=1, target_frames=1, tracks=0),
+        gates=(),
     )
 
 
 def joint_stage(dynamic: StageRecipe) -> StageRecipe:
-    """All but the autoencoder."""
-    trained = ("text_encoder", "dit", "ldrm", "deformation")
-    return replace(dynamic, name="joint", kind="joint", trained=trained, gates=())
+    """All networks but the autoencoder."""
+    return replace(
+        dynamic,
+        name="joint",
+        kind="joint",
+        trained=("text_encoder", "dit", "ldrm", "deformation"),
+        losses=JointLosses(
+            reconstruction=dynamic.losses.reconstruction, motion=dynamic.losses.motion
+        ),
+        gates=(),
+    )
 
 
 def reconstruction_gates(psnr: float, depth_correlation: float) -> tuple[Gate, ...]:

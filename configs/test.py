@@ -4,21 +4,20 @@ from dataclasses import replace
 
 from diff4splat.configs.stages import (
     dynamic_stage,
-    generator_stage,
     joint_stage,
     later,
     reconstruction_gates,
     static_data,
     static_stage,
+    video_diffusion_stage,
 )
 from diff4splat.models.config.sizes import test_size
-from diff4splat.training.recipe import (
-    DataSettings,
-    OptimizerSettings,
-    Recipe,
-    StageRecipe,
-    TrainerSettings,
-)
+from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.recipe.losses import AutoencoderLosses
+from diff4splat.training.recipe.optimizer import OptimizerSettings
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.recipe.trainer import TrainerSettings
 
 
 def test_recipe() -> Recipe:
@@ -35,13 +34,14 @@ def test_recipe() -> Recipe:
         global_batch=2,
         micro_batch=1,
         trained=("vae",),
+        losses=AutoencoderLosses(),
         optimizer=optimizer,
         data=static_data(data),
     )
     static = replace(
         static_stage(vae, data), gates=reconstruction_gates(psnr=5.0, depth_correlation=-1.0)
     )
-    dynamic = replace(dynamic_stage(static, data.tracks), level_shift=5.0)
+    dynamic = replace(dynamic_stage(static, data.tracks), timestep_shift=5.0)
     return Recipe(
         name="test",
         seed=0,
@@ -51,7 +51,7 @@ def test_recipe() -> Recipe:
             static,
             later(static, "static-high", (64, 64), 0.25),
             dynamic,
-            generator_stage(dynamic),
+            video_diffusion_stage(dynamic),
             joint_stage(dynamic),
         ),
         trainer=TrainerSettings(checkpoint_every=50, evaluate_every=50, evaluation_samples=2),

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
-from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.geometry.camera import Camera, focal_from_35mm
 

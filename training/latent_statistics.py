@@ -13,13 +13,13 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError, FileFormatError
-from diff4splat.io.tensor_file import TensorFile, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import TensorFile, read_tensors, write_tensors
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.progress.phases import Advance
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.stages.model_stage import network_video
-from diff4splat.training.trainer.loader import load_batch, require_batch
-from diff4splat.training.trainer.samples import EVALUATION_START
+from diff4splat.training.latents.video_latents import network_video
+from diff4splat.training.trainer.loading.loader import load_batch, require_batch
+from diff4splat.training.trainer.loading.samples import EVALUATION_START
 
 FILE = "latent_statistics.safetensors"
 CLIPS = 16

@@ -17,15 +17,16 @@ from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import PARTS, Networks, create_networks
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
-from diff4splat.training.recipe import Recipe, StageRecipe
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stages.factory import STAGES
-from diff4splat.training.trainer.checkpoint_files import read_checkpoint
-from diff4splat.training.trainer.distributed import Processes
-from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.trainer.checkpoints.export import load_parts
+from diff4splat.training.trainer.checkpoints.files import read_checkpoint
+from diff4splat.training.trainer.distributed.processes import Processes
 from diff4splat.training.trainer.gates import read_result, stage_may_start
-from diff4splat.training.trainer.run_files import CHECKPOINTS, RESULT_FILE
+from diff4splat.training.trainer.logs.run_files import CHECKPOINTS, RESULT_FILE
 
 
 def sources_of_parts(recipe: Recipe, stage: StageRecipe) -> dict[str, StageRecipe]:
@@ -82,7 +83,7 @@ def starting_networks(
         CheckpointError, FileFormatError: a checkpoint is missing, damaged or of other networks.
     """
     needed = STAGES[stage.kind].needed(recipe.model)
-    networks = create_networks(recipe.model, seed=recipe.seed, needed=needed)
+    networks = create_networks(recipe.model, seed=recipe.seed, parts=needed)
     _take(networks, start, needed)
     return _filled(networks, stages_before(recipe, stage, folder, start), folder)
 

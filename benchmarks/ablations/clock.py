@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat.progress.phases import Advance, Phases
-from diff4splat.training.recipe import StageRecipe
-from diff4splat.training.trainer.run_files import LOG_FILE, EventLog
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.trainer.logs.run_files import LOG_FILE, EventLog
 
 EVENT = "cpu"
 NOTES = 10

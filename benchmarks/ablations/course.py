@@ -27,11 +27,12 @@ from ablations.variants import (
 from diff4splat.errors import ConfigError
 from diff4splat.io.atomic import write_text
 from diff4splat.training.latent_statistics import has_statistics
-from diff4splat.training.recipe import Recipe
-from diff4splat.training.recipe_json import fingerprint, recipe_from_json
-from diff4splat.training.stage_run import RECIPE_FILE, StageRun, train_stage
+from diff4splat.training.recipe.fingerprint import fingerprint
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_from_json
+from diff4splat.training.train_stage import RECIPE_FILE, StageRequest, train_stage
 from diff4splat.training.trainer.gates import read_result
-from diff4splat.training.trainer.run_files import RESULT_FILE
+from diff4splat.training.trainer.logs.run_files import RESULT_FILE
 
 WARM_UP, TIMED = 3, 8
 """Steps of a timing: those that do not count, and those that do."""
@@ -173,7 +174,7 @@ def _timed_s(recipe: Recipe, stage: str, folder: Path) -> float:
 def _train(
     recipe: Recipe, stage: str, folder: Path, note: Callable[[str], None], most: int | None = None
 ) -> None:
-    asked = StageRun(
+    request = StageRequest(
         recipe=recipe,
         stage=stage,
         folder=folder,
@@ -183,5 +184,5 @@ def _train(
         phases=StepClock(folder=folder / stage, stage=recipe.stage(stage), note=note),
         note=note,
     )
-    if train_stage(asked).outcome == "signalled":
+    if train_stage(request).outcome == "signalled":
         raise KeyboardInterrupt

@@ -9,8 +9,8 @@ import tyro
 
 from ablations.variants import DYNAMIC, MOTION, STATIC
 from diff4splat.configs.recipes import find_recipe, with_clips
-from diff4splat.training.recipe import Recipe
-from diff4splat.training.recipe_json import changed
+from diff4splat.training.recipe.overrides import override
+from diff4splat.training.recipe.recipe import Recipe
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class Options:
         Raises:
             ConfigError: no such recipe or key.
         """
-        recipe = changed(find_recipe(self.config), [one for given in self.set for one in given])
+        recipe = override(find_recipe(self.config), [one for given in self.set for one in given])
         return recipe if self.clips is None else with_clips(recipe, self.clips)
 
     @property

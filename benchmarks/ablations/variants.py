@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from diff4splat.errors import ConfigError
-from diff4splat.training.recipe import Recipe, StageRecipe
-from diff4splat.training.recipe_json import changed
+from diff4splat.training.recipe.overrides import override
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
 
 AUTOENCODER, STATIC, MOTION, DYNAMIC = "vae", "static-low", "motion", "dynamic"
 STAGES = (STATIC, MOTION, DYNAMIC)
@@ -30,7 +31,9 @@ class Variant:
     """As ``--set`` of the training command takes them."""
     without: tuple[str, ...] = ()
     """Stages left out; the dynamic stage gets their processor time."""
-    true_pictures: bool = False
+    deforms: bool = True
+    """False: the dynamic stage has no deformation network."""
+    use_ground_truth_frames: bool = False
     """Judged with the given pictures as they are, not as the autoencoder decodes them."""
 
 
@@ -39,7 +42,9 @@ def _each(stages: tuple[str, ...], change: str) -> tuple[str, ...]:
 
 
 def _rendering(change: str) -> tuple[str, ...]:
-    return _each((STATIC, DYNAMIC), change)
+    """A change of a loss weight in the stages that render."""
+    dynamic = f"stages.{DYNAMIC}.losses.reconstruction.{change}"
+    return f"stages.{STATIC}.losses.{change}", dynamic
 
 
 FULL = Variant(name="full", title="full")
@@ -50,41 +55,41 @@ VARIANTS = (
         title="no motion loss",
         # The motion stage has no other loss to learn from.
         without=(MOTION,),
-        changes=(f"stages.{DYNAMIC}.losses.motion=0",),
+        changes=(f"stages.{DYNAMIC}.losses.motion.weight=0",),
     ),
     Variant(
         name="no-deformation",
         title="no deformation",
         without=(MOTION,),
-        changes=(f"stages.{DYNAMIC}.kind=static", f'stages.{DYNAMIC}.trained=["ldrm"]'),
+        deforms=False,
     ),
     Variant(
         name="no-depth-correlation",
         title="no depth correlation, nor smoothness",
-        changes=_rendering("losses.depth=0"),
+        changes=_rendering("depth=0"),
     ),
     Variant(
         name="no-depth-loss",
         title="no depth loss at all",
-        changes=(*_rendering("losses.depth=0"), *_rendering("losses.depth_log=0")),
+        changes=(*_rendering("depth=0"), *_rendering("depth_log=0")),
     ),
     Variant(name="no-motion-stage", title="no motion stage", without=(MOTION,)),
     Variant(name="no-order", title="no order of stages", without=(STATIC, MOTION)),
     Variant(
         name="pictures",
         title="true pictures instead of latents",
-        changes=("model.ldrm.reads=frames", *_each(STAGES, "true_pictures=true")),
-        true_pictures=True,
+        changes=("model.ldrm.reads=frames", *_each(STAGES, "use_ground_truth_frames=true")),
+        use_ground_truth_frames=True,
     ),
     Variant(
         name="no-comparison",
         title="no comparison of frames",
-        changes=("model.detail.depths=0",),
+        changes=("model.refinement.cost_volume_depths=0",),
     ),
     Variant(
         name="no-surroundings",
         title="no surroundings",
-        changes=("model.detail.surroundings=0",),
+        changes=("model.refinement.border_cells=0",),
     ),
 )
 
@@ -148,18 +153,26 @@ def recipe_of(variant: Variant, base: Recipe) -> Recipe:
         ConfigError: the base cannot be changed like that.
     """
     try:
-        recipe = changed(base, variant.changes)
+        recipe = override(base, variant.changes)
     except ConfigError as error:
         raise ConfigError(f"variant {variant.name}: {error}; choose others with --only") from error
     if not variant.without:
         return recipe
     dynamic = recipe.stage(DYNAMIC)
+    if not variant.deforms:
+        dynamic = _without_deformation(dynamic)
     if STATIC in variant.without:
         # What starts from nothing learns at the rate of what starts from nothing.
         dynamic = replace(dynamic, optimizer=recipe.stage(STATIC).optimizer)
     steps = sum(recipe.stage(name).steps for name in (*variant.without, DYNAMIC))
     kept = tuple(stage for stage in recipe.stages if stage.name not in variant.without)
     return with_steps(_exchanged(replace(recipe, stages=kept), dynamic), DYNAMIC, steps)
+
+
+def _without_deformation(dynamic: StageRecipe) -> StageRecipe:
+    """A static stage on the data of the dynamic one."""
+    losses = dynamic.losses.reconstruction
+    return replace(dynamic, kind="static", trained=("ldrm",), losses=losses)
 
 
 def trained_stages(recipe: Recipe) -> tuple[str, ...]:

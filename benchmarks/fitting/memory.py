@@ -60,8 +60,9 @@ def fit_once(motion: str, times: int) -> dict[str, float | str]:
     import torch
 
     from diff4splat.data.capture.capture import Capture, PointCloud
-    from diff4splat.fitting.fit import FitRun, fit_scene
-    from diff4splat.fitting.settings import Density, FitSettings, Stillness
+    from diff4splat.fitting.fit import fit_scene
+    from diff4splat.fitting.fit_types import FitRequest
+    from diff4splat.fitting.settings import DensitySettings, FitSettings, StaticDetectionSettings
     from diff4splat.geometry import rigid
     from diff4splat.geometry.camera import pinhole, stack_cameras
     from diff4splat.progress.phases import peak_memory_bytes
@@ -87,10 +88,11 @@ def fit_once(motion: str, times: int) -> dict[str, float | str]:
     )  # fmt: skip
     settings = FitSettings(
         motion=motion, coarse_steps=20, fine_steps=20, picture_memory_mb=32,
-        density=Density(budget=20_000, until=0.0), stillness=Stillness(min_score=0.0),
+        density=DensitySettings(budget=20_000, until=0.0),
+        stillness=StaticDetectionSettings(min_score=0.0),
     )  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
-        result = fit_scene(FitRun(capture=capture, settings=settings, folder=Path(folder)))
+        result = fit_scene(FitRequest(capture=capture, settings=settings, folder=Path(folder)))
         peak = peak_memory_bytes()
         return {
             "motion": motion, "frames": len(capture), "gaussians": len(result.gaussians),
@@ -100,7 +102,7 @@ def fit_once(motion: str, times: int) -> dict[str, float | str]:
 
 def scene_bytes(result, capture, folder: Path) -> int:
     """Of the scene file, without the camera path."""
-    from diff4splat.io.scene_file import save_scene
+    from diff4splat.io.scene_files.scene_file import save_scene
     from diff4splat.paths.camera_path import CameraPath
     from diff4splat.scene.scene import Provenance, Scene
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe
 from diff4splat.data_prep.writing import WorldJob, write_worlds
 from diff4splat.progress.phases import Phases

@@ -20,19 +20,20 @@ from benchmarks.optics_fitting.captures import seen_db, taken, told
 from benchmarks.optics_fitting.worlds import views, world
 from diff4splat.data.capture.capture import Capture
 from diff4splat.fitting.evaluator import mean_psnr_db
-from diff4splat.fitting.fit import FitResult, FitRun, fit_scene
+from diff4splat.fitting.fit import fit_scene
+from diff4splat.fitting.fit_types import FitRequest, FitResult
 from diff4splat.fitting.optics.coefficients import largest_displacement_px
 from diff4splat.fitting.settings import (
     CameraSettings,
-    Density,
+    DensitySettings,
     FitSettings,
-    Stillness,
+    StaticDetectionSettings,
 )
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.geometry.lenses.build import fisheye_camera
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
 
 Row = dict[str, str | float]
@@ -136,13 +137,14 @@ def fitted(
     settings = FitSettings(
         motion=motion, harmonics=0, coarse_steps=steps // 3 if motion != "static" else 0,
         fine_steps=steps, time_slices=1, judge_every=100, checkpoint_every=10_000,
-        density=Density(budget=4000, until=0.0), stillness=Stillness(min_score=0.02, checks=()),
+        density=DensitySettings(budget=4000, until=0.0),
+        stillness=StaticDetectionSettings(min_score=0.02, checks=()),
         camera=CameraSettings(learn=learn, start=100, samples=8, shown_samples=16),
     )  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
         result = fit_scene(
-            FitRun(capture=capture, settings=settings, folder=Path(folder), note=_say)
+            FitRequest(capture=capture, settings=settings, folder=Path(folder), note=_say)
         )
         return result, time.perf_counter() - began
 
@@ -167,7 +169,7 @@ def _error(found: float, truth: float, factor: float) -> Row:
 
 def _scene(result: FitResult, capture: Capture) -> Scene:
     return Scene(
-        gaussians=result.gaussians, motion=result.motion, path=result.sight.path,
+        gaussians=result.gaussians, motion=result.motion, path=result.renderer.path,
         provenance=Provenance(generator="benchmark"),
     )  # fmt: skip
 

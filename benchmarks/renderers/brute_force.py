@@ -1,4 +1,4 @@
-"""The true picture at some pixels, in float64, from the formula of docs/rendering.md.
+"""The true picture at some pixels, in float64, from the formula of docs/reference/rendering.md.
 
 Axes: ``n`` Gaussians nearest first, ``p`` pixels, ``k`` contributions to a pixel. Every Gaussian is
 asked at every pixel: no support, no tiles, no early end. alpha = min(0.999, o exp(-q / 2)) with

@@ -1,31 +1,31 @@
-"""What a person may choose when a capture is read; every format takes the same options."""
+"""Options for reading a capture, equal for all formats."""
 
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from diff4splat.errors import ConfigError
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 FormatName = Literal["dnerf", "neu3d", "hypernerf", "colmap", "transforms", "clips", "cameras"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions:
-    """None leaves the choice to the format."""
+    """Options of a reader; None selects the default of the format."""
 
     format: str = "auto"
-    """``auto`` looks at the files, otherwise a ``FormatName``."""
+    """``auto`` detects the format, otherwise a ``FormatName``."""
     hold_out: tuple[int, ...] | None = None
     """Cameras to hold out, counted from 0 in the order of their names. D-NeRF counts files instead:
     1 is val, 2 is test."""
     downscale: int = 1
-    """Each so many by so many pixels become their mean."""
+    """Downscale factor; blocks of pixels are averaged."""
     frame_step: int = 1
-    """Only every so manieth time is taken."""
+    """Use every n-th time."""
     background: tuple[float, float, float] | None = None
-    """RGB in [0, 1] behind transparent pixels. None is white for D-NeRF; elsewhere it means that
-    transparent pixels say nothing."""
+    """RGB in [0, 1] behind transparent pixels. None is white for D-NeRF; elsewhere it makes
+    transparent pixels invalid."""
     fps: float | None = None
     """For formats that count frames instead of seconds."""
     clip: str | None = None

@@ -1,83 +1,84 @@
-"""From placed things to the objects of a world: textures, instances, grids of numbers.
+"""Turns placed objects into the objects of a world: textures, instances and quantised meshes.
 
-In a world that must show a new texture one thing gets it: the first mover if it can, else any.
+In a world that must contain a new texture, the first object that can carry it gets it, moving
+objects first.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
-from diff4splat.data_prep.synthetic.layout.plan import Placed
-from diff4splat.data_prep.synthetic.materials import Looks
-from diff4splat.data_prep.synthetic.motions.act import Posed
+from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
+from diff4splat.data_prep.synthetic.materials import MaterialSampler
+from diff4splat.data_prep.synthetic.motions.context import PartPositions
 from diff4splat.data_prep.synthetic.palettes import PALETTES
-from diff4splat.data_prep.synthetic.rounding import to_grid
+from diff4splat.data_prep.synthetic.quantise import quantise
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.shape import Part
 from diff4splat.data_prep.synthetic.splits import Split
 from diff4splat.data_prep.synthetic.world import Mesh, Texture, WorldObject
 
-MOST_OBJECTS = 250
+MAX_OBJECTS = 250
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scenery:
-    """All that is in a world, before it gets its colours."""
+class WorldContent:
+    """All placed objects of a world, before textures."""
 
-    moving: tuple[Placed, ...]
-    standing: tuple[Placed, ...]
+    moving: tuple[PlacedObject, ...]
+    static: tuple[PlacedObject, ...]
     split: Split
-    draws: Draws
+    rng: Rng
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Named:
-    """A thing with its look: what notes and captions speak of."""
+class AssembledObject:
+    """A placed object with its instances and textures, for captions and metadata."""
 
-    placed: Placed
+    placed: PlacedObject
     instances: tuple[int, ...]
     textures: tuple[Texture, ...]
 
 
-def assemble(scenery: Scenery) -> tuple[tuple[WorldObject, ...], tuple[Named, ...]]:
-    """Objects in the order of their instances, and who they belong to."""
-    palette = PALETTES[scenery.draws.pick(scenery.split.palettes.names)]
-    looks = Looks(
+def assemble(content: WorldContent) -> tuple[tuple[WorldObject, ...], tuple[AssembledObject, ...]]:
+    """World objects in order of their instances, and the placed objects they belong to."""
+    palette = PALETTES[content.rng.choice(content.split.palettes.names)]
+    sampler = MaterialSampler(
         palette,
-        frozenset(scenery.split.textures.names),
-        scenery.split.textures.new,
-        scenery.draws.child("looks"),
+        frozenset(content.split.textures.names),
+        content.split.textures.new,
+        content.rng.child("looks"),
     )
     objects: list[WorldObject] = []
-    named: list[Named] = []
+    assembled: list[AssembledObject] = []
     seen_new = False
-    for thing in (*scenery.moving, *scenery.standing):
-        parts = thing.shape.parts
-        if len(objects) + len(parts) > MOST_OBJECTS:
+    for item in (*content.moving, *content.static):
+        parts = item.shape.parts
+        if len(objects) + len(parts) > MAX_OBJECTS:
             break
         textures = []
-        for part, positions in zip(parts, thing.parts, strict=True):
-            want = not seen_new and bool(scenery.split.textures.new)
-            texture = looks.texture(part.role, thing.size_m, prefer_wanted=want)
-            seen_new = seen_new or texture.family in scenery.split.textures.new
+        for part, positions in zip(parts, item.parts, strict=True):
+            want = not seen_new and bool(content.split.textures.new)
+            texture = sampler.texture(part.role, item.size_m, prefer_wanted=want)
+            seen_new = seen_new or texture.family in content.split.textures.new
             textures.append(texture)
             objects.append(_object(len(objects) + 1, part, positions, texture))
         first = len(objects) - len(parts) + 1
         numbers = tuple(range(first, len(objects) + 1))
-        named.append(Named(placed=thing, instances=numbers, textures=tuple(textures)))
-    return tuple(objects), tuple(named)
+        assembled.append(AssembledObject(placed=item, instances=numbers, textures=tuple(textures)))
+    return tuple(objects), tuple(assembled)
 
 
 def _object(
-    instance: int, part: Part, positions: Posed | np.ndarray, texture: Texture
+    instance: int, part: Part, positions: PartPositions | np.ndarray, texture: Texture
 ) -> WorldObject:
-    rounded = to_grid(np.ascontiguousarray(positions, np.float64))
+    rounded = quantise(np.ascontiguousarray(positions, np.float64))
     if len(rounded) > 1 and bool((rounded == rounded[:1]).all()):
         rounded = rounded[:1]
     mesh = Mesh(
         triangles=np.ascontiguousarray(part.surface.triangles, np.int32),
-        rest=to_grid(np.ascontiguousarray(part.surface.vertices)),
-        uv=to_grid(np.ascontiguousarray(part.surface.uv)),
+        rest=quantise(np.ascontiguousarray(part.surface.vertices)),
+        uv=quantise(np.ascontiguousarray(part.surface.uv)),
         smooth=part.smooth,
     )
     return WorldObject(instance=instance, mesh=mesh, texture=texture, positions=rounded)

@@ -1,6 +1,6 @@
-"""Cameras that look at the stage: one input view and its neighbours, each on a path of its own.
+"""Camera paths of a world: the input view and its neighbours, each on a separate path.
 
-A view starts at an eye point and looks at the focus; from there it follows a text of the path
+A view starts at an eye point and looks at the focus. From there it follows a path in the path
 language (``diff4splat.paths.language``). Amplitudes are shares of a near depth of 0.55 of the
 distance to the focus.
 """
@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.layout.kinds import SceneKind
-from diff4splat.data_prep.synthetic.rounding import LENGTH_BITS, LENS_BITS, POSE_BITS
+from diff4splat.data_prep.synthetic.quantise import LENGTH_BITS, LENS_BITS, POSE_BITS
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.geometry import rigid
 from diff4splat.geometry.camera import Camera, focal_from_fov, pinhole
 from diff4splat.paths.build import build_path
@@ -33,24 +33,24 @@ AMPLITUDES: dict[str, tuple[float, float]] = {
     "roll": (0.015, 0.04),
     "dolly-zoom": (0.12, 0.3),
 }
-_EITHER_WAY = frozenset({"orbit", "arc", "roll", "dolly-zoom"})
+_SIGNED = frozenset({"orbit", "arc", "roll", "dolly-zoom"})
 _WEIGHTS = {"orbit": 3.0, "arc": 2.0, "forward": 1.5, "roll": 0.5, "dolly-zoom": 0.7}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shot:
-    """Where a view starts, relative to the focus, and how it goes on."""
+class ViewSpec:
+    """Start pose of a view relative to the focus, and its path."""
 
     azimuth_rad: float
-    """0 looks along +z; positive stands further to the right."""
+    """0 looks along +z; positive is further to the right."""
     tilt_rad: float
     distance_m: float
     path: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Lens:
-    """What all views of a world share."""
+class LensSpec:
+    """Image size, field of view and timing of all views."""
 
     size_px: tuple[int, int]
     fov_deg: float
@@ -58,22 +58,22 @@ class Lens:
     fps: float
 
 
-def draw_path(draws: Draws, *, may_stand: bool) -> str:
-    """A text of the path language."""
-    if may_stand and draws.chance(0.15):
+def sample_path(rng: Rng, *, may_be_static: bool) -> str:
+    """Sample a path in the path language."""
+    if may_be_static and rng.bernoulli(0.15):
         return "static"
     names = list(AMPLITUDES)
     weights = [_WEIGHTS.get(name, 1.0) for name in names]
-    count = 2 if draws.chance(0.2) else 1
-    chosen: list[str] = []
-    while len(chosen) < count:
-        name = draws.weighted(names, weights)
-        if not any({name, other} <= group for other in chosen for group in _CLASHING):
-            chosen.append(name)
-    return "+".join(_segment(name, draws) for name in chosen)
+    count = 2 if rng.bernoulli(0.2) else 1
+    names_used: list[str] = []
+    while len(names_used) < count:
+        name = rng.weighted_choice(names, weights)
+        if not any({name, other} <= group for other in names_used for group in _EXCLUSIVE):
+            names_used.append(name)
+    return "+".join(_segment(name, rng) for name in names_used)
 
 
-_CLASHING = (
+_EXCLUSIVE = (
     {"forward", "backward"},
     {"left", "right"},
     {"up", "down"},
@@ -83,41 +83,43 @@ _CLASHING = (
 )
 
 
-def _segment(name: str, draws: Draws) -> str:
+def _segment(name: str, rng: Rng) -> str:
     low, high = AMPLITUDES[name]
-    sign = draws.sign() if name in _EITHER_WAY else 1.0
-    return f"{name}:{sign * draws.between(low, high):.3f}"
+    sign = rng.sign() if name in _SIGNED else 1.0
+    return f"{name}:{sign * rng.uniform(low, high):.3f}"
 
 
-def draw_shots(kind: SceneKind, lens: Lens, stage_m: float, views: int, draws: Draws) -> list[Shot]:
-    """The input view looks along +z; the others stand 10 to 40 degrees aside."""
+def sample_views(
+    kind: SceneKind, lens: LensSpec, area_radius_m: float, views: int, rng: Rng
+) -> list[ViewSpec]:
+    """The input view looks along +z; the others are 10 to 40 degrees to the side."""
     half = np.tan(np.radians(lens.fov_deg) / 2)
-    distance = float(stage_m * draws.between(0.82, 1.12) / half) + 0.25 * stage_m
-    tilt = float(np.radians(draws.between(*kind.tilt_deg)))
-    path = draw_path(draws, may_stand=True)
-    shots = [Shot(azimuth_rad=0.0, tilt_rad=tilt, distance_m=distance, path=path)]
-    side = draws.sign()
+    distance = float(area_radius_m * rng.uniform(0.82, 1.12) / half) + 0.25 * area_radius_m
+    tilt = float(np.radians(rng.uniform(*kind.tilt_deg)))
+    path = sample_path(rng, may_be_static=True)
+    specs = [ViewSpec(azimuth_rad=0.0, tilt_rad=tilt, distance_m=distance, path=path)]
+    side = rng.sign()
     for _ in range(views - 1):
         low = max(tilt - 0.1, 0.05)
-        shots.append(
-            Shot(
-                azimuth_rad=side * float(np.radians(draws.between(10.0, 40.0))),
-                tilt_rad=draws.between(low, max(tilt + 0.15, low + 0.05)),
-                distance_m=distance * draws.between(0.9, 1.2),
-                path=draw_path(draws, may_stand=True),
+        specs.append(
+            ViewSpec(
+                azimuth_rad=side * float(np.radians(rng.uniform(10.0, 40.0))),
+                tilt_rad=rng.uniform(low, max(tilt + 0.15, low + 0.05)),
+                distance_m=distance * rng.uniform(0.9, 1.2),
+                path=sample_path(rng, may_be_static=True),
             )
         )
         side = -side
-    return shots
+    return specs
 
 
-def film(shot: Shot, lens: Lens, focus_height_m: float) -> Camera:
-    """The cameras of a shot, float64, on the grid of poses."""
-    level = shot.distance_m * np.cos(shot.tilt_rad)
+def camera_batch(view: ViewSpec, lens: LensSpec, focus_height_m: float) -> Camera:
+    """The cameras of a view, float64, quantised."""
+    level = view.distance_m * np.cos(view.tilt_rad)
     eye = (
-        level * np.sin(shot.azimuth_rad),
-        -focus_height_m - shot.distance_m * np.sin(shot.tilt_rad),
-        -level * np.cos(shot.azimuth_rad),
+        level * np.sin(view.azimuth_rad),
+        -focus_height_m - view.distance_m * np.sin(view.tilt_rad),
+        -level * np.cos(view.azimuth_rad),
     )
     start = rigid.look_at(
         torch.tensor(eye, dtype=torch.float64),
@@ -126,14 +128,14 @@ def film(shot: Shot, lens: Lens, focus_height_m: float) -> Camera:
     )
     camera = pinhole(focal_from_fov(lens.fov_deg, lens.size_px[1]), lens.size_px, torch.float64)
     frame = PathFrame(
-        camera=camera, near_depth=NEAR_SHARE * shot.distance_m, focus_depth=shot.distance_m
+        camera=camera, near_depth=NEAR_SHARE * view.distance_m, focus_depth=view.distance_m
     )
-    path = build_path(shot.path, frame, PathSettings(frames=lens.frames, fps=lens.fps))
+    path = build_path(view.path, frame, PathSettings(frames=lens.frames, fps=lens.fps))
     poses = start @ path.cameras.world_from_camera
-    return _on_grid(path.cameras.with_pose(poses), path.cameras.focal_px)
+    return _quantised(path.cameras.with_pose(poses), path.cameras.focal_px)
 
 
-def _on_grid(cameras: Camera, focal_px: torch.Tensor) -> Camera:
+def _quantised(cameras: Camera, focal_px: torch.Tensor) -> Camera:
     poses = cameras.world_from_camera
     rotation = torch.round(poses[:, :3, :3] * 2.0**POSE_BITS) * 2.0**-POSE_BITS + 0.0
     position = torch.round(poses[:, :3, 3] * 2.0**LENGTH_BITS) * 2.0**-LENGTH_BITS + 0.0

@@ -1,6 +1,6 @@
-"""Light and sky that belong together: sun at any height, overcast, lamps indoors, under water.
+"""Matching light and sky: sun at any height, overcast, lamps indoors, under water.
 
-Colours are linear and only their ratios matter: pictures are exposed for the light there is.
+Colours are linear and only their ratios matter, since images are auto-exposed.
 """
 
 from dataclasses import dataclass
@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.layout.kinds import SceneKind
 from diff4splat.data_prep.synthetic.palettes import linear_from_hex
-from diff4splat.data_prep.synthetic.rounding import COLOR_BITS, POSE_BITS, number_on_grid, to_grid
+from diff4splat.data_prep.synthetic.quantise import COLOR_BITS, POSE_BITS, quantise, quantise_number
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.world import Light, Sky
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mood:
-    """One kind of light; colours in sRGB words, strengths beside them."""
+class LightingPreset:
+    """One preset; colours as hexadecimal sRGB, with strengths."""
 
     sun: str
     sun_strength: float
@@ -32,8 +32,8 @@ class Mood:
     weight: float = 1.0
 
 
-OUTDOORS: dict[str, Mood] = {
-    "high sun": Mood(
+OUTDOORS: dict[str, LightingPreset] = {
+    "high sun": LightingPreset(
         sun="fff6e8",
         sun_strength=2.6,
         sky_strength=0.75,
@@ -44,7 +44,7 @@ OUTDOORS: dict[str, Mood] = {
         clouds=(0.1, 0.55),
         weight=2.0,
     ),
-    "afternoon": Mood(
+    "afternoon": LightingPreset(
         sun="ffe3bd",
         sun_strength=2.5,
         sky_strength=0.62,
@@ -54,7 +54,7 @@ OUTDOORS: dict[str, Mood] = {
         bounce="6f6250",
         weight=2.0,
     ),
-    "low sun": Mood(
+    "low sun": LightingPreset(
         sun="ffb877",
         sun_strength=2.4,
         sky_strength=0.5,
@@ -64,7 +64,7 @@ OUTDOORS: dict[str, Mood] = {
         bounce="6a5548",
         haze=1.8,
     ),
-    "overcast": Mood(
+    "overcast": LightingPreset(
         sun="eef2f6",
         sun_strength=0.7,
         sky_strength=1.3,
@@ -77,7 +77,7 @@ OUTDOORS: dict[str, Mood] = {
         haze=2.2,
         weight=1.3,
     ),
-    "dusk": Mood(
+    "dusk": LightingPreset(
         sun="ffa984",
         sun_strength=1.2,
         sky_strength=0.75,
@@ -89,8 +89,8 @@ OUTDOORS: dict[str, Mood] = {
         weight=0.6,
     ),
 }
-INDOORS: dict[str, Mood] = {
-    "daylight": Mood(
+INDOORS: dict[str, LightingPreset] = {
+    "daylight": LightingPreset(
         sun="fff3e2",
         sun_strength=1.8,
         sky_strength=0.95,
@@ -101,7 +101,7 @@ INDOORS: dict[str, Mood] = {
         softness=(0.05, 0.14),
         weight=2.0,
     ),
-    "lamp": Mood(
+    "lamp": LightingPreset(
         sun="ffd09a",
         sun_strength=2.0,
         sky_strength=0.62,
@@ -112,7 +112,7 @@ INDOORS: dict[str, Mood] = {
         softness=(0.08, 0.18),
         weight=1.2,
     ),
-    "north window": Mood(
+    "north window": LightingPreset(
         sun="e4eefc",
         sun_strength=1.5,
         sky_strength=0.9,
@@ -123,7 +123,7 @@ INDOORS: dict[str, Mood] = {
         softness=(0.15, 0.3),
         weight=1.5,
     ),
-    "evening": Mood(
+    "evening": LightingPreset(
         sun="ffb469",
         sun_strength=2.1,
         sky_strength=0.5,
@@ -135,8 +135,8 @@ INDOORS: dict[str, Mood] = {
         weight=0.8,
     ),
 }
-UNDER_WATER: dict[str, Mood] = {
-    "clear water": Mood(
+UNDER_WATER: dict[str, LightingPreset] = {
+    "clear water": LightingPreset(
         sun="bfe9e2",
         sun_strength=1.9,
         sky_strength=0.9,
@@ -147,7 +147,7 @@ UNDER_WATER: dict[str, Mood] = {
         clouds=(0.0, 0.0),
         softness=(0.06, 0.15),
     ),
-    "deep water": Mood(
+    "deep water": LightingPreset(
         sun="8fc8d6",
         sun_strength=1.4,
         sky_strength=0.8,
@@ -161,25 +161,25 @@ UNDER_WATER: dict[str, Mood] = {
 }
 
 
-def lighting(kind: SceneKind, stage_m: float, draws: Draws) -> tuple[Light, Sky]:
-    """A light and the sky it comes with; the light is never behind the back walls of a room."""
+def sample_lighting(kind: SceneKind, area_radius_m: float, rng: Rng) -> tuple[Light, Sky]:
+    """Sample a light and its sky; indoors the light is never behind the back walls."""
     moods = UNDER_WATER if kind.is_under_water else INDOORS if kind.is_indoors else OUTDOORS
-    mood = draws.weighted(list(moods.values()), [mood.weight for mood in moods.values()])
+    mood = rng.weighted_choice(list(moods.values()), [mood.weight for mood in moods.values()])
     open_walls = kind.is_indoors or "street" in kind.tags
-    azimuth = draws.between(-0.75, 0.75) + np.pi if open_walls else draws.between(0.0, 2 * np.pi)
-    sun = linear_from_hex(mood.sun) * mood.sun_strength * draws.between(0.85, 1.15)
+    azimuth = rng.uniform(-0.75, 0.75) + np.pi if open_walls else rng.uniform(0.0, 2 * np.pi)
+    sun = linear_from_hex(mood.sun) * mood.sun_strength * rng.uniform(0.85, 1.15)
     zenith, horizon = linear_from_hex(mood.zenith), linear_from_hex(mood.horizon)
     light = Light(
-        color=to_grid(sun, COLOR_BITS),
-        toward=_toward(azimuth, np.radians(draws.between(*mood.elevation_deg))),
-        sky=to_grid(
+        color=quantise(sun, COLOR_BITS),
+        toward=_toward(azimuth, np.radians(rng.uniform(*mood.elevation_deg))),
+        sky=quantise(
             (0.55 * zenith + 0.45 * horizon) / _mean(zenith, horizon) * 0.6 * mood.sky_strength,
             COLOR_BITS,
         ),
-        ground=to_grid(linear_from_hex(mood.bounce) * mood.sky_strength, COLOR_BITS),
-        softness=number_on_grid(draws.between(*mood.softness)),
+        ground=quantise(linear_from_hex(mood.bounce) * mood.sky_strength, COLOR_BITS),
+        softness=quantise_number(rng.uniform(*mood.softness)),
     )
-    return light, _sky(kind, mood, stage_m, draws)
+    return light, _sky(kind, mood, area_radius_m, rng)
 
 
 def _mean(a: Float64[np.ndarray, "3"], b: Float64[np.ndarray, "3"]) -> float:
@@ -188,21 +188,21 @@ def _mean(a: Float64[np.ndarray, "3"], b: Float64[np.ndarray, "3"]) -> float:
 
 def _toward(azimuth: float, elevation: float) -> Float64[np.ndarray, "3"]:
     level = np.cos(elevation)
-    return to_grid(
+    return quantise(
         np.array([level * np.sin(azimuth), -np.sin(elevation), level * np.cos(azimuth)]), POSE_BITS
     )
 
 
-def _sky(kind: SceneKind, mood: Mood, stage_m: float, draws: Draws) -> Sky:
+def _sky(kind: SceneKind, mood: LightingPreset, area_radius_m: float, rng: Rng) -> Sky:
     if kind.is_under_water:
-        haze = draws.between(0.12, 0.25) / stage_m
+        haze = rng.uniform(0.12, 0.25) / area_radius_m
     else:
-        haze = 0.0 if kind.is_indoors else draws.between(0.001, 0.006) * mood.haze
-    brightness = draws.between(0.85, 1.1)
+        haze = 0.0 if kind.is_indoors else rng.uniform(0.001, 0.006) * mood.haze
+    brightness = rng.uniform(0.85, 1.1)
     return Sky(
-        zenith=to_grid(linear_from_hex(mood.zenith) * brightness, COLOR_BITS),
-        horizon=to_grid(linear_from_hex(mood.horizon) * brightness, COLOR_BITS),
-        clouds=0.0 if kind.is_indoors else number_on_grid(draws.between(*mood.clouds)),
-        haze_per_m=number_on_grid(haze, 20),
-        seed=draws.bits(),
+        zenith=quantise(linear_from_hex(mood.zenith) * brightness, COLOR_BITS),
+        horizon=quantise(linear_from_hex(mood.horizon) * brightness, COLOR_BITS),
+        clouds=0.0 if kind.is_indoors else quantise_number(rng.uniform(*mood.clouds)),
+        haze_per_m=quantise_number(haze, 20),
+        seed=rng.random_seed(),
     )

@@ -1,8 +1,8 @@
-"""What things are made of: from a role and a palette to a texture.
+"""Materials: from a role and a palette to a texture.
 
-A role lists the textures that suit it. ``per`` says what the number of features counts for: a
-``metre`` where nature or trade fixes the size (bricks, boards, blades of grass), the ``thing``
-where the pattern goes with the object (painted dots). Textures that grow inside a material are
+A role lists its suitable textures. ``per`` is the unit of the number of features: ``metre`` for
+patterns of fixed size (bricks, boards, blades of grass), ``thing`` for patterns that scale with the
+object (painted dots). Textures that grow inside a material are
 solid.
 """
 
@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.draws import Draws
 from diff4splat.data_prep.synthetic.palettes import Palette
-from diff4splat.data_prep.synthetic.rounding import COLOR_BITS, number_on_grid, to_grid
+from diff4splat.data_prep.synthetic.quantise import COLOR_BITS, quantise, quantise_number
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.world import Texture
 
 SOLID = frozenset({"marble", "noise", "rust"})
@@ -33,7 +33,7 @@ RELIEF = {
 }
 """Depth of the pattern in features."""
 DOMINANT = {"stripes": 1}
-"""Which colour covers most of a texture, where it is not the first."""
+"""Index of the dominant colour, if it is not the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +49,15 @@ class Option:
 
 
 @dataclass(frozen=True, slots=True)
-class Role:
-    """Which of the palette's colours, and which textures."""
+class MaterialRole:
+    """Palette colours and textures of a material."""
 
     colors: str
     options: tuple[Option, ...]
 
 
-def _role(colors: str, *options: Option) -> Role:
-    return Role(colors, options)
+def _role(colors: str, *options: Option) -> MaterialRole:
+    return MaterialRole(colors, options)
 
 
 _PAINT = (
@@ -81,8 +81,11 @@ _MASONRY = (
     Option("plaster", (2.0, 5.0)),
     Option("marble", (1.5, 3.0), gloss=0.5, second="lighter"),
 )
-_GREEN = (Option("leaves", (6.0, 12.0), gloss=0.1), Option("noise", (4.0, 9.0), gloss=0.1))
-ROLES: dict[str, Role] = {
+_GREEN = (
+    Option("leaves", (6.0, 12.0), gloss=0.1),
+    Option("noise", (4.0, 9.0), gloss=0.1),
+)
+ROLES: dict[str, MaterialRole] = {
     "painted": _role("paint", *_PAINT),
     "toy": _role("paint", *_PAINT),
     "accent": _role("paint", Option("plain", (2.0, 4.0), gloss=0.3), Option("noise", (3.0, 6.0))),
@@ -127,10 +130,14 @@ ROLES: dict[str, Role] = {
     "glass": _role("leaf", Option("plain", (2.0, 4.0), gloss=0.9)),
     "shade": _role("pale", Option("fabric", (10.0, 16.0)), Option("plain", (2.0, 4.0))),
     "cap": _role(
-        "paint", Option("dots", (3.0, 5.0), second="pale", gloss=0.4), Option("noise", (3.0, 6.0))
+        "paint",
+        Option("dots", (3.0, 5.0), second="pale", gloss=0.4),
+        Option("noise", (3.0, 6.0)),
     ),
     "pumpkin": _role(
-        "brick", Option("noise", (3.0, 5.0), gloss=0.25), Option("stripes", (5.0, 8.0), gloss=0.2)
+        "brick",
+        Option("noise", (3.0, 5.0), gloss=0.25),
+        Option("stripes", (5.0, 8.0), gloss=0.2),
     ),
     "pot": _role(
         "brick",
@@ -276,49 +283,49 @@ ROLES: dict[str, Role] = {
 }
 
 
-class Looks:
-    """Gives every part of one world its texture."""
+class MaterialSampler:
+    """Samples the textures of one world."""
 
     def __init__(
-        self, palette: Palette, textures: frozenset[str], wanted: frozenset[str], draws: Draws
+        self, palette: Palette, textures: frozenset[str], wanted: frozenset[str], rng: Rng
     ) -> None:
         self._palette = palette
         self._textures = textures
         self._wanted = wanted
-        self._draws = draws
+        self._draws = rng
         self._given = 0
 
     def texture(self, role: str, size_m: float, *, prefer_wanted: bool = False) -> Texture:
-        """A texture for ``role`` on a thing of this size."""
-        draws = self._draws.child("look", self._given)
+        """A texture for ``role`` on an object of this size."""
+        rng = self._draws.child("look", self._given)
         self._given += 1
         options = [o for o in ROLES[role].options if o.family in self._textures]
         wanted = [o for o in options if o.family in self._wanted]
-        option = draws.weighted(*_weighed(wanted if prefer_wanted and wanted else options))
-        features = draws.between(*option.features)
+        option = rng.weighted_choice(*_weighed(wanted if prefer_wanted and wanted else options))
+        features = rng.uniform(*option.features)
         scale = features if option.per == "metre" else features / size_m
-        base = draws.pick(self._palette.colors(ROLES[role].colors))
+        base = rng.choice(self._palette.colors(ROLES[role].colors))
         return Texture(
             family=option.family,
-            colors=to_grid(self._colors(option, base, draws), COLOR_BITS),
-            scale=number_on_grid(scale),
-            seed=draws.bits(),
+            colors=quantise(self._colors(option, base, rng), COLOR_BITS),
+            scale=quantise_number(scale),
+            seed=rng.random_seed(),
             solid=option.family in SOLID,
-            relief=number_on_grid(RELIEF.get(option.family, 0.0) / scale, 20),
+            relief=quantise_number(RELIEF.get(option.family, 0.0) / scale, 20),
             gloss=option.gloss,
         )
 
     def _colors(
-        self, option: Option, base: Float64[np.ndarray, "3"], draws: Draws
+        self, option: Option, base: Float64[np.ndarray, "3"], rng: Rng
     ) -> Float64[np.ndarray, "3 3"]:
-        base = np.clip(base * (1 + 0.12 * draws.normal(1)) + 0.01 * draws.normal(3), 0.004, 0.92)
-        pale = draws.pick(self._palette.colors("pale"))
-        other = draws.pick(self._palette.colors("paint"))
+        base = np.clip(base * (1 + 0.12 * rng.normal(1)) + 0.01 * rng.normal(3), 0.004, 0.92)
+        pale = rng.choice(self._palette.colors("pale"))
+        other = rng.choice(self._palette.colors("paint"))
         if option.family == "brick":
             return np.stack([base, np.clip(0.7 * base, 0, 1), 0.5 * pale + 0.15 * base])
         second = {
-            "darker": base * draws.between(0.4, 0.65),
-            "lighter": base + (0.9 - base) * draws.between(0.2, 0.45),
+            "darker": base * rng.uniform(0.4, 0.65),
+            "lighter": base + (0.9 - base) * rng.uniform(0.2, 0.45),
             "pale": 0.8 * pale + 0.1 * base,
             "other": 0.6 * other + 0.3 * base,
         }[option.second]

@@ -1,8 +1,8 @@
-"""An endless source of dynamic worlds: ``make_world(recipe, index)``.
+"""Procedural dynamic worlds: ``make_world(recipe, index)``.
 
-World number ``index`` is a function of the recipe and the index alone, on every machine and in
-every process. A world that does not come out well (nobody is seen moving, or a held-out world shows
-nothing new) is drawn again from (index, attempt).
+A world depends on the recipe and the index alone, on every machine and in every process. An
+unsuitable world (no visible motion, or a held-out world without new content) is sampled again from
+(index, attempt).
 """
 
 import math
@@ -10,19 +10,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.action import Stage, frozen, movers
-from diff4splat.data_prep.synthetic.assembly import Scenery, assemble
-from diff4splat.data_prep.synthetic.cameras import Lens, draw_path, draw_shots, film
-from diff4splat.data_prep.synthetic.cast import Cast
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.actors import StageArea, freeze, place_movers
+from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
+from diff4splat.data_prep.synthetic.camera_rig import rig_views
+from diff4splat.data_prep.synthetic.cameras import LensSpec, camera_batch, sample_path, sample_views
+from diff4splat.data_prep.synthetic.captioning import caption_facts, clip_metadata
+from diff4splat.data_prep.synthetic.environment import EnvironmentContext, furnish_environment
+from diff4splat.data_prep.synthetic.layout.floor_plan import FloorPlan, PlacedObject
 from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
-from diff4splat.data_prep.synthetic.layout.plan import Placed, Plan
-from diff4splat.data_prep.synthetic.lights import lighting
-from diff4splat.data_prep.synthetic.narration import facts_of, note_of
-from diff4splat.data_prep.synthetic.rig import rig_shots
-from diff4splat.data_prep.synthetic.rounding import POSE_BITS, to_grid
+from diff4splat.data_prep.synthetic.lights import sample_lighting
+from diff4splat.data_prep.synthetic.object_sampler import ObjectSampler
+from diff4splat.data_prep.synthetic.quantise import POSE_BITS, quantise
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.splits import Split, SplitName, load_split
-from diff4splat.data_prep.synthetic.surroundings import Surroundings, furnish
 from diff4splat.data_prep.synthetic.world import World
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import Camera
@@ -34,16 +34,16 @@ Names = tuple[str, ...] | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldRecipe:
-    """Which worlds to make. The names narrow the split's lists; None leaves them as they are."""
+    """Distribution of worlds. Names restrict the lists of the split; None allows the full list."""
 
     seed: int = 0
     split: SplitName = "training"
     still_share: float = 0.15
     """Share of worlds in which only the camera moves."""
     against_share: float = 0.0
-    """Share of travelling things that go against what their place and facing suggest."""
+    """Share of travelling objects that move against what their position and orientation suggest."""
     frozen_share: float = 0.0
-    """Share of the other worlds in which what could move stands all the same."""
+    """Share of the other worlds whose movable objects are static."""
     frames: int = 17
     size_px: tuple[int, int] = (128, 128)
     """(height, width)"""
@@ -51,7 +51,7 @@ class WorldRecipe:
     fps: float = FPS
     """17 frames make 2 seconds."""
     rig: bool = False
-    """Cameras stand all around the stage; otherwise each goes its own way near the input view."""
+    """Static cameras all around the scene; otherwise moving cameras near the input view."""
     families: Names = None
     textures: Names = None
     motions: Names = None
@@ -68,7 +68,7 @@ class WorldRecipe:
         _require_range("fps", self.fps, 0.1, 1000.0)
 
     def allowed(self) -> Split:
-        """The split's lists, narrowed.
+        """The lists of the split, restricted to the recipe.
 
         Raises:
             ConfigError: a name that the split does not have.
@@ -87,15 +87,15 @@ def make_world(recipe: WorldRecipe, index: int) -> World:
     """World number ``index``.
 
     Raises:
-        ConfigError: the recipe names what its split does not have, or what never comes together,
-            such as a motion that none of its families can do.
+        ConfigError: the recipe contains a name outside its split, or an impossible combination,
+            such as a motion that none of its families can perform.
     """
     _require_range("index", index, 0, 2**62)
     split = recipe.allowed()
     for attempt in range(ATTEMPTS):
-        draws = Draws("world", recipe.split, recipe.seed, index, attempt)
-        is_still = Draws("still", recipe.split, recipe.seed, index).chance(recipe.still_share)
-        world = _try_world(recipe, index, split, draws, is_still)
+        rng = Rng("world", recipe.split, recipe.seed, index, attempt)
+        is_still = Rng("still", recipe.split, recipe.seed, index).bernoulli(recipe.still_share)
+        world = _try_world(recipe, index, split, rng, is_still)
         if world is not None:
             return world
     raise ConfigError(
@@ -106,47 +106,49 @@ def make_world(recipe: WorldRecipe, index: int) -> World:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Framing:
-    """Where a world happens and who looks at it."""
+    """Scene, area and cameras of a world."""
 
-    cast: Cast
-    stage: Stage
+    sampler: ObjectSampler
+    area: StageArea
     views: tuple[Camera, ...]
     path: str
-    """Of the input view."""
+    """Camera path of the input view."""
 
 
 def _try_world(
-    recipe: WorldRecipe, index: int, split: Split, draws: Draws, is_still: bool
+    recipe: WorldRecipe, index: int, split: Split, rng: Rng, is_still: bool
 ) -> World | None:
-    framing = _framing(recipe, split, draws, is_still)
+    framing = _framing(recipe, split, rng, is_still)
     if framing is None:
         return None
-    cast, stage = framing.cast, framing.stage
-    moving = _moving(stage, draws, is_still)
+    sampler, area = framing.sampler, framing.area
+    moving = _moving(area, rng, is_still)
     if not is_still and not moving:
         return None
-    around = Surroundings(
-        cast=cast, stage_m=stage.radius_m, plan=stage.plan, draws=draws.child("around")
+    context = EnvironmentContext(
+        sampler=sampler, area_radius_m=area.radius_m, plan=area.plan, rng=rng.child("around")
     )
-    standing = furnish(around)
-    if draws.child("frozen").chance(recipe.frozen_share):
-        moving, standing = [], [*map(frozen, moving), *standing]
-    scenery = Scenery(
+    static = furnish_environment(context)
+    if rng.child("frozen").bernoulli(recipe.frozen_share):
+        moving, static = [], [*map(freeze, moving), *static]
+    content = WorldContent(
         moving=tuple(moving),
-        standing=tuple(standing),
+        static=tuple(static),
         split=split,
-        draws=draws.child("looks"),
+        rng=rng.child("looks"),
     )
-    objects, named = assemble(scenery)
-    if not _shows_something_new(split, scenery, objects):
+    objects, assembled = assemble(content)
+    if not _has_new_content(split, content, objects):
         return None
-    light, sky = lighting(SCENE_KINDS[cast.scene], stage.radius_m, draws.child("light"))
-    facts = facts_of(cast.scene, named, framing.views[0], framing.path, draws.child("facts"))
+    light, sky = sample_lighting(SCENE_KINDS[sampler.scene], area.radius_m, rng.child("light"))
+    facts = caption_facts(
+        sampler.scene, assembled, framing.views[0], framing.path, rng.child("facts")
+    )
     return World(
-        note=note_of(
-            facts, named, world_identifier(recipe, index), draws.child("words").integer(0, 11)
+        note=clip_metadata(
+            facts, assembled, world_identifier(recipe, index), rng.child("words").integer(0, 11)
         ),
-        times_s=to_grid(stage.times_s, POSE_BITS),
+        times_s=quantise(area.times_s, POSE_BITS),
         objects=objects,
         light=light,
         sky=sky,
@@ -154,61 +156,61 @@ def _try_world(
     )
 
 
-def _framing(recipe: WorldRecipe, split: Split, draws: Draws, is_still: bool) -> _Framing | None:
-    """Scene, stage and cameras; None when nothing could move there or a camera would be too low."""
+def _framing(recipe: WorldRecipe, split: Split, rng: Rng, is_still: bool) -> _Framing | None:
+    """Sample scene, area and cameras; None if no motion is possible or a camera is too low."""
     names = split.scenes.names
-    scene = draws.weighted(names, [SCENE_KINDS[name].weight for name in names])
-    cast, kind = Cast(split=split, scene=scene), SCENE_KINDS[scene]
-    if not is_still and not cast.pairs():
+    scene = rng.weighted_choice(names, [SCENE_KINDS[name].weight for name in names])
+    sampler, kind = ObjectSampler(split=split, scene=scene), SCENE_KINDS[scene]
+    if not is_still and not sampler.motion_pairs():
         return None
-    radius = math.exp(draws.between(*(math.log(limit) for limit in kind.stage_m)))
-    fov_deg = draws.between(35.0, 72.0)
-    lens = Lens(size_px=recipe.size_px, fov_deg=fov_deg, frames=recipe.frames, fps=recipe.fps)
-    arrange = rig_shots if recipe.rig else draw_shots
-    shots = arrange(kind, lens, radius, recipe.views, draws.child("shots"))
+    radius = math.exp(rng.uniform(*(math.log(limit) for limit in kind.area_radius_m)))
+    fov_deg = rng.uniform(35.0, 72.0)
+    lens = LensSpec(size_px=recipe.size_px, fov_deg=fov_deg, frames=recipe.frames, fps=recipe.fps)
+    arrange = rig_views if recipe.rig else sample_views
+    specs = arrange(kind, lens, radius, recipe.views, rng.child("shots"))
     if is_still and not recipe.rig:
-        shots[0] = replace(shots[0], path=draw_path(draws.child("path"), may_stand=False))
-    views = tuple(film(shot, lens, 0.28 * radius) for shot in shots)
+        specs[0] = replace(specs[0], path=sample_path(rng.child("path"), may_be_static=False))
+    views = tuple(camera_batch(spec, lens, 0.28 * radius) for spec in specs)
     eyes = np.concatenate([view.position.numpy() for view in views])
     if float(eyes[:, 1].max()) > -0.1 * radius:
         return None
-    distance = shots[0].distance_m
-    stage = Stage(
+    distance = specs[0].distance_m
+    area = StageArea(
         radius_m=radius,
         times_s=np.arange(recipe.frames) / recipe.fps,
         camera=views[0],
         distance_m=distance,
-        plan=Plan(eyes=eyes, margin_m=0.16 * distance),
-        cast=cast,
+        plan=FloorPlan(eyes=eyes, margin_m=0.16 * distance),
+        sampler=sampler,
         against_share=recipe.against_share,
     )
-    return _Framing(cast=cast, stage=stage, views=views, path=shots[0].path)
+    return _Framing(sampler=sampler, area=area, views=views, path=specs[0].path)
 
 
-def _moving(stage: Stage, draws: Draws, is_still: bool) -> list[Placed]:
-    """What moves; where nothing does, the middle of the stage is kept in sight all the same."""
+def _moving(area: StageArea, rng: Rng, is_still: bool) -> list[PlacedObject]:
+    """The moving objects; a static world keeps the centre of the area visible instead."""
     if is_still:
-        radius = stage.radius_m
-        stage.plan.watched.append((0.0, 0.3 * radius, 0.0, 0.4 * radius))
+        radius = area.radius_m
+        area.plan.watched.append((0.0, 0.3 * radius, 0.0, 0.4 * radius))
         return []
-    count = draws.weighted((1, 2, 3), (5.0, 4.0, 2.0))
-    return movers(stage, count, draws.child("act"))
+    count = rng.weighted_choice((1, 2, 3), (5.0, 4.0, 2.0))
+    return place_movers(area, count, rng.child("act"))
 
 
 def world_identifier(recipe: WorldRecipe, index: int) -> str:
-    """What the clip of a world is called."""
+    """Identifier of the clip of a world."""
     rig = f"-rig{recipe.views}" if recipe.rig else ""
     return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{rig}"
 
 
-def _shows_something_new(split: Split, scenery: Scenery, objects) -> bool:
-    """Whether a held-out world has what training worlds lack; others always do."""
-    things = [*scenery.moving, *scenery.standing]
-    families = {thing.family for thing in things}
-    motions = {thing.motion for thing in scenery.moving}
-    textures = {thing.texture.family for thing in objects}
+def _has_new_content(split: Split, content: WorldContent, objects) -> bool:
+    """Whether a held-out world has content absent from training; true for training worlds."""
+    placed = [*content.moving, *content.static]
+    families = {item.family for item in placed}
+    motions = {item.motion for item in content.moving}
+    textures = {item.texture.family for item in objects}
     wanted = [(split.families.new, families), (split.textures.new, textures)]
-    if scenery.moving:
+    if content.moving:
         wanted.append((split.motions.new, motions))
     return all(not new or new & seen for new, seen in wanted)
 

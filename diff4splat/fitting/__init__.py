@@ -1,1 +1,1 @@
-"""Fitting one scene to one capture: 4D Gaussians with a HexPlane field, and native 4D Gaussians."""
+"""Per-scene optimisation: fits 4D Gaussians to one capture of posed, timed frames."""

@@ -1,6 +1,7 @@
-"""A fit on disk: all numbers, moments, pulls and where it stands; one ``.safetensors`` file.
+"""Checkpoints of a fit: parameters, Adam moments, gradient statistics and progress in one file.
 
-Written under another name and renamed, so that whatever stops a fit leaves the one before.
+The file is written under a temporary name and renamed, so an interrupted write keeps the previous
+checkpoint.
 """
 
 import json
@@ -12,80 +13,87 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError
-from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import (
+    TensorFile,
+    read_metadata,
+    read_tensors,
+    write_tensors,
+)
 
-FILE = "checkpoint.safetensors"
-FORMAT = "diff4splat-fit-1"
+CHECKPOINT_FILE = "checkpoint.safetensors"
+CHECKPOINT_FORMAT = "diff4splat-fit-1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
-    """How far a fit is."""
+class FitState:
+    """Progress and parameters of a fit at one step."""
 
     stage: str
     step: int
+    """Completed steps of the stage."""
     fingerprint: str
-    """Of settings and capture; another one belongs to another fit."""
+    """Hash of settings and capture; a different hash means a different fit."""
     seconds: float
-    """Spent so far."""
+    """Time spent so far."""
     tensors: dict[str, Tensor]
-    """Of the table."""
-    moves: Bool[Tensor, " n"]
+    """Content of the parameter table."""
+    moving_mask: Bool[Tensor, " n"]
+    """Gaussians that the motion deforms."""
     fixed: dict[str, Tensor]
-    """What the stage was built with, such as the bounds of the planes."""
+    """Tensors that the stage needs but does not optimise, such as the bounds of the planes."""
 
 
-def save(standing: Standing, folder: Path) -> None:
-    """Write whole or not at all.
+def save_checkpoint(state: FitState, folder: Path) -> None:
+    """Write ``state`` atomically.
 
     Raises:
-        OutputError: the folder cannot be made or written.
+        OutputError: the folder cannot be created or written.
     """
-    tensors = {f"table/{name}": value for name, value in standing.tensors.items()}
-    tensors |= {f"fixed/{name}": value for name, value in standing.fixed.items()}
-    tensors["moves"] = standing.moves.long()
-    text = {
-        "stage": standing.stage,
-        "step": standing.step,
-        "fingerprint": standing.fingerprint,
-        "seconds": standing.seconds,
+    tensors = {f"table/{name}": value for name, value in state.tensors.items()}
+    tensors |= {f"fixed/{name}": value for name, value in state.fixed.items()}
+    tensors["moves"] = state.moving_mask.long()
+    progress = {
+        "stage": state.stage,
+        "step": state.step,
+        "fingerprint": state.fingerprint,
+        "seconds": state.seconds,
     }
-    content = TensorFile(tensors=tensors, metadata={"format": FORMAT, "fit": json.dumps(text)})
-    write_tensors(content, folder / FILE)
+    metadata = {"format": CHECKPOINT_FORMAT, "fit": json.dumps(progress)}
+    write_tensors(TensorFile(tensors=tensors, metadata=metadata), folder / CHECKPOINT_FILE)
 
 
-def load(folder: Path, fingerprint: str) -> Standing | None:
-    """How far the fit in ``folder`` is; None where none has begun.
+def load_checkpoint(folder: Path, fingerprint: str) -> FitState | None:
+    """Read the checkpoint in ``folder``; None if there is no file.
 
     Raises:
-        CheckpointError: the checkpoint is of another fit or not one of ours.
+        CheckpointError: the checkpoint belongs to another fit, or the file is something else.
         FileFormatError: the file is damaged.
     """
-    file = folder / FILE
+    file = folder / CHECKPOINT_FILE
     if not file.exists():
         return None
     metadata = read_metadata(file)
-    if metadata.get("format") != FORMAT:
+    if metadata.get("format") != CHECKPOINT_FORMAT:
         raise CheckpointError(f"{file}: expected a checkpoint of a fit, got another file")
-    text = json.loads(metadata["fit"])
-    if text["fingerprint"] != fingerprint:
+    progress = json.loads(metadata["fit"])
+    if progress["fingerprint"] != fingerprint:
         raise CheckpointError(
             f"{file}: expected the settings and data of the fit that began here, got others; "
             "choose another --out, or --restart"
         )
     tensors = read_tensors(file)
-    return Standing(
-        stage=text["stage"],
-        step=text["step"],
+    return FitState(
+        stage=progress["stage"],
+        step=progress["step"],
         fingerprint=fingerprint,
-        seconds=text["seconds"],
-        tensors=_under(tensors, "table/"),
-        moves=tensors["moves"].bool(),
-        fixed=_under(tensors, "fixed/"),
+        seconds=progress["seconds"],
+        tensors=_with_prefix(tensors, "table/"),
+        moving_mask=tensors["moves"].bool(),
+        fixed=_with_prefix(tensors, "fixed/"),
     )
 
 
-def _under(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
+def _with_prefix(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
     return {
         name.removeprefix(prefix): torch.as_tensor(value)
         for name, value in tensors.items()

@@ -1,7 +1,7 @@
-"""How well a scene shows frames that it has not seen.
+"""Image quality of a scene on frames of its capture.
 
-Axes: ``h w`` pixels. As published comparisons do: pictures of eight bits, one PSNR and SSIM per
-frame, then the mean; PSNR over all pixels that count and that the lens sees.
+Axes: ``h w`` pixels. The protocol of published comparisons: 8-bit images, one PSNR and SSIM per
+frame, then the mean over frames. PSNR covers the valid pixels only.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,92 +12,85 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture, Frame
-from diff4splat.fitting.frame_renderer import Sight, counted
+from diff4splat.fitting.frames.frame_renderer import FrameRenderer, loss_mask
+from diff4splat.fitting.frames.frame_store import FrameStore
 from diff4splat.fitting.optics.camera_model import CameraModel
-from diff4splat.fitting.pictures import FrameStore
 from diff4splat.metrics.image import psnr
-from diff4splat.metrics.structure import WINDOW_PX, ssim
-from diff4splat.render.api import render
-from diff4splat.render.settings import RenderSettings
-from diff4splat.scene.gaussians import Gaussians
+from diff4splat.metrics.ssim import WINDOW_PX, ssim
 from diff4splat.scene.scene import Scene
 
-BEST_PSNR_DB = 99.0
-"""Of equal pictures, whose PSNR is infinite."""
+MAX_PSNR_DB = 99.0
+"""Reported for identical images, whose PSNR is infinite."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameQuality:
-    """One frame."""
+    """Quality of one frame."""
 
     frame: int
     camera: int
     time_s: float
     psnr_db: float
     ssim: float | None
-    """None where the picture is smaller than the window, or was not asked for."""
+    """None if not requested, or if the image is smaller than the SSIM window."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judge:
-    """Makes frames of a capture and compares."""
+class Evaluator:
+    """Renders frames of a capture and compares them with the ground truth."""
 
-    sight: Sight
+    renderer: FrameRenderer
     store: FrameStore
 
     def frames(
         self,
         scene: Scene,
-        known: CameraModel | None,
+        cameras: CameraModel | None,
         indices: Sequence[int],
         with_ssim: bool = False,
         advance: Callable[[], None] = lambda: None,
     ) -> list[FrameQuality]:
-        """Quality of each frame, through cameras as far as they are ``known``."""
-        found = []
+        """Quality of each frame; ``cameras`` replaces the optics of the capture if given."""
+        qualities = []
         for index in indices:
-            made, seen = self.picture(scene, known, index)
+            rgb, valid = self.image(scene, cameras, index)
             frame = self.store.read(index)
-            frame = replace(frame, counts=counted(frame, seen))
-            found.append(self._compare(made, frame, index, with_ssim))
+            frame = replace(frame, counts=loss_mask(frame, valid))
+            qualities.append(self._compare(rgb, frame, index, with_ssim))
             advance()
-        return found
+        return qualities
 
     @torch.no_grad()
-    def picture(
-        self, scene: Scene, known: CameraModel | None, index: int
+    def image(
+        self, scene: Scene, cameras: CameraModel | None, index: int
     ) -> tuple[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]]:
-        """What the scene shows in place of a frame, rounded to eight bits, and where."""
-        if self.sight.traced:
-            made = self.sight.show(scene, self.sight.camera(index, known), index)
-            rgb, seen = made.rgb, made.valid
+        """The rendering of a frame, rounded to 8 bits, and its mask of valid pixels."""
+        if self.renderer.traced:
+            photo = self.renderer.show(scene, self.renderer.camera(index, cameras), index)
+            rgb, valid = photo.rgb, photo.valid
         else:
-            rgb = self._drawn(scene.state_at(float(self.capture.times_s[index])), index)
-            seen = torch.ones(rgb.shape[:2], dtype=torch.bool)
-        return (rgb.clamp(0, 1) * 255).round() / 255, seen
+            state = scene.state_at(float(self.capture.times_s[index]))
+            rgb = self.renderer.rasterize(state, index).rgb
+            valid = torch.ones(rgb.shape[:2], dtype=torch.bool)
+        return (rgb.clamp(0, 1) * 255).round() / 255, valid
 
     @property
     def capture(self) -> Capture:
-        """What is compared with."""
-        return self.sight.capture
-
-    def _drawn(self, state: Gaussians, index: int) -> Float[Tensor, "h w 3"]:
-        settings = RenderSettings(background=self.sight.background)
-        camera = self.capture.cameras[index]
-        return render(state, camera, settings=settings, backend=self.sight.drawing).rgb
+        """The ground truth."""
+        return self.renderer.capture
 
     def _compare(
-        self, made: Float[Tensor, "h w 3"], frame: Frame, index: int, with_ssim: bool
+        self, rgb: Float[Tensor, "h w 3"], frame: Frame, index: int, with_ssim: bool
     ) -> FrameQuality:
-        structure = None
-        if with_ssim and min(made.shape[:2]) >= WINDOW_PX:
-            structure = float(ssim(made, frame.rgb))
+        similarity = None
+        if with_ssim and min(rgb.shape[:2]) >= WINDOW_PX:
+            similarity = float(ssim(rgb, frame.rgb))
         return FrameQuality(
             frame=index,
             camera=int(self.capture.camera_index[index]),
             time_s=float(self.capture.times_s[index]),
-            psnr_db=min(_psnr(made, frame), BEST_PSNR_DB),
-            ssim=structure,
+            psnr_db=min(_psnr(rgb, frame), MAX_PSNR_DB),
+            ssim=similarity,
         )
 
 
@@ -108,8 +101,8 @@ def mean_psnr_db(qualities: Sequence[FrameQuality]) -> float | None:
     return sum(quality.psnr_db for quality in qualities) / len(qualities)
 
 
-def _psnr(made: Float[Tensor, "h w 3"], frame: Frame) -> float:
+def _psnr(rgb: Float[Tensor, "h w 3"], frame: Frame) -> float:
     if frame.counts is None:
-        return float(psnr(made, frame.rgb))
-    error = (made - frame.rgb)[frame.counts].double().square().mean()
-    return float(-10 * torch.log10(error)) if error > 0 else BEST_PSNR_DB
+        return float(psnr(rgb, frame.rgb))
+    error = (rgb - frame.rgb)[frame.counts].double().square().mean()
+    return float(-10 * torch.log10(error)) if error > 0 else MAX_PSNR_DB

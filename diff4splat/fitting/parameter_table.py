@@ -1,7 +1,7 @@
-"""Numbers that are learned: one row per Gaussian, or shared by all; and the state of Adam.
+"""Optimised parameters, per Gaussian or shared, with the state of Adam.
 
-Axes: ``n`` Gaussians. Rows come and go while a scene is fitted. The moments of Adam go with their
-rows; new and rewritten rows start with none.
+Axes: ``n`` Gaussians. A fit adds and removes rows. Each row keeps its Adam moments; new and
+rewritten rows start with zero moments.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 class ParameterTable:
-    """Leaf tensors by name, each with a learning rate of its own."""
+    """Leaf tensors by name, each with a separate learning rate."""
 
     def __init__(self, columns: Mapping[str, Tensor], shared: Mapping[str, Tensor]) -> None:
         """``columns`` have one row per Gaussian; ``shared`` tensors have any shape."""
@@ -23,7 +23,7 @@ class ParameterTable:
         for name, value in {**columns, **shared}.items():
             self._leaves[name] = value.detach().clone().requires_grad_()
         groups = [{"params": [leaf], "name": name} for name, leaf in self._leaves.items()]
-        # The published value: with the usual one, small gradients of means would count for less.
+        # The published value; the default of 1e-8 would damp the small gradients of means.
         self.optimizer = torch.optim.Adam(groups, lr=0.0, eps=1e-15, fused=True)
 
     def __len__(self) -> int:
@@ -37,7 +37,7 @@ class ParameterTable:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of what has one row per Gaussian."""
+        """Names of the tensors with one row per Gaussian."""
         return self._columns
 
     @property
@@ -46,19 +46,19 @@ class ParameterTable:
         return tuple(self._leaves)
 
     def step(self, rates: Mapping[str, float]) -> None:
-        """One step of Adam; what has no rate stays."""
+        """One step of Adam; tensors without a rate stay unchanged."""
         for group in self.optimizer.param_groups:
             group["lr"] = rates.get(group["name"], 0.0)
         self.optimizer.step()
         self.optimizer.zero_grad(set_to_none=True)
 
-    def keep(self, kept: Bool[Tensor, " n"]) -> None:
-        """Drop the rows of all other Gaussians."""
-        self._replace({name: self._leaves[name].detach()[kept] for name in self._columns})
-        self._map_moments(lambda moment: moment[kept])
+    def keep(self, mask: Bool[Tensor, " n"]) -> None:
+        """Remove the rows outside ``mask``."""
+        self._replace({name: self._leaves[name].detach()[mask] for name in self._columns})
+        self._map_moments(lambda moment: moment[mask])
 
     def append(self, rows: Mapping[str, Tensor]) -> None:
-        """Add Gaussians; ``rows`` has every column."""
+        """Add rows; ``rows`` has every column."""
         joined = {
             name: torch.cat([self._leaves[name].detach(), rows[name]]) for name in self._columns
         }
@@ -67,7 +67,7 @@ class ParameterTable:
         self._map_moments(lambda old: torch.cat([old, old.new_zeros(count, *old.shape[1:])]))
 
     def rewrite(self, index: Int[Tensor, " m"], rows: Mapping[str, Tensor]) -> None:
-        """Give some Gaussians other numbers; columns that ``rows`` lacks stay."""
+        """Overwrite some rows and reset their moments; columns that ``rows`` lacks stay."""
         with torch.no_grad():
             for name, value in rows.items():
                 self._leaves[name][index] = value
@@ -77,23 +77,23 @@ class ParameterTable:
                         state[moment][index] = 0
 
     def rewrite_shared(self, name: str, value: Tensor) -> None:
-        """Give a shared tensor other numbers; it starts anew."""
+        """Overwrite a shared tensor and reset its moments."""
         with torch.no_grad():
             self._leaves[name].copy_(value)
         self.optimizer.state.pop(self._leaves[name], None)
 
     def tensors(self) -> dict[str, Tensor]:
-        """Everything that makes the next step, detached: values and moments."""
-        found = {}
+        """Values and Adam state, detached: everything that the next step depends on."""
+        state_dict = {}
         for name, leaf in self._leaves.items():
-            found[name] = leaf.detach()
+            state_dict[name] = leaf.detach()
             state = self.optimizer.state.get(leaf, {})
             for key, value in state.items():
-                found[f"{name}/{key}"] = value.detach().float()
-        return found
+                state_dict[f"{name}/{key}"] = value.detach().float()
+        return state_dict
 
     def load(self, tensors: Mapping[str, Tensor]) -> None:
-        """Take over what ``tensors()`` gave, rows and moments."""
+        """Restore the output of ``tensors``."""
         self._replace({name: tensors[name].clone() for name in self._leaves})
         self.optimizer.state.clear()
         for name, leaf in self._leaves.items():
@@ -106,7 +106,7 @@ class ParameterTable:
                 self.optimizer.state[leaf] = state
 
     def _replace(self, values: Mapping[str, Tensor]) -> None:
-        """Other leaves under the same names; their states go with them."""
+        """Replace leaves under the same names and hand over their Adam state."""
         for group in self.optimizer.param_groups:
             name = group["name"]
             if name not in values:

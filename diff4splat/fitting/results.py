@@ -1,4 +1,4 @@
-"""What a fit leaves: scene file, video, a comparison with held-out frames, and a card.
+"""Output files of a fit: scene, video, comparison with held-out frames, and metadata.
 
 Axes: ``t`` frames, ``h w`` pixels.
 """
@@ -17,46 +17,46 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.data.capture.capture import Capture
-from diff4splat.fitting.comparison import comparison
-from diff4splat.fitting.evaluator import FrameQuality, Judge, mean_psnr_db
-from diff4splat.fitting.fit import FitResult
-from diff4splat.fitting.pictures import FrameStore
+from diff4splat.fitting.comparison import comparison_sheet
+from diff4splat.fitting.evaluator import Evaluator, FrameQuality, mean_psnr_db
+from diff4splat.fitting.fit_types import FitResult
+from diff4splat.fitting.frames.frame_store import FrameStore
 from diff4splat.fitting.settings import FitSettings
 from diff4splat.io.atomic import atomic_folder, write_text
-from diff4splat.io.images import write_png
-from diff4splat.io.optics_json import optics_json
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.cameras.optics_json import optics_json
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.outputs.card import LIBRARIES, scene_facts
 from diff4splat.outputs.scene_folder import write_view
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
 
 RESULT_FILES = ("scene.safetensors", "video.mp4", "comparison.png", "card.json")
-SHOWN = 4
-"""Held-out frames in the comparison."""
+COMPARISON_FRAMES = 4
+"""Held-out frames on the comparison sheet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitReport:
-    """A fit and what it was made of."""
+    """A fit and its inputs."""
 
     result: FitResult
     capture: Capture
     settings: FitSettings
     inputs: dict[str, object]
-    """Of the command, for the card."""
+    """Command line options, for ``card.json``."""
 
 
-def scene_of(report: FitReport) -> Scene:
-    """The scene, along the way of the first training camera."""
+def fitted_scene(report: FitReport) -> Scene:
+    """The scene, with the path of the first training camera."""
     result, capture = report.result, report.capture
     return Scene(
         gaussians=result.gaussians,
         motion=result.motion,
-        path=shown_path(capture),
+        path=preview_path(capture),
         provenance=Provenance(
             generator=f"diff4splat {__version__} fit --motion {report.settings.motion}",
             model=f"{capture.source}: {capture.name}",
@@ -66,36 +66,36 @@ def scene_of(report: FitReport) -> Scene:
     )
 
 
-def shown_path(capture: Capture) -> CameraPath:
-    """All frames of the first training camera by time; of every camera where it has only one."""
-    learnt = ~capture.held_out
-    first = capture.camera_index[learnt][0]
-    own = (learnt & (capture.camera_index == first)).nonzero().flatten()
-    if len(own) < 2:
-        own = learnt.nonzero().flatten()
-    own = own[capture.times_s[own].argsort(stable=True)]
-    times_s, last = [], -math.inf
-    for index in own.tolist():
+def preview_path(capture: Capture) -> CameraPath:
+    """Frames of the first training camera in order of time; of all cameras if it has only one."""
+    training = ~capture.held_out
+    first = capture.camera_index[training][0]
+    frames = (training & (capture.camera_index == first)).nonzero().flatten()
+    if len(frames) < 2:
+        frames = training.nonzero().flatten()
+    frames = frames[capture.times_s[frames].argsort(stable=True)]
+    kept, last = [], -math.inf
+    for index in frames.tolist():
         time_s = float(capture.times_s[index])
         if time_s > last:
-            times_s.append((index, time_s))
+            kept.append(index)
             last = time_s
-    kept = torch.tensor([index for index, _ in times_s])
-    cameras = capture.cameras[kept]
+    index = torch.tensor(kept)
+    cameras = capture.cameras[index]
     if capture.optics is not None:
-        # A path is of pinholes: as fine as the lens in the middle of the picture.
+        # A path has pinhole cameras; keep the resolution of the lens at the image centre.
         step = radians_per_pixel(cameras[0], capture.optics)
         cameras = replace(cameras, focal_px=torch.full_like(cameras.focal_px, 1 / step))
-    return CameraPath(cameras=cameras, times_s=capture.times_s[kept])
+    return CameraPath(cameras=cameras, times_s=capture.times_s[index])
 
 
 def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
-    """Write all files, or none; they replace those of an earlier call.
+    """Write all files atomically; they replace those of an earlier call.
 
     Raises:
         OutputError: the folder cannot be written.
     """
-    scene = scene_of(report)
+    scene = fitted_scene(report)
     with atomic_folder(folder, RESULT_FILES) as staging:
         save_scene(scene, staging / "scene.safetensors")
         write_view(scene, scene.path, staging / "video.mp4", None, log)
@@ -106,13 +106,15 @@ def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
 
 def _comparison(report: FitReport, scene: Scene) -> Float[Tensor, "h w 3"]:
     qualities = report.result.held_out or report.result.training
-    at = torch.linspace(0, len(qualities) - 1, min(SHOWN, len(qualities))).round().long()
-    chosen = [qualities[i] for i in at.tolist()]
-    judge = Judge(sight=report.result.sight, store=FrameStore(report.capture))
-    truths = [judge.store.read(quality.frame).rgb for quality in chosen]
-    made = [judge.picture(scene, report.result.cameras, q.frame)[0] for q in chosen]
-    labels = [f"camera {q.camera}, {q.time_s:.2f} s: {q.psnr_db:.1f} dB" for q in chosen]
-    return comparison(truths, made, labels)
+    at = (
+        torch.linspace(0, len(qualities) - 1, min(COMPARISON_FRAMES, len(qualities))).round().long()
+    )
+    selected = [qualities[i] for i in at.tolist()]
+    evaluator = Evaluator(renderer=report.result.renderer, store=FrameStore(report.capture))
+    truths = [evaluator.store.read(quality.frame).rgb for quality in selected]
+    renderings = [evaluator.image(scene, report.result.cameras, q.frame)[0] for q in selected]
+    labels = [f"camera {q.camera}, {q.time_s:.2f} s: {q.psnr_db:.1f} dB" for q in selected]
+    return comparison_sheet(truths, renderings, labels)
 
 
 def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
@@ -128,8 +130,8 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
             "notes": list(capture.notes),
             "license": capture.license,
         },
-        "held_out": quality_facts(result.held_out),
-        "training": quality_facts(result.training),
+        "held_out": quality_summary(result.held_out),
+        "training": quality_summary(result.training),
         "cameras_learned": result.learned,
         "optics": None if result.cameras is None else optics_json(result.cameras.optics),
         "finished": result.finished,
@@ -139,7 +141,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
         "seconds": {name: round(value, 3) for name, value in log.phases.seconds.items()},
         "seconds_fitting": round(result.seconds, 3),
         "peak_memory_bytes": peak_memory_bytes(),
-        "left_out": [*result.omissions.to_json(), *log.omissions.to_json()],
+        "left_out": [*result.omissions.to_json(), *log.skipped.to_json()],
         "versions": {name: version(name) for name in LIBRARIES},
         "machine": {
             "python": platform.python_version(),
@@ -150,17 +152,17 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
     return json.dumps(card, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def quality_facts(qualities: Sequence[FrameQuality]) -> dict[str, object] | None:
+def quality_summary(qualities: Sequence[FrameQuality]) -> dict[str, object] | None:
     """Means over frames, and per camera; None without frames."""
     if not qualities:
         return None
     cameras = sorted({quality.camera for quality in qualities})
-    structures = [quality.ssim for quality in qualities if quality.ssim is not None]
+    similarities = [quality.ssim for quality in qualities if quality.ssim is not None]
     return {
         "frames": len(qualities),
         "psnr_db": round(mean_psnr_db(qualities), 3),
         "worst_psnr_db": round(min(quality.psnr_db for quality in qualities), 3),
-        "ssim": round(sum(structures) / len(structures), 4) if structures else None,
+        "ssim": round(sum(similarities) / len(similarities), 4) if similarities else None,
         "psnr_db_per_camera": {
             str(camera): round(mean_psnr_db([q for q in qualities if q.camera == camera]), 3)
             for camera in cameras

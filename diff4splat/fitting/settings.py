@@ -1,8 +1,8 @@
-"""Everything that decides how a scene is fitted, with where each number comes from.
+"""Settings of a fit, with the source of each number.
 
 Rates are those of Kerbl et al. (SIGGRAPH 2023) and Wu et al. (CVPR 2024, arXiv 2310.08528), code
-and appendix, raised where a fit of minutes in place of hours needs it. Lengths are in shares of
-the extent of the scene.
+and appendix, raised for fits of minutes instead of hours. Lengths are shares of the extent of the
+scene.
 """
 
 from dataclasses import dataclass, field
@@ -17,59 +17,59 @@ CameraPart = Literal["lens", "focus", "aperture", "readout", "focal"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Decay:
-    """A learning rate that falls log-linearly over its stage."""
+class LogLinearDecay:
+    """A learning rate that decays log-linearly over its stage."""
 
     first: float
     last: float
 
     def at(self, progress: float) -> float:
-        """The rate after a share of the stage."""
+        """The rate after the share ``progress`` of the stage."""
         return self.first * (self.last / self.first) ** min(max(progress, 0.0), 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rates:
+class LearningRates:
     """Learning rates; lengths are multiplied by the extent of the scene."""
 
-    means: Decay = Decay(first=8e-4, last=8e-6)
-    log_scales: Decay = Decay(first=1e-2, last=2e-3)
-    quats: Decay = Decay(first=4e-3, last=1e-3)
-    opacity_logits: Decay = Decay(first=5e-2, last=1e-2)
-    sh_dc: Decay = Decay(first=1e-2, last=1e-3)
-    sh_rest: Decay = Decay(first=5e-4, last=5e-5)
-    planes: Decay = Decay(first=1e-2, last=5e-4)
-    decoder: Decay = Decay(first=1e-3, last=5e-5)
-    velocities: Decay = Decay(first=1e-2, last=1e-4)
-    times: Decay = Decay(first=1e-2, last=1e-3)
-    lens: Decay = Decay(first=5e-2, last=2e-3)
+    means: LogLinearDecay = LogLinearDecay(first=8e-4, last=8e-6)
+    log_scales: LogLinearDecay = LogLinearDecay(first=1e-2, last=2e-3)
+    quats: LogLinearDecay = LogLinearDecay(first=4e-3, last=1e-3)
+    opacity_logits: LogLinearDecay = LogLinearDecay(first=5e-2, last=1e-2)
+    sh_dc: LogLinearDecay = LogLinearDecay(first=1e-2, last=1e-3)
+    sh_rest: LogLinearDecay = LogLinearDecay(first=5e-4, last=5e-5)
+    planes: LogLinearDecay = LogLinearDecay(first=1e-2, last=5e-4)
+    decoder: LogLinearDecay = LogLinearDecay(first=1e-3, last=5e-5)
+    velocities: LogLinearDecay = LogLinearDecay(first=1e-2, last=1e-4)
+    times: LogLinearDecay = LogLinearDecay(first=1e-2, last=1e-3)
+    lens: LogLinearDecay = LogLinearDecay(first=5e-2, last=2e-3)
     """In pixels of displacement."""
-    focus: Decay = Decay(first=1e-2, last=5e-4)
-    """Of logarithms, as the next three."""
-    aperture: Decay = Decay(first=1e-2, last=5e-4)
-    readout: Decay = Decay(first=2e-2, last=1e-3)
-    focal: Decay = Decay(first=2e-3, last=1e-4)
+    focus: LogLinearDecay = LogLinearDecay(first=1e-2, last=5e-4)
+    """Of the logarithm, as for the next three."""
+    aperture: LogLinearDecay = LogLinearDecay(first=1e-2, last=5e-4)
+    readout: LogLinearDecay = LogLinearDecay(first=2e-2, last=1e-3)
+    focal: LogLinearDecay = LogLinearDecay(first=2e-3, last=1e-4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Density:
-    """How Gaussians are added and removed."""
+class DensitySettings:
+    """Density control: how Gaussians are added and removed."""
 
     budget: int = 40_000
-    """Never more Gaussians than this."""
+    """Largest number of Gaussians."""
     every: int = 100
     growth: float = 0.12
-    """Share of Gaussians that is split each time, at the most."""
+    """Largest share of Gaussians that one step splits."""
     until: float = 0.6
-    """Of the stage; afterwards the number stays."""
+    """Share of the stage after which the number of Gaussians is fixed."""
     min_opacity: float = 0.005
     min_gradient: float = 2e-5
-    """Of a mean, in half pictures per loss: below it nothing is split."""
+    """Smallest gradient of a mean, in normalised device coordinates, for a split."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Weights:
-    """Of the terms of the loss beside the mean absolute error of colours."""
+class LossWeights:
+    """Weights of the loss terms other than the mean absolute colour error."""
 
     ssim: float = 0.0
     depth: float = 0.1
@@ -81,60 +81,59 @@ class Weights:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stillness:
-    """Which Gaussians the motion has to carry; the others are left out of it."""
+class StaticDetectionSettings:
+    """Which Gaussians are static and excluded from the motion."""
 
     min_score: float = 0.08
-    """How much more error at its worst time than at its best a standing Gaussian may have."""
+    """Largest error variation over time of a static Gaussian, in the static scene."""
     offset_px: float = 0.1
-    """A Gaussian that never goes further than this from its mean place stands still."""
+    """Largest displacement of a static Gaussian from its mean position."""
     change: float = 0.02
-    """The same for opacity and colour."""
+    """Largest change of opacity and colour of a static Gaussian."""
     checks: tuple[float, ...] = (0.5, 1.0)
-    """Shares of the fine stage after which Gaussians that proved still are taken out."""
+    """Shares of the fine stage after which static Gaussians leave the motion."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSettings:
-    """What is learned of the cameras, and how rays make pictures where rays are needed."""
+    """Learned camera parameters, and the quality of ray traced frames."""
 
     learn: tuple[CameraPart, ...] = ()
-    """Parts that the capture only guesses: they start from there."""
+    """Parameters that the capture only estimates; the estimate is the initial value."""
     start: int = 100
-    """Steps of the whole fit before they are learned: first the scene has to be there."""
+    """First step of the fit that optimises the cameras; the scene converges first."""
     samples: int = 8
-    """Rays per pixel in a step, where an aperture or an exposure needs several; other ones each
-    time. Fewer are faster and noisier."""
+    """Rays per pixel in a step, for an aperture or an exposure; fewer are faster and noisier."""
     shown_samples: int = 64
-    """The same for pictures that are judged and shown."""
+    """Rays per pixel for evaluation and preview."""
     tolerance_px: float = 0.3
-    """How far anything may be from its place at the time of a ray, in a step."""
+    """Largest position error from approximating the time of a ray, in a step."""
     most_intervals: int = 4
-    """Into which the time of a picture is split in a step."""
+    """Largest number of time intervals per frame in a step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitSettings:
-    """One fit."""
+    """All settings of one fit."""
 
     motion: MotionName = "hexplane"
     seed: int = 0
     coarse_steps: int = 1000
-    """Without motion, all times as if they were one."""
+    """Steps without motion, over frames of all times."""
     fine_steps: int = 2500
     views_per_step: int = 2
-    """Pictures of one time per step: they share the state."""
+    """Frames of one time per step; they share the state of the Gaussians."""
     harmonics: int = 1
     """Highest degree of view-dependent colour; raised by one every ``harmonics_every`` steps."""
     harmonics_every: int = 500
     points: int = 20_000
-    """To start from, where the capture has more."""
+    """Largest number of initial points."""
     use_depth: bool = True
-    """Start from depth, and compare with it, where the capture has any."""
-    rates: Rates = field(default_factory=Rates)
-    density: Density = field(default_factory=Density)
-    weights: Weights = field(default_factory=Weights)
-    stillness: Stillness = field(default_factory=Stillness)
+    """Initialise from depth and use a depth loss, if the capture has depth."""
+    rates: LearningRates = field(default_factory=LearningRates)
+    density: DensitySettings = field(default_factory=DensitySettings)
+    weights: LossWeights = field(default_factory=LossWeights)
+    stillness: StaticDetectionSettings = field(default_factory=StaticDetectionSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
     planes: HexPlaneSize = field(default_factory=lambda: HexPlaneSize(space=(32, 32, 32), time=25))
     decoder: DecoderSize = field(
@@ -143,9 +142,9 @@ class FitSettings:
         )
     )
     time_slices: int = 8
-    """Native 4D: pulses that share the time range at the start."""
+    """Native 4D Gaussians: initial number of time slices."""
     picture_memory_mb: int = 1024
-    """Pictures kept in memory; the others are read again when they are needed."""
+    """Cache for frames; others are read again when needed."""
     checkpoint_every: int = 1000
     judge_every: int = 500
 

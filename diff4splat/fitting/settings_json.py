@@ -1,4 +1,4 @@
-"""Settings of a fit changed by ``key=value``, with dotted keys such as ``density.budget``."""
+"""Overrides of fit settings as ``key=value``, with dotted keys such as ``density.budget``."""
 
 import json
 from collections.abc import Sequence
@@ -7,11 +7,11 @@ from typing import Any
 
 from diff4splat.errors import ConfigError
 from diff4splat.fitting.settings import FitSettings
-from diff4splat.training.typed_json import TypedReader
+from diff4splat.training.config_codec import TypedReader
 
 
-def changed(settings: FitSettings, changes: Sequence[str]) -> FitSettings:
-    """Other settings; values are JSON, or plain words.
+def apply_changes(settings: FitSettings, changes: Sequence[str]) -> FitSettings:
+    """Settings with ``changes`` applied; values are JSON or plain words.
 
     Raises:
         ConfigError: no "=", an unknown key, or a value of the wrong kind.
@@ -22,19 +22,19 @@ def changed(settings: FitSettings, changes: Sequence[str]) -> FitSettings:
         if not equals:
             raise ConfigError(f"--set: expected key=value, got {change!r}")
         *outer, last = key.strip().split(".")
-        place = data
+        target = data
         for name in outer:
-            place = _inner(place, name, key)
-        place[last] = _parsed(text.strip())
+            target = _group(target, name, key)
+        target[last] = _parsed(text.strip())
     return TypedReader(refusal=ConfigError).read(FitSettings, data, "settings")
 
 
-def _inner(place: dict[str, Any], name: str, key: str) -> dict[str, Any]:
-    inner = place.get(name)
-    if not isinstance(inner, dict):
-        groups = ", ".join(name for name, value in place.items() if isinstance(value, dict))
+def _group(parent: dict[str, Any], name: str, key: str) -> dict[str, Any]:
+    group = parent.get(name)
+    if not isinstance(group, dict):
+        groups = ", ".join(name for name, value in parent.items() if isinstance(value, dict))
         raise ConfigError(f"--set {key}: expected a group such as {groups or 'none'}, got {name!r}")
-    return inner
+    return group
 
 
 def _parsed(text: str) -> Any:

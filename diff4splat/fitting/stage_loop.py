@@ -1,118 +1,142 @@
-"""One stage of a fit: steps, more and fewer Gaussians, judgements and checkpoints."""
+"""The optimisation loop of one stage: steps, density control, evaluation and checkpoints."""
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor
 
-from diff4splat.fitting.density import Pull, grow_and_prune
-from diff4splat.fitting.divergence_guard import Guard
-from diff4splat.fitting.evaluator import Judge, mean_psnr_db
-from diff4splat.fitting.log import Reading, Recorder
-from diff4splat.fitting.model import SceneModel
-from diff4splat.fitting.objective import Objective
-from diff4splat.fitting.pictures import Schedule
+from diff4splat.fitting.divergence_guard import DivergenceGuard, restore_snapshot
+from diff4splat.fitting.evaluator import Evaluator, mean_psnr_db
+from diff4splat.fitting.frames.frame_schedule import FrameSchedule
+from diff4splat.fitting.log import FitLogger, LogEntry
+from diff4splat.fitting.model.density import densify_and_prune
+from diff4splat.fitting.model.scene_model import SceneModel
+from diff4splat.fitting.objective.gradient_statistics import GradientStatistics
+from diff4splat.fitting.objective.step_objective import Objective
 
-LIVE_FRAMES = 12
-"""Held-out frames that are looked at while a fit runs."""
-FIRST_GROWTH = 300
-"""Steps before Gaussians are split for the first time."""
+EVALUATION_FRAMES = 12
+"""Held-out frames evaluated during a fit."""
+FIRST_SPLIT_STEP = 300
+"""First step of a stage that may split Gaussians."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
-    """What a stage needs beside its model."""
+class StageSchedule:
+    """Length of a stage, its frames and what it reports to."""
 
     name: str
     objective: Objective
-    schedule: Schedule
-    judge: Judge
-    recorder: Recorder
+    frames: FrameSchedule
+    evaluator: Evaluator
+    logger: FitLogger
     extent: float
+    """Of the scene, in scene units; scales the learning rates of lengths."""
     steps: int
     first_step: int
-    """Of the whole fit: schedules and harmonics count from its beginning."""
+    """Steps of earlier stages; frames and harmonics count from the start of the fit."""
     save: Callable[["StageLoop"], None]
+    fixed: Mapping[str, Tensor] = field(default_factory=dict)
+    """Tensors that a checkpoint needs to rebuild the stage."""
     deadline_s: float | None = None
     """Of ``time.perf_counter``."""
     seconds_before: float = 0.0
 
 
 class StageLoop:
-    """Runs the steps of a stage from wherever they are."""
+    """Runs the steps of a stage, from ``step`` on."""
 
-    def __init__(self, course: Course, model: SceneModel, step: int = 0) -> None:
-        self.course, self.model, self.step = course, model, step
-        self.pull = Pull(len(model))
-        self.guard = Guard(model)
-        self._began = time.perf_counter()
+    def __init__(self, stage: StageSchedule, model: SceneModel, step: int = 0) -> None:
+        self.stage, self.model, self.step = stage, model, step
+        self.gradients = GradientStatistics(len(model))
+        self.guard = DivergenceGuard(model)
+        self._start_s = time.perf_counter()
         self._loss = 0.0
 
     @property
     def degree(self) -> int:
-        """Of the harmonics that take part by now."""
-        settings = self.course.objective.settings
+        """Current degree of the spherical harmonics."""
+        settings = self.stage.objective.settings
         return min(
-            settings.harmonics, (self.course.first_step + self.step) // settings.harmonics_every
+            settings.harmonics, (self.stage.first_step + self.step) // settings.harmonics_every
         )
 
     @property
     def seconds(self) -> float:
-        """Since the fit began, those of earlier calls included."""
-        return self.course.seconds_before + time.perf_counter() - self._began
+        """Time since the start of the fit, including earlier calls."""
+        return self.stage.seconds_before + time.perf_counter() - self._start_s
 
     @property
     def progress(self) -> float:
-        """Share of the stage that is over."""
-        return self.step / max(self.course.steps, 1)
+        """Completed share of the stage."""
+        return self.step / max(self.stage.steps, 1)
 
     def run(self, until: int, advance: Callable[[], None]) -> bool:
-        """Take steps up to ``until``; False when time ran out before.
+        """Run steps up to ``until``; False if the deadline passed before.
 
         Raises:
-            DivergenceError: the loss is not finite or has left for good.
+            DivergenceError: the loss is not finite or has diverged.
         """
-        settings = self.course.objective.settings
+        settings = self.stage.objective.settings
         while self.step < until:
-            if self.course.deadline_s is not None and time.perf_counter() > self.course.deadline_s:
+            if self.stage.deadline_s is not None and time.perf_counter() > self.stage.deadline_s:
                 return False
             self._take_step()
             self.step += 1
             self._change_density()
             if self.step % settings.judge_every == 0:
-                self.judge()
+                self.evaluate()
             if self.step % settings.checkpoint_every == 0:
-                self.course.save(self)
+                self.stage.save(self)
             advance()
         return True
 
-    def judge(self) -> None:
-        """Look at a few held-out frames and say how it goes."""
-        held = self.course.objective.capture.held_out.nonzero().flatten()
-        some = torch.linspace(0, len(held) - 1, min(LIVE_FRAMES, len(held))).round().long()
+    def evaluate(self) -> None:
+        """Measure quality on a few held-out frames and log it."""
+        held_out = self.stage.objective.capture.held_out.nonzero().flatten()
+        at = torch.linspace(0, len(held_out) - 1, min(EVALUATION_FRAMES, len(held_out)))
         with torch.no_grad():
-            scene = self.model.scene(self.degree, self.course.objective.sight.path)
-            known = self.model.cameras(learning=False)
-            found = self.course.judge.frames(scene, known, held[some].tolist())
-        self.course.recorder.record(
-            Reading(
-                stage=self.course.name,
+            scene = self.model.scene(self.degree, self.stage.objective.renderer.path)
+            cameras = self.model.cameras(learning=False)
+            indices = held_out[at.round().long()].tolist()
+            qualities = self.stage.evaluator.frames(scene, cameras, indices)
+        self.stage.logger.record(
+            LogEntry(
+                stage=self.stage.name,
                 step=self.step,
                 loss=self._loss,
                 gaussians=len(self.model),
-                moving=int(self.model.moves.sum()),
+                moving=int(self.model.moving_mask.sum()),
                 seconds=round(self.seconds, 1),
-                held_out_psnr_db=mean_psnr_db(found),
+                held_out_psnr_db=mean_psnr_db(qualities),
             )
         )
 
+    def rewind(self) -> None:
+        """Go back to the last good state."""
+        restore_snapshot(self.model, self.guard.last_good)
+        self.step = self.guard.last_good.step
+        self.gradients.reset(len(self.model))
+
+    def tensors(self) -> dict[str, Tensor]:
+        """State of the loop outside the parameter table, for a checkpoint."""
+        gradients = {
+            "pull_total": self.gradients.total,
+            "pull_seen": self.gradients.visible_steps,
+        }
+        return gradients | dict(self.stage.fixed)
+
+    def load(self, tensors: Mapping[str, Tensor]) -> None:
+        """Restore the output of ``tensors``."""
+        self.gradients.total = tensors["pull_total"]
+        self.gradients.visible_steps = tensors["pull_seen"]
+
     def _take_step(self) -> None:
-        course, number = self.course, self.course.first_step + self.step
-        time_s, frames = course.schedule.frames(number)
-        step = course.objective.loss(self.model, time_s, frames, self.degree, number)
+        stage, number = self.stage, self.stage.first_step + self.step
+        time_s, frames = stage.frames.frames(number)
+        step = stage.objective.loss(self.model, time_s, frames, self.degree, number)
         self._loss = float(step.loss.detach())
         finite = math.isfinite(self._loss)
         if finite:
@@ -121,11 +145,11 @@ class StageLoop:
         if not self.guard.accepts(self._loss if finite else math.nan):
             self.model.table.optimizer.zero_grad(set_to_none=True)
             return
-        self.pull.add(step.means, step.half_pictures)
-        rates = self.model.rates(course.objective.settings.rates, course.extent, self.progress)
+        self.gradients.add(step.means, step.ndc_scale)
+        rates = self.model.rates(stage.objective.settings.rates, stage.extent, self.progress)
         self.model.table.step(rates)
-        self.model.bound()
-        self.guard.passed(self.model, self.step)
+        self.model.clamp_params()
+        self.guard.after_step(self.model, self.step)
 
     def _gradients_finite(self) -> bool:
         gradients = [self.model.table[name].grad for name in self.model.table.names]
@@ -133,18 +157,10 @@ class StageLoop:
         return total - total == 0
 
     def _change_density(self) -> None:
-        density = self.course.objective.settings.density
+        density = self.stage.objective.settings.density
         late = self.progress > density.until
-        if self.step % density.every or self.step < FIRST_GROWTH or late:
+        if self.step % density.every or self.step < FIRST_SPLIT_STEP or late:
             return
-        generator = torch.Generator().manual_seed(self.course.first_step + self.step)
-        grow_and_prune(self.model, self.pull.mean(), density, generator)
-        self.pull = Pull(len(self.model))
-
-    def tensors(self) -> dict[str, Tensor]:
-        """What the next step needs beside the table."""
-        return {"pull_total": self.pull.total, "pull_seen": self.pull.seen}
-
-    def take_over(self, tensors: dict[str, Tensor]) -> None:
-        """Put back what ``tensors()`` gave."""
-        self.pull.total, self.pull.seen = tensors["pull_total"], tensors["pull_seen"]
+        generator = torch.Generator().manual_seed(self.stage.first_step + self.step)
+        densify_and_prune(self.model, self.gradients.mean(), density, generator)
+        self.gradients = GradientStatistics(len(self.model))

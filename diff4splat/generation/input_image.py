@@ -16,7 +16,7 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, pinhole
-from diff4splat.io.images import read_photo
+from diff4splat.io.photos.images import read_photo
 
 SIDE_MULTIPLE = 16
 """Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""

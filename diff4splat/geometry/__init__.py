@@ -1,1 +1,1 @@
-"""Rotations, rigid motions, cameras, rays and depth; see docs/conventions.md."""
+"""Rotations, rigid motions, cameras, rays and depth; see docs/reference/conventions.md."""

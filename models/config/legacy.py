@@ -22,6 +22,9 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
 }
 """Section → old field → field of version 2."""
 
+HEADS = 4
+"""Of a motion prior that is absent; one that exists had as many as the video model."""
+
 
 def upgrade_config(data: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of version 2 for those of version 1."""
@@ -40,7 +43,7 @@ def upgrade_config(data: Mapping[str, Any]) -> dict[str, Any]:
     fresh["monocular_depth"] = {"channels": depth_channels}
     fresh["motion_unet"] = {
         "width": motion_width,
-        "heads": dit.get("heads", 4),
+        "heads": dit.get("heads", HEADS) if motion_width else HEADS,
         "mask_refiner_width": refiner_width,
     }
     # Version 1 never filled what one image hides where it had a depth prior.

@@ -146,10 +146,13 @@ class ModelConfig:
 
 
 def _current(data: Any) -> Any:
-    """The fields of this version; anything that is no object is refused later."""
+    """The fields of this version; anything that is no object is refused later.
+
+    A configuration inside another file needs no version: its sections tell.
+    """
     if not isinstance(data, Mapping):
         return data
-    version = data.get("version", 1)
+    version = data.get("version", VERSION if "refinement" in data else 1)
     if version not in (1, VERSION) or isinstance(version, bool):
         raise ConfigError(
             f"model configuration: expected version 1 or {VERSION}, got {version!r}; "

@@ -36,14 +36,16 @@ def write_sums(folder: Path) -> None:
 def require_whole(folder: Path, advice: str, names: Collection[str] | None = None) -> None:
     """Every file is the one that the list names; ``advice`` says how to get the folder again.
 
-    With ``names`` only those files are looked at.
+    With ``names`` only those files are compared; names of files that do not exist and that the
+    list does not name are ignored.
 
     Raises:
         FileFormatError: a file is damaged, missing, or not in the list.
     """
     sums = _read_sums(folder / SUMS_FILE, advice)
     present = {file.name for file in listed_files(folder)}
-    for name in sorted(present | sums.keys() if names is None else names):
+    compared = present | sums.keys()
+    for name in sorted(compared if names is None else compared.intersection(names)):
         if name not in sums:
             raise FileFormatError(
                 f"{folder / name}: expected a file that {SUMS_FILE} names, got another; {advice}"

@@ -26,12 +26,12 @@ def checked_folder(name_or_folder: str | Path, names: Collection[str] | None = N
     folder = Path(name_or_folder)
     bundled = None if _is_folder(folder) else bundled_folder(str(name_or_folder))
     if bundled is not None:
-        require_whole(bundled, "install diff4splat again", names)
+        require_whole(bundled, _advice(bundled), names)
         return bundled
     if not _is_folder(folder):
         return None
     if (folder / SUMS_FILE).is_file():
-        require_whole(folder, "fetch the model again", names)
+        require_whole(folder, _advice(folder), names)
     return folder
 
 
@@ -39,12 +39,11 @@ def require_parts(folder: Path, parts: Collection[str]) -> None:
     """Compare the weight files of ``parts`` with the folder's checksums, if it has any.
 
     Raises:
-        FileFormatError: a file is damaged.
+        FileFormatError: a file is damaged, or a listed one is absent.
     """
     if (folder / SUMS_FILE).is_file():
-        files = {weight_file(folder, part) for part in parts}
-        names = {file.name for file in files if file.is_file()}
-        require_whole(folder, "fetch the model again", names)
+        names = {weight_file(folder, part).name for part in parts}
+        require_whole(folder, _advice(folder), names)
 
 
 def find_config(name_or_folder: str | Path) -> ModelConfig:
@@ -67,6 +66,12 @@ def find_provenance(name_or_folder: str | Path) -> ModelProvenance:
     if folder is None:
         return ModelProvenance()
     return read_provenance(folder)
+
+
+def _advice(folder: Path) -> str:
+    """How to get a damaged folder again."""
+    bundled = folder == bundled_folder(folder.name)
+    return "install diff4splat again" if bundled else "fetch the model again"
 
 
 def _is_folder(folder: Path) -> bool:

@@ -79,11 +79,11 @@ def load_model(name_or_folder: str | Path, parts: Collection[str] | None = None)
     if folder is None:
         model = Model(config=size_by_name(str(name_or_folder)))
     else:
-        provenance = read_provenance(folder)
+        config, provenance = load_config(folder), read_provenance(folder)
         model = Model(
-            config=load_config(folder),
+            config=config,
             folder=folder,
-            trained=provenance.trained,
+            trained=provenance.trained.intersection(model_parts(config)),
             license=provenance.license,
             origin=provenance.origin,
         )

@@ -135,7 +135,7 @@ def _to_pixels(config: LdrmConfig, side_px: int) -> nn.ConvTranspose3d:
 def _require_frames(posed_video: PosedVideo | None) -> PosedVideo:
     if posed_video is None:
         raise ShapeError(
-            "LDRM: expected decoded pictures with their cameras for the detail decoder, got none; "
+            "LDRM: expected decoded frames with their cameras for refinement, got none; "
             "hand over a PosedVideo"
         )
     return posed_video

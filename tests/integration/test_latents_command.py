@@ -10,10 +10,10 @@ from training_commands import contents, refusal, rows
 
 from diff4splat.cli.main import run
 from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.pretrained import load_model
-from diff4splat.training.latents.stored import read_packs
+from diff4splat.models.hub.model import load_model
+from diff4splat.training.latents.latent_shards import read_packs
 
-SHORT = ("--set", "stages.generator.steps=2")
+SHORT = ("--set", "stages.video_diffusion.steps=2")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def latents(shards: Path, start: Path, tmp_path_factory: pytest.TempPathFactory)
 
 
 def train(out: Path, latents: Path, *more: str) -> int:
-    given = ["--config", "test", "--stage", "generator", "--out", str(out)]
+    given = ["--config", "test", "--stage", "video_diffusion", "--out", str(out)]
     return run(["train", *given, "--latents", str(latents), *SHORT, *more])
 
 
@@ -44,7 +44,7 @@ def test_every_clip_is_encoded_with_its_mirror_image(latents: Path, start: Path)
     assert pack.latent.shape[1:] == (4, 2, 4, 4)
     assert pack.versions == 2
     assert pack.model == load_model(start).weights_sha256
-    assert pack.draft is None, "the test size sees no drafts"
+    assert pack.render_condition is None, "the test size sees no drafts"
 
 
 def test_a_second_call_leaves_the_files_as_they_are(
@@ -68,12 +68,12 @@ def test_the_video_model_learns_from_latents_alone(
     latents: Path, start: Path, tmp_path: Path
 ) -> None:
     assert train(tmp_path, latents, "--from-model", str(start)) == 0
-    result = json.loads((tmp_path / "generator" / "result.json").read_text())
+    result = json.loads((tmp_path / "video_diffusion" / "result.json").read_text())
     assert (result["finished"], result["step"]) == (True, 2)
-    assert len(rows(tmp_path / "generator", "step")) == 2
+    assert len(rows(tmp_path / "video_diffusion", "step")) == 2
     assert not (tmp_path / "vae").exists()
-    written = json.loads((tmp_path / "generator" / "recipe.json").read_text())
-    (stage,) = [one for one in written["stages"] if one["name"] == "generator"]
+    written = json.loads((tmp_path / "video_diffusion" / "recipe.json").read_text())
+    (stage,) = [one for one in written["stages"] if one["name"] == "video_diffusion"]
     assert stage["data"]["sources"][0]["folder"] == str(latents)
     whole, given = load_model(tmp_path / "model"), load_model(start)
     assert whole.trained == set(PARTS)
@@ -85,7 +85,7 @@ def test_the_video_model_learns_from_latents_alone(
 
 def test_two_folders_are_learnt_from_together(latents: Path, start: Path, tmp_path: Path) -> None:
     both = ("--latents", str(latents), str(latents))
-    given = ["--config", "test", "--stage", "generator", "--out", str(tmp_path), *SHORT]
+    given = ["--config", "test", "--stage", "video_diffusion", "--out", str(tmp_path), *SHORT]
     assert run(["train", *given, *both, "--from-model", str(start), "--steps", "1"]) == 0
 
 
@@ -101,7 +101,7 @@ def test_a_folder_without_latents_is_refused(
 ) -> None:
     assert train(tmp_path, shards, "--from-model", str(start)) == 2
     assert "diff4splat prepare latents" in refusal(capsys)
-    assert not (tmp_path / "generator").exists()
+    assert not (tmp_path / "video_diffusion").exists()
 
 
 def test_a_model_that_sees_drafts_refuses_latents_without(

@@ -9,11 +9,13 @@ from packed_models import TRAINED, packed_folder, ship, trained_folder
 from training_commands import refusal
 
 from diff4splat.cli.main import run
-from diff4splat.io.images import write_png
-from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.pretrained import load_model
+from diff4splat.io.photos.images import write_png
+from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.factory import model_parts
+from diff4splat.models.hub.model import load_model
 from diff4splat.models.hub.weights import part_file, weights_sha256
 
+PARTS = model_parts(tiny_size())
 STATED = ("--license", "Apache-2.0", "--origin", "made by a test")
 
 
@@ -25,7 +27,7 @@ def rows(shown: str) -> dict[str, list[str]]:
     return {line.split()[0]: line.split()[1:] for line in shown.splitlines()}
 
 
-def test_a_trained_model_is_packed_and_its_sizes_are_told(
+def test_a_trained_model_is_packed_and_its_sizes_are_shown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "packed"
@@ -71,7 +73,7 @@ def test_what_cannot_be_packed_is_refused(
     assert not (tmp_path / "out").exists()
 
 
-def test_inspect_tells_what_is_trained(
+def test_inspect_shows_what_is_trained(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = ship(tmp_path, monkeypatch)
@@ -79,6 +81,7 @@ def test_inspect_tells_what_is_trained(
     shown = rows(capsys.readouterr().out)
     states = {part: shown[part][-1] for part in PARTS}
     assert states == {part: "trained" if part in TRAINED else "random" for part in PARTS}
+    assert not shown.keys() & {"monocular_depth", "motion_unet"}
     assert shown["weights"] == [str(folder)]
     assert shown["weights_sha256"] == [weights_sha256(folder)]
     assert (shown["license"], shown["origin"]) == (["MIT"], ["made", "by", "a", "test"])
@@ -104,16 +107,17 @@ def test_inspect_wants_one_thing(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "the file is damaged, fetch the model again" in refusal(capsys)
 
 
-def test_a_scene_of_shipped_weights_without_a_video_model(
+def test_a_scene_of_bundled_weights_without_a_video_model(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = ship(tmp_path, monkeypatch)
+    ship(tmp_path, monkeypatch)
     write_png(torch.rand(40, 40, 3), tmp_path / "photo.png")
     made = ["generate", str(tmp_path / "photo.png"), "--model", "test", "--frames", "2"]
     assert run([*made, "--out", str(tmp_path / "out"), "--prompt", "waves"]) == 0
     card = json.loads((tmp_path / "out" / "card.json").read_text())
-    assert card["untrained"] is True
+    assert card["untrained"] is False, "no network ran"
     assert card["scene"]["moving_gaussians"] == 0
-    assert card["provenance"]["weights_sha256"] == weights_sha256(folder)
-    left_out = {entry["what"]: entry["why"] for entry in card["left_out"]}
-    assert left_out["video model and reconstruction"] == "the video model is not trained"
+    skipped = {entry["what"]: entry["why"] for entry in card["left_out"]}
+    for part in ("vae", "dit", "ldrm", "deformation"):
+        assert skipped[part] == "the video model is not trained"
+    assert skipped["text_encoder"] == "no network that runs takes text"

@@ -1,4 +1,4 @@
-"""The shipped size: on pictures of two sizes, and on the demo's as ``make demo`` runs it."""
+"""The bundled model: on images of two sizes, and on the demo's as ``make demo`` runs it."""
 
 import json
 import subprocess
@@ -11,6 +11,7 @@ import torch
 from diff4splat.cli.main import run
 from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import pinhole
 from diff4splat.metrics.image import psnr
 from diff4splat.render.api import render
@@ -27,19 +28,30 @@ def waves(side_px: int) -> InputImage:
 
 
 @pytest.mark.parametrize("side_px", [64, 256])
-def test_one_picture_is_shown_as_it_is(side_px: int) -> None:
-    picture = waves(side_px)
-    scene = Diff4SplatPipeline.from_pretrained("small")(picture, "arc:0.1")
+def test_an_image_without_a_prompt_needs_its_depth_alone(side_px: int) -> None:
+    image, pipeline = waves(side_px), Diff4SplatPipeline.from_pretrained("small")
+    scene = pipeline(image, "arc:0.1")
+    assert pipeline.model.loaded == {"monocular_depth"}
+    assert scene.provenance.weights_sha256 == pipeline.model.weights_sha256({"monocular_depth"})
+    assert not scene.provenance.untrained
     assert scene.dilation_px2 == 0
     assert len(scene.gaussians) > 3 * side_px**2
-    assert float(psnr(render(scene, picture.camera).rgb.clamp(0, 1), picture.rgb)) >= 50
+    assert float(psnr(render(scene, image.camera).rgb.clamp(0, 1), image.rgb)) >= 50
+
+
+def test_every_network_runs_where_the_video_model_fills() -> None:
+    image, pipeline = waves(64), Diff4SplatPipeline.from_pretrained("small")
+    scene = pipeline(image, "arc:0.1", "waves", settings=GenerationSettings(fill="video", steps=1))
+    assert pipeline.model.loaded == set(pipeline.model.parts)
+    assert not scene.provenance.untrained
+    assert float(psnr(render(scene, image.camera).rgb.clamp(0, 1), image.rgb)) >= 50
 
 
 @pytest.mark.slow
-def test_the_demo_from_picture_to_folder(tmp_path: Path) -> None:
-    picture, out = tmp_path / "picture.jpg", tmp_path / "scene"
-    subprocess.run([sys.executable, str(EXAMPLE), str(picture)], check=True)
-    arguments = ["generate", str(picture), "--out", str(out), "--camera", "arc:0.2"]
+def test_the_demo_from_image_to_folder(tmp_path: Path) -> None:
+    image, out = tmp_path / "image.jpg", tmp_path / "scene"
+    subprocess.run([sys.executable, str(EXAMPLE), str(image)], check=True)
+    arguments = ["generate", str(image), "--out", str(out), "--camera", "arc:0.2"]
     assert run([*arguments, "--frames", "9", "--prompt", "a turquoise block slides"]) == 0
     card = json.loads((out / "card.json").read_text())
     assert card["first_view_psnr_db"] >= 28

@@ -1,9 +1,9 @@
 """The whole course through the command line: clips, six stages, a scene, a judgement."""
 
 import json
+import os
 import shutil
 import signal
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,17 +18,15 @@ from training_commands import (
     STAGES,
     arguments,
     assert_same,
-    command,
     refusal,
     rows,
     train,
-    wait_for,
     weights,
 )
 
 from diff4splat.cli.main import run
-from diff4splat.evaluation.protocol_json import protocol_json
-from diff4splat.io.images import write_png
+from diff4splat.evaluation.protocols.protocol_json import protocol_json
+from diff4splat.io.photos.images import write_png
 from diff4splat.training.prerequisites import last_checkpoint
 
 
@@ -134,22 +132,27 @@ def test_a_half_written_checkpoint_is_passed_over(
     assert_same(weights(tmp_path / "run"), weights(six_steps))
 
 
-def test_a_polite_stop_saves_and_the_same_command_goes_on(shards: Path, tmp_path: Path) -> None:
-    out, steps = tmp_path / "stopped", 40
-    given = arguments("vae", shards, out, steps=steps)
-    process = subprocess.Popen(
-        command(*given), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        wait_for(out / "vae" / "log.jsonl", '"step": 3')
-        process.send_signal(signal.SIGTERM)
-        said, errors = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert process.returncode == 0, errors
-    assert "the same command goes on" in said
-    stopped = json.loads((out / "vae" / "result.json").read_text())
-    assert 3 < stopped["step"] < steps and not stopped["finished"]
+def test_a_polite_stop_saves_and_the_same_command_goes_on(
+    six_steps: Path,
+    shards: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    step, updates = torch.optim.AdamW.step, []
+
+    def signalling(optimizer: torch.optim.AdamW) -> None:
+        step(optimizer)
+        updates.append(optimizer)
+        if len(updates) == 2:  # the step after the signal is the last
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(torch.optim.AdamW, "step", signalling)
+    given = arguments("vae", shards, tmp_path, *SAVING, steps=6)
     assert run(given) == 0
-    assert train("vae", shards, tmp_path / "whole", steps=steps) == 0
-    assert_same(weights(out), weights(tmp_path / "whole"))
+    monkeypatch.undo()
+    assert "the same command goes on" in capsys.readouterr().out
+    stopped = json.loads((tmp_path / "vae" / "result.json").read_text())
+    assert (stopped["step"], stopped["finished"]) == (3, False)
+    assert run(given) == 0
+    assert_same(weights(tmp_path), weights(six_steps))

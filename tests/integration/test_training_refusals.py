@@ -21,7 +21,7 @@ from training_commands import (
 
 from diff4splat.cli.main import run
 from diff4splat.errors import ConfigError
-from diff4splat.training.trainer.sampler import plan_batches
+from diff4splat.training.trainer.loading.sampler import plan_batches
 
 Spoil = Callable[[Path], object]
 
@@ -182,7 +182,7 @@ def test_a_full_disk_keeps_what_is_there(
     def full(source: object, target: object) -> None:
         raise OSError(28, os.strerror(28))
 
-    monkeypatch.setattr("diff4splat.training.trainer.checkpoint.os.replace", full)
+    monkeypatch.setattr("diff4splat.training.trainer.checkpoints.store.os.replace", full)
     assert train("vae", shards, out, *SAVING, steps=6) == 2
     assert "the disk is full; free some space" in refusal(capsys)
     monkeypatch.undo()

@@ -12,12 +12,12 @@ import pytest
 import torch
 from toy_training import Toy, ToySamples, ToyStage, toy_run, weights
 
-from diff4splat.training.trainer.export import load_parts
-from diff4splat.training.trainer.run import run_stage
+from diff4splat.training.trainer.checkpoints.export import load_parts
+from diff4splat.training.trainer.loop.fit import fit_stage
 
 SUPPORT = Path(__file__).parents[1] / "support"
 MODES = ("ddp", "fsdp2")
-SHARED = {"checkpoint_every": 2, "timeout_s": 30.0}
+SHARED = {"checkpoint_every": 2, "timeout_s": 120.0}
 
 
 def launch(folder: Path, calls: list[dict]) -> list[int]:
@@ -38,7 +38,7 @@ def launch(folder: Path, calls: list[dict]) -> list[int]:
             for rank in range(2)
         ]
         try:
-            return [process.wait(timeout=90) for process in running]
+            return [process.wait(timeout=400) for process in running]
         finally:
             for process in running:
                 process.kill()
@@ -53,7 +53,7 @@ def alone(folder: Path, samples: ToySamples | None = None, **changes: object) ->
     """Weights of the same run in this process."""
     stage = ToyStage()
     changes = {"checkpoint_every": 2} | changes
-    run_stage(stage, samples or ToySamples(), Toy().recipe(), toy_run(folder, **changes))
+    fit_stage(stage, samples or ToySamples(), Toy().recipe(), toy_run(folder, **changes))
     return weights(stage)
 
 

@@ -13,7 +13,8 @@ from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.training.batches.sources import EndlessClips
-from diff4splat.training.recipe import Recipe, SourceSettings
+from diff4splat.training.recipe.data import SourceSettings
+from diff4splat.training.recipe.recipe import Recipe
 
 SIZE_PX, FRAMES = (32, 32), 5
 

@@ -4,20 +4,29 @@ from dataclasses import replace
 
 from stage_fixtures import stage_recipe
 
-from diff4splat.models.config.model import DetailConfig, ModelConfig
+from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig, RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.recipe.losses import DepthLosses
+from diff4splat.training.recipe.stage import StageRecipe
 
-DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4, picture_width=4)
-MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
+REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
+MODEL: ModelConfig = replace(
+    tiny_size(), refinement=REFINEMENT, monocular_depth=MonocularDepthConfig(channels=4)
+)
 
 
 def depth_recipe(**losses: float) -> StageRecipe:
-    weights = {"depth_log": 1.0, "depth_edges": 0.5, "depth_shift": 1.0, "sky": 0.2} | losses
-    like = stage_recipe("dynamic", **weights)
-    data = replace(like.data, track_stride=4)
-    return replace(like, name="depth", kind="depth", data=data, trained=("ldrm",))
+    like = stage_recipe("dynamic")
+    data = replace(like.data, keyframe_stride=4)
+    return replace(
+        like,
+        name="monocular_depth",
+        kind="monocular_depth",
+        data=data,
+        trained=("ldrm",),
+        losses=DepthLosses(**losses),
+    )
 
 
 def with_sky(batch: ClipBatch) -> ClipBatch:

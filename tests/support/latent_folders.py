@@ -5,8 +5,10 @@ from pathlib import Path
 import torch
 
 from diff4splat.geometry.camera import Camera
-from diff4splat.training.latents.stored import LatentPack, write_pack
-from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
+from diff4splat.training.latents.latent_shards import LatentPack, write_pack
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
+from diff4splat.training.recipe.losses import FlowLosses
+from diff4splat.training.recipe.stage import StageRecipe
 
 FRAMES = 5
 
@@ -22,7 +24,7 @@ def make_pack(
     pose[:, :, 0, 3] = number[:, None] * 0.01 * torch.arange(FRAMES)
     return LatentPack(
         latent=latent,
-        draft=latent + 0.5 if draft else None,
+        render_condition=latent + 0.5 if draft else None,
         motion=latent[:, :0],
         cameras=Camera(
             focal_px=torch.full((count, FRAMES, 2), 20.0) + number[:, None, None],
@@ -52,13 +54,14 @@ def latents_of(folder: Path, still_share: float = 0.5, weight: float = 1.0) -> S
 
 
 def learning_from(*sources: SourceSettings) -> StageRecipe:
-    """A generator stage with these sources."""
+    """A video_diffusion stage with these sources."""
     return StageRecipe(
-        name="generator",
-        kind="generator",
+        name="video_diffusion",
+        kind="video_diffusion",
         steps=1,
         global_batch=2,
         micro_batch=2,
         trained=("dit",),
+        losses=FlowLosses(),
         data=DataSettings(sources=sources, workers=0),
     )

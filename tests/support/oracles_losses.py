@@ -37,7 +37,7 @@ def smoothness(depth: np.ndarray, valid: np.ndarray) -> float:
     return sum(float(np.mean(steps)) for steps in (along, across) if steps)
 
 
-def motion(predicted, truth, valid, distance_weight: float, size_weight: float) -> float:
+def motion(predicted, truth, valid, distance_weight: float, l1_weight: float) -> float:
     """Of one element ``... n 3``."""
     total, count = 0.0, 0
     for own, true, keep in zip(
@@ -45,7 +45,7 @@ def motion(predicted, truth, valid, distance_weight: float, size_weight: float) 
     ):
         if keep:
             apart = math.sqrt(sum((a - b) ** 2 for a, b in zip(own, true, strict=True)))
-            total += distance_weight * apart + size_weight * sum(abs(a) for a in own)
+            total += distance_weight * apart + l1_weight * sum(abs(a) for a in own)
             count += 1
     return total / count if count else 0.0
 

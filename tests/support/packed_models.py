@@ -8,9 +8,9 @@ import torch
 
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
-from diff4splat.models.hub import bundled_weights as shipped
+from diff4splat.models.hub import bundled_weights
 from diff4splat.models.hub.export import export_model
-from diff4splat.models.hub.pretrained import Model, load_model, save_model
+from diff4splat.models.hub.model import Model, load_model, save_model
 
 TRAINED = ("vae", "ldrm", "deformation")
 
@@ -39,14 +39,14 @@ def ship(
 ) -> Path:
     """Make the packed folder what the package finds under the name of its size."""
     folder = packed_folder(tmp_path, trained)
-    monkeypatch.setattr(shipped, "WEIGHTS_FOLDER", folder.parent)
+    monkeypatch.setattr(bundled_weights, "WEIGHTS_FOLDER", folder.parent)
     return folder
 
 
 def random_model() -> Model:
     """What a size without shipped weights gives."""
     config = tiny_size()
-    return Model(config=config, networks=create_networks(config, with_text=False))
+    return Model(config=config, networks=create_networks(config))
 
 
 def as_trained(model: Model, *parts: str) -> Model:

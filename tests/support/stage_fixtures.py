@@ -11,7 +11,7 @@ from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
-from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 from diff4splat.training.stages.factory import create_stage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
@@ -32,7 +32,7 @@ class SquaredDifference:
         return (image - reference).square().mean((1, 2, 3))
 
 
-def stage_recipe(name: str, **losses: float) -> StageRecipe:
+def stage_recipe(name: str, **losses: object) -> StageRecipe:
     """A stage of the ``test`` recipe with other loss weights."""
     recipe = recipe_by_name("test").stage(name)
     return replace(recipe, losses=replace(recipe.losses, **losses))

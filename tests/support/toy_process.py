@@ -14,9 +14,9 @@ from pathlib import Path
 import torch
 from toy_training import Toy, ToySamples, ToyStage, toy_run, weights
 
-from diff4splat.training.trainer import checkpoint
-from diff4splat.training.trainer.distributed import open_processes
-from diff4splat.training.trainer.run import run_stage
+from diff4splat.training.trainer.checkpoints import store as checkpoint
+from diff4splat.training.trainer.distributed.processes import open_processes
+from diff4splat.training.trainer.loop.fit import fit_stage
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def call(asked: dict) -> None:
         die_while_saving(asked["die_while_saving"])
     stage = ToyStage()
     run = toy_run(Path(asked["folder"]), **asked.get("run", {}))
-    result = run_stage(stage, samples, Toy(**asked.get("toy", {})).recipe(), run)
+    result = fit_stage(stage, samples, Toy(**asked.get("toy", {})).recipe(), run)
     found = weights(stage) | {"outcome": result.outcome, "measures": result.measures}
     torch.save(found, f"{asked['folder']}/rank-{os.environ['RANK']}.pt")
 
@@ -64,7 +64,7 @@ def call(asked: dict) -> None:
 def main() -> None:
     torch.set_num_threads(1)
     calls = json.loads(Path(sys.argv[1]).read_text())
-    with open_processes("ddp", "cpu", timeout_s=30.0):
+    with open_processes("ddp", "cpu", timeout_s=120.0):
         for asked in calls:
             call(asked)
 

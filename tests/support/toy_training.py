@@ -9,12 +9,11 @@ from torch import Tensor, nn
 from torch.distributed.tensor import DTensor
 
 from diff4splat.errors import InputError
-from diff4splat.training.recipe import (
-    DataSettings,
-    OptimizerSettings,
-    StageRecipe,
-    TrainerSettings,
-)
+from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.recipe.losses import AutoencoderLosses
+from diff4splat.training.recipe.optimizer import OptimizerSettings
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.recipe.trainer import TrainerSettings
 from diff4splat.training.stage import TOTAL, Stage
 from diff4splat.training.trainer.settings import RunSettings
 
@@ -122,6 +121,7 @@ class Toy:
             global_batch=self.global_batch,
             micro_batch=self.micro_batch,
             trained=("body", "head"),
+            losses=AutoencoderLosses(),
             optimizer=self.optimizer,
             data=DataSettings(workers=self.workers),
         )

@@ -1,8 +1,6 @@
 """What tests of the training commands share."""
 
 import json
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -11,9 +9,9 @@ from clip_shards import changes
 
 from diff4splat.cli.main import run
 from diff4splat.training.prerequisites import last_checkpoint
-from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.trainer.checkpoints.export import load_parts
 
-STAGES = ("vae", "static-low", "static-high", "dynamic", "generator", "joint")
+STAGES = ("vae", "static-low", "static-high", "dynamic", "video_diffusion", "joint")
 DRAWN = ("--size", "32", "--frames", "5", "--views", "2", "--tracks", "16")
 SAVING = ("--set", "trainer.checkpoint_every=2", "trainer.keep_checkpoints=9")
 
@@ -65,16 +63,3 @@ def assert_same(first: dict[str, torch.Tensor], second: dict[str, torch.Tensor])
     assert first.keys() == second.keys()
     for key, value in first.items():
         assert torch.equal(value, second[key]), key
-
-
-def command(*given: str) -> list[str]:
-    return [sys.executable, "-m", "diff4splat.cli.main", *given]
-
-
-def wait_for(file: Path, word: str, seconds: float = 90) -> None:
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if file.is_file() and word in file.read_text():
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"{file} never said {word}")

@@ -14,8 +14,8 @@ from torch import Tensor
 from diff4splat.data.clip import Clip, View
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
-from diff4splat.training.batches.window import from_first_camera, unplaced
-from diff4splat.training.recipe import DataSettings
+from diff4splat.training.batches.temporal_crop import drop_projections, from_first_camera
+from diff4splat.training.recipe.data import DataSettings
 
 
 def augmented(clip: Clip, settings: DataSettings, generator: torch.Generator) -> Clip:
@@ -37,7 +37,7 @@ def augmented(clip: Clip, settings: DataSettings, generator: torch.Generator) ->
 def led_by(clip: Clip, view: int) -> Clip:
     """Another view becomes the input view; the others follow in turn."""
     turned = clip.views[view:] + clip.views[:view]
-    tracks = None if clip.tracks is None else unplaced(clip.tracks)
+    tracks = None if clip.tracks is None else drop_projections(clip.tracks)
     return from_first_camera(replace(clip, views=turned, tracks=tracks))
 
 
@@ -54,7 +54,7 @@ def reversed_in_time(clip: Clip) -> Clip:
     """The last frame first; times run forwards again."""
     times_s, tracks = clip.times_s, clip.tracks
     if tracks is not None:
-        tracks = replace(unplaced(tracks), positions=tracks.positions.flip(0))
+        tracks = replace(drop_projections(tracks), positions=tracks.positions.flip(0))
     views = tuple(_backwards(view) for view in clip.views)
     times_s = times_s[0] + (times_s[-1] - times_s).flip(0)
     return from_first_camera(replace(clip, times_s=times_s, views=views, tracks=tracks))
@@ -74,7 +74,7 @@ def cropped(clip: Clip, size_px: tuple[int, int], generator: torch.Generator) ->
         )
     top, left = (int(torch.randint(space + 1, (), generator=generator)) for space in room)
     views = tuple(_window(view, (top, left), size_px) for view in clip.views)
-    tracks = None if clip.tracks is None else unplaced(clip.tracks)
+    tracks = None if clip.tracks is None else drop_projections(clip.tracks)
     return replace(clip, views=views, tracks=tracks)
 
 

@@ -50,7 +50,7 @@ class ClipBatch:
     def __len__(self) -> int:
         return len(self.sample_index)
 
-    def first_picture(self) -> "ClipBatch":
+    def first_image(self) -> "ClipBatch":
         """The same with nothing but the first frame as input; targets stay."""
         first = camera_frames(self.cameras, torch.zeros(1, dtype=torch.long))
         return replace(self, video=self.video[:, :1], cameras=first, depth=self.depth[:, :1])

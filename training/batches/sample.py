@@ -14,17 +14,17 @@ from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.training.batches.augment import augmented
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.batches.motion_truth import (
+from diff4splat.training.batches.motion_targets import (
     cell_means,
-    continued,
-    moving_pixels,
+    extend_to_all_cells,
+    moving_mask,
     pixel_motion,
 )
+from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
-from diff4splat.training.batches.scale import normalized
 from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
-from diff4splat.training.batches.window import cut, held
-from diff4splat.training.recipe import DataSettings
+from diff4splat.training.batches.temporal_crop import crop, repeat_keyframes
+from diff4splat.training.recipe.data import DataSettings
 from diff4splat.training.stage import SampleKey
 
 
@@ -46,20 +46,20 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
     _require_views(clip, settings.views)
     clip = resized(_window(clip, settings, generator), settings.size_px)
     clip = augmented(clip, settings, generator)
-    clip = normalized(clip, settings.least_depth_share)
+    clip = normalized(clip, settings.min_valid_depth)
     targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
-    if not (settings.moving_targets or clip.note.is_static):
+    if not (settings.supervise_motion or clip.note.is_static):
         targets = replace(targets, frames=torch.zeros_like(targets.frames))
     tracks = draw_tracks(clip, targets.frames, settings, generator)
     motion = pixel_motion(clip, settings.input_stride)
-    moving = moving_pixels(motion)
+    moving = moving_mask(motion)
     view, shown = clip.views[INPUT_VIEW], slice(None, None, settings.input_stride)
     return ClipBatch(
         sample_index=torch.tensor([origin.key.sample]),
         source=(origin.source,),
         video=view.rgb[None, shown],
         cameras=stack_cameras([view.cameras[shown]]).to(torch.float32),
-        depth=view.depth[None, shown][:, :: settings.track_stride].float(),
+        depth=view.depth[None, shown][:, :: settings.keyframe_stride].float(),
         target_rgb=_pictures(clip, targets, "rgb")[None],
         target_depth=_pictures(clip, targets, "depth").float()[None],
         target_cameras=stack_cameras([_target_cameras(clip, targets)]).to(torch.float32),
@@ -68,7 +68,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         track_offset=tracks.offset[None],
         track_valid=tracks.valid[None],
         motion=cell_means(motion)[None],
-        field=continued(motion, moving)[None],
+        field=extend_to_all_cells(motion, moving)[None],
         moving=moving[None],
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
@@ -76,14 +76,14 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
 
 
 def _window(clip: Clip, settings: DataSettings, generator: torch.Generator) -> Clip:
-    if not settings.moments:
-        return cut(clip, settings.clip_frames, generator)
+    if not settings.keyframes_only:
+        return crop(clip, settings.clip_frames, generator)
     if clip.frames != settings.clip_frames:
         raise InputError(
-            f"clip {clip.note.identifier}: expected {settings.clip_frames} moments, got "
-            f"{clip.frames} frames; draw such clips or train with data.moments=false"
+            f"clip {clip.note.identifier}: expected {settings.clip_frames} keyframes, got "
+            f"{clip.frames} frames; draw such clips or train with data.keyframes_only=false"
         )
-    return held(clip, settings.moment_stride)
+    return repeat_keyframes(clip, settings.keyframe_spacing)
 
 
 def _require_views(clip: Clip, views: int) -> None:

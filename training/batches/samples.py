@@ -10,7 +10,7 @@ import torch
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.batches.sources import EndlessClips, open_source
-from diff4splat.training.recipe import StageRecipe
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
 
@@ -48,7 +48,7 @@ class ClipSamples:
         return collate(samples)
 
     def _name(self, number: int) -> str:
-        """For the log: losses are told apart by source."""
+        """For the log: losses are logged per source."""
         source = self.recipe.data.sources[number]
         return f"{number} {source.folder or f'{source.kind} {source.split}'}"
 

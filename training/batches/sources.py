@@ -11,12 +11,12 @@ from typing import Protocol, runtime_checkable
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder, Selection
 from diff4splat.data.clip_part import ClipPart
-from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
-from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import FPS, WorldRecipe, make_world
 from diff4splat.errors import InputError
-from diff4splat.training.batches.places import Places, ShuffledPlaces, split_places
-from diff4splat.training.recipe import DataSettings, SourceSettings
+from diff4splat.training.batches.epoch_shuffle import Places, ShuffledIndices, split_by_motion
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
 
 
 @runtime_checkable
@@ -53,7 +53,7 @@ class FolderClips:
         self.folder = Path(settings.folder)
         self.views = views
         self.kept: dict[int, Clip] | None = {} if in_memory else None
-        self.order = ShuffledPlaces(settings.still_share, seed)
+        self.order = ShuffledIndices(settings.still_share, seed)
 
     @cached_property
     def clips(self) -> ClipFolder:
@@ -77,7 +77,7 @@ class FolderClips:
 
     @cached_property
     def _places(self) -> Places:
-        return split_places([entry.is_static for entry in self.clips.entries])
+        return split_by_motion([entry.is_static for entry in self.clips.entries])
 
 
 def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> EndlessClips:
@@ -115,7 +115,7 @@ def world_clips(settings: SourceSettings, data: DataSettings, seed: int) -> "Wor
         split=settings.split,
         still_share=settings.still_share,
         frames=data.clip_frames,
-        fps=FPS / data.moment_stride,
+        fps=FPS / data.keyframe_spacing,
         size_px=data.size_px,
         views=data.views,
     )

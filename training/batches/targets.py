@@ -12,10 +12,10 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.data.clip import Clip
-from diff4splat.training.recipe import DataSettings
+from diff4splat.training.recipe.data import DataSettings
 
 INPUT_VIEW = 0
-LEAST_MOTION = 0.02
+MIN_MOTION = 0.02
 """Way of a point, in units of which the plane stands at 4, that counts as motion."""
 
 
@@ -60,8 +60,8 @@ def draw_tracks(
     generator: torch.Generator,
 ) -> TrackTargets:
     """Points, each at one of the input frames in which the input view sees it."""
-    count, seen = settings.tracks, seen_cells(clip)
-    seen = seen[seen[:, 1] % (settings.input_stride * settings.track_stride) == 0]
+    count, seen = settings.tracks, visible_cells(clip)
+    seen = seen[seen[:, 1] % (settings.input_stride * settings.keyframe_stride) == 0]
     chosen = torch.randperm(len(seen), generator=generator)
     # One cell per point: the first of its frames in random order.
     point = seen[chosen, 0]
@@ -88,12 +88,12 @@ def _balanced(seen: Int[Tensor, "u 4"], clip: Clip, count: int) -> Int[Tensor, "
     if not len(seen):
         return seen
     positions = clip.tracks.positions[:, seen[:, 0]]
-    moves = (positions - positions[:1]).norm(dim=-1).amax(0) > LEAST_MOTION
+    moves = (positions - positions[:1]).norm(dim=-1).amax(0) > MIN_MOTION
     first = moves & (moves.cumsum(0) <= count // 2)
     return torch.cat([seen[first], seen[~first & ~moves], seen[~first & moves]])[:count]
 
 
-def seen_cells(clip: Clip) -> Int[Tensor, "s 4"]:
+def visible_cells(clip: Clip) -> Int[Tensor, "s 4"]:
     """(point, frame, row, column) wherever the input view sees a point on its own object."""
     view = clip.views[INPUT_VIEW]
     if clip.tracks is None or view.track_uv is None or view.track_visible is None:

@@ -1,7 +1,7 @@
-"""Clips to latents and drafts, once and for all; each clip also in a mirror.
+"""Clips to latents and render conditions, stored for training; each clip also mirrored.
 
     clip ─ input video ─┬─ vae ──────────────────────────── latent
-                        └─ first picture ─ draft ─ vae ──── draft
+                        └─ first image ─ render ─ vae ───── render condition
 
 Axes: ``f`` video frames, ``c t h w`` latents.
 """
@@ -14,25 +14,27 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.captions.mirror import mirrored_caption
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
-from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
 from diff4splat.errors import InputError
-from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.render_condition import render_condition_latent
-from diff4splat.geometry.camera import stack_cameras
+from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.hub.pretrained import Model
-from diff4splat.models.motion_unet.motion_field import pack_motion
+from diff4splat.models.hub.model import Model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.augment import mirrored
-from diff4splat.training.batches.motion_truth import motion_truth
+from diff4splat.training.batches.motion_targets import (
+    extend_to_all_cells,
+    moving_mask,
+    pixel_motion,
+)
+from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
-from diff4splat.training.batches.scale import normalized
-from diff4splat.training.batches.window import from_first_camera
-from diff4splat.training.latents.stored import LatentPack, has_pack, join_packs, write_pack
-from diff4splat.training.recipe import DataSettings
+from diff4splat.training.batches.temporal_crop import from_first_camera
+from diff4splat.training.latents.latent_shards import LatentPack, has_pack, join_packs, write_pack
+from diff4splat.training.latents.video_latents import FirstFrame, render_condition
+from diff4splat.training.recipe.data import DataSettings
 
 PACK = 128
 """Clips per file."""
@@ -99,7 +101,7 @@ def _input_clip(clip: Clip, data: DataSettings) -> Clip:
             f"{clip.frames}; leave the clip out"
         )
     clip = from_first_camera(resized(clip, data.size_px))
-    return normalized(clip, data.least_depth_share)
+    return normalized(clip, data.min_valid_depth)
 
 
 def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
@@ -107,20 +109,24 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
     view, frames = clip.views[0], slice(None, data.clip_frames, data.input_stride)
     rgb, cameras = unit_rgb(view.rgb[frames]), view.cameras[frames].to(torch.float32)
     latent = model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean
-    picture = InputImage(rgb=rgb[0], camera=cameras[0], focal_source="clip")
+    condition = render_condition(model, _first_frame(clip, data, rgb[0], cameras))
     return LatentPack(
         latent=latent,
-        draft=render_condition_latent(model, picture, cameras) if model.config.dit.draft else None,
-        motion=true_motion(model, clip, data),
+        render_latent=None if condition is None else condition.latent,
+        validity=None if condition is None else condition.validity,
         cameras=stack_cameras([cameras]),
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
-        model=model.weights_sha256,
+        model=model.weights_sha256(),
     )
 
 
-def true_motion(model: Model, clip: Clip, data: DataSettings) -> Float[Tensor, "1 m t h w"]:
-    """For a model that makes one; otherwise without channels."""
-    cells = motion_truth(clip, data.input_stride)[None]
-    packed = pack_motion(cells, model.config.vae.space_stride)
-    return packed[:, : model.config.motion_channels]
+def _first_frame(
+    clip: Clip, data: DataSettings, rgb: Float[Tensor, "h w 3"], cameras: Camera
+) -> FirstFrame:
+    """The first input frame with its true motion."""
+    motion = pixel_motion(clip, data.input_stride)
+    moving = moving_mask(motion)
+    return FirstFrame(
+        rgb=rgb, field=extend_to_all_cells(motion, moving), moving=moving, cameras=cameras
+    )

@@ -1,6 +1,6 @@
-"""What the video model learns from: latents of true videos and of their drafts.
+"""Training samples of the video model: latents of true videos and of their render conditions.
 
-Axes: ``b`` batch, ``c t h w`` latents, ``f`` video frames.
+Axes: ``b`` batch, ``c t h w`` latents, ``f hh ww`` video frames and pixels.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, join_cameras
+from diff4splat.models.video_dit.render_condition import RenderCondition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,10 +20,10 @@ class LatentBatch:
     sample_index: Int[Tensor, " b"]
     source: tuple[str, ...]
     latent: Float[Tensor, "b c t h w"]
-    draft: Float[Tensor, "b c t h w"] | None
-    """None for a model that sees no draft."""
-    motion: Float[Tensor, "b m t h w"]
-    """True motion (``video_motion``); no channels for a model that makes none."""
+    render_latent: Float[Tensor, "b c t h w"] | None
+    """Of the render condition; None for a model without."""
+    validity: Float[Tensor, "b 1 f hh ww"] | None
+    """1 where the first frame shows what a pixel sees; None without a render condition."""
     cameras: Camera
     """Batch shape (b, f); the first of each sample is the identity."""
     captions: tuple[str, ...]
@@ -30,27 +31,35 @@ class LatentBatch:
     def __len__(self) -> int:
         return len(self.sample_index)
 
+    @property
+    def render_condition(self) -> RenderCondition | None:
+        """As the video model takes it."""
+        if self.render_latent is None:
+            return None
+        return RenderCondition(latent=self.render_latent, validity=self.validity)
+
     def to(self, device: torch.device) -> "LatentBatch":
         """Move every tensor."""
+        render, validity = self.render_latent, self.validity
         return replace(
             self,
             sample_index=self.sample_index.to(device),
             latent=self.latent.to(device),
-            draft=None if self.draft is None else self.draft.to(device),
-            motion=self.motion.to(device),
+            render_latent=None if render is None else render.to(device),
+            validity=None if validity is None else validity.to(device),
             cameras=self.cameras.to(device),
         )
 
 
 def collate_latents(samples: list[LatentBatch]) -> LatentBatch:
     """Batches of one sample each, as one."""
-    drafts = [sample.draft for sample in samples if sample.draft is not None]
+    rendered = [sample for sample in samples if sample.render_latent is not None]
     return LatentBatch(
         sample_index=torch.cat([sample.sample_index for sample in samples]),
         source=tuple(name for sample in samples for name in sample.source),
         latent=torch.cat([sample.latent for sample in samples]),
-        draft=torch.cat(drafts) if drafts else None,
-        motion=torch.cat([sample.motion for sample in samples]),
+        render_latent=torch.cat([one.render_latent for one in rendered]) if rendered else None,
+        validity=torch.cat([one.validity for one in rendered]) if rendered else None,
         cameras=join_cameras([sample.cameras for sample in samples]),
         captions=tuple(text for sample in samples for text in sample.captions),
     )

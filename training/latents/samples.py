@@ -6,11 +6,12 @@ from pathlib import Path
 import torch
 
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.training.batches.places import Places, ShuffledPlaces, split_places
+from diff4splat.training.batches.epoch_shuffle import Places, ShuffledIndices, split_by_motion
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latents.latent_batch import LatentBatch, collate_latents
-from diff4splat.training.latents.stored import LatentPack, read_packs, require_alike
-from diff4splat.training.recipe import SourceSettings, StageRecipe
+from diff4splat.training.latents.latent_shards import LatentPack, read_packs, require_alike
+from diff4splat.training.recipe.data import SourceSettings
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
 
@@ -20,8 +21,8 @@ class _Source:
     def __init__(self, settings: SourceSettings, seed: int) -> None:
         self.name = settings.folder
         self.pack: LatentPack = read_packs(Path(settings.folder))
-        self.places = split_places(self.pack.is_static.tolist(), self.pack.versions)
-        self.order = ShuffledPlaces(settings.still_share, seed)
+        self.places = split_by_motion(self.pack.is_static.tolist(), self.pack.versions)
+        self.order = ShuffledIndices(settings.still_share, seed)
         _require_kinds(self.places, settings)
 
     def sample(self, index: int) -> LatentBatch:
@@ -31,8 +32,8 @@ class _Source:
             sample_index=torch.tensor([index]),
             source=(self.name,),
             latent=pack.latent[own],
-            draft=None if pack.draft is None else pack.draft[own],
-            motion=pack.motion[own],
+            render_latent=None if pack.render_latent is None else pack.render_latent[own],
+            validity=None if pack.validity is None else pack.validity[own],
             cameras=pack.cameras[own],
             captions=(pack.captions[place],),
         )

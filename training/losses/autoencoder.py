@@ -2,7 +2,7 @@
 
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid, ``*d`` everything else of a video.
 
-    divergence  = mean of ½ (μ² + σ² − 1 − ln σ²)           KL(N(μ, σ²) ‖ N(0, 1)) per dimension
+    kl          = mean of ½ (μ² + σ² − 1 − ln σ²)           KL(N(μ, σ²) ‖ N(0, 1)) per dimension
     charbonnier = mean of sqrt(d² + ε²) − ε,  ε = 1e-3      (Lai et al., arXiv 1704.03915, §3.3)
 
 Latent diffusion sums the divergence over dimensions (arXiv 2112.10752, appendix G); the mean makes
@@ -13,13 +13,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, widen
+from diff4splat.metrics.checks import promote, require_alike
 
 CHARBONNIER_WIDTH = 1e-3
 """Below this error the loss is quadratic."""
 
 
-def posterior_divergence(
+def kl_divergence(
     mean: Float[Tensor, "b c t h w"], log_variance: Float[Tensor, "b c t h w"]
 ) -> Float[Tensor, " b"]:
     """How far a diagonal Gaussian posterior is from the standard normal, mean over dimensions.
@@ -28,7 +28,7 @@ def posterior_divergence(
         ShapeError: the shapes differ.
     """
     require_alike("log_variance", log_variance, mean)
-    mean, log_variance = widen(mean, log_variance)
+    mean, log_variance = promote(mean, log_variance)
     # expm1 keeps the small difference of near-equal numbers around a variance of 1.
     divergence = 0.5 * (mean.square() + (log_variance.expm1() - log_variance))
     return divergence.flatten(1).mean(1)
@@ -43,7 +43,7 @@ def charbonnier(
         ShapeError: the shapes differ.
     """
     require_alike("video", video, reference)
-    video, reference = widen(video, reference)
+    video, reference = promote(video, reference)
     width = torch.full_like(video[:1], CHARBONNIER_WIDTH)
     error = torch.hypot(video - reference, width) - CHARBONNIER_WIDTH
     return error.flatten(1).mean(1)

@@ -15,8 +15,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.path import velocity as path_velocity
-from diff4splat.metrics.checks import require_alike, widen
-from diff4splat.metrics.masked import masked_mean
+from diff4splat.metrics.checks import promote, require_alike
 
 
 def flow_matching(
@@ -27,10 +26,12 @@ def flow_matching(
     first_frame_is_clean: bool = False,
     weights: Float[Tensor, " b"] | None = None,
     channels: Float[Tensor, " c"] | None = None,
+    cells: Float[Tensor, "b t h w"] | None = None,
 ) -> Float[Tensor, " b"]:
     """Mean squared error of a predicted velocity, times ``weights``.
 
-    ``channels`` says how much each latent channel counts; 1 on average keeps the scale.
+    ``channels`` weighs each latent channel; 1 on average keeps the scale. ``cells`` weighs each
+    latent cell: the mean is over weighted cells, 0 where all weights are 0.
 
     A video of nothing but the clean first frame gives 0.
 
@@ -38,12 +39,14 @@ def flow_matching(
         ShapeError: the shapes differ.
     """
     require_alike("velocity", velocity, clean)
-    velocity, clean, noise = widen(velocity, clean, noise)
+    velocity, clean, noise = promote(velocity, clean, noise)
     error = (velocity - path_velocity(clean, noise)).square()
     if channels is not None:
         error = error * channels.to(error)[:, None, None, None]
-    error = error[:, :, int(first_frame_is_clean) :].flatten(1)
-    loss = masked_mean(error, torch.ones_like(error, dtype=torch.bool))
+    first = int(first_frame_is_clean)
+    share = torch.ones_like(error) if cells is None else cells.to(error)[:, None].expand_as(error)
+    error, share = (part[:, :, first:].flatten(1) for part in (error, share))
+    loss = (error * share).sum(1) / share.sum(1).clamp_min(torch.finfo(error.dtype).tiny)
     if weights is None:
         return loss
     require_alike("weights", weights, loss)

@@ -2,7 +2,7 @@
 
 Axes: ``n`` pictures, ``h w`` pixels. With the difference R = log D̂ − log D and V its valid pixels
 
-    edges = Σ_k mean_V (|R_{x + 2^k} − R_x| + |R_{y + 2^k} − R_y|),   k = 0 … SCALES − 1
+    gradient = Σ_k mean_V (|R_{x + 2^k} − R_x| + |R_{y + 2^k} − R_y|),   k = 0 … SCALES − 1
 
 (the gradient term of MiDaS, arXiv 1907.01341, equation 11, at strides instead of resolutions): an
 edge of depth costs where it is, however far everything else is off.
@@ -19,7 +19,7 @@ LEAST_PIXELS = 16
 """A picture with fewer pixels of known depth has no scale of its own."""
 
 
-def own_scale(
+def rescale_median(
     depth: Float[Tensor, "n h w"], median: float
 ) -> tuple[Float[Tensor, "n h w"], Bool[Tensor, "n h w"]]:
     """Depth in units in which each picture's median is ``median``, and where it is known.
@@ -33,7 +33,7 @@ def own_scale(
     return torch.where(known, scaled, 1.0), known
 
 
-def edge_error(
+def gradient_error(
     difference: Float[Tensor, "n h w"], known: Bool[Tensor, "n h w"]
 ) -> Float[Tensor, " n"]:
     """Steps of ``difference`` between known pixels, over all scales."""
@@ -42,6 +42,17 @@ def edge_error(
         for axis in (-1, -2):
             total = total + _steps(difference, known, axis, 1 << scale)
     return total
+
+
+def inverse_depth_error(
+    log_depth: Float[Tensor, "n h w"],
+    truth: Float[Tensor, "n h w"],
+    known: Bool[Tensor, "n h w"],
+    unit: float,
+) -> Float[Tensor, " n"]:
+    """Mean |unit / depth − unit / truth| over known pixels."""
+    error = unit * (-log_depth).exp() - unit / truth
+    return masked_mean(error.abs().flatten(1), known.flatten(1))
 
 
 def _steps(difference: Tensor, known: Tensor, axis: int, stride: int) -> Float[Tensor, " n"]:

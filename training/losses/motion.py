@@ -9,17 +9,17 @@ displacements are from the time a point was found at to the queried time, in the
 to standstill, and the paper gives no reason for it: weight 0 switches it off. In a scene in which
 nothing moves the truth is zero, and both terms ask for the same.
 
-``width`` w rounds the distance off near 0, √(d² + w²) − w (ours). Most points stand still, and a
-plain distance pulls each of them to exactly zero as hard as it pulls others to where they go: a
-network that does not know yet which is which then stays at zero.
+``huber_delta`` w makes the distance quadratic near 0, √(d² + w²) − w (ours). Most points are
+static, and a plain distance pulls each of them to exactly zero as hard as it pulls moving points to
+their displacement: an untrained network, which cannot tell them apart, then stays at zero.
 """
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, masked_mean
+from diff4splat.metrics.checks import promote, require_alike, require_mask
+from diff4splat.metrics.masked import masked_mean, zero_masked
 
 
 def track_motion(
@@ -28,8 +28,8 @@ def track_motion(
     valid: Bool[Tensor, "b *k n"] | None = None,
     *,
     distance_weight: float = 2.0,
-    size_weight: float = 1.0,
-    width: float = 0.0,
+    l1_weight: float = 1.0,
+    huber_delta: float = 0.0,
 ) -> Float[Tensor, " b"]:
     """The motion loss over an element's valid points; 0 with zero gradient without any.
 
@@ -39,19 +39,19 @@ def track_motion(
     predicted, truth, valid = _known(predicted, truth, valid)
     # The norm's gradient is 0 where both agree exactly.
     apart = torch.linalg.vector_norm(predicted - truth, dim=-1)
-    if width:
-        apart = torch.hypot(apart, torch.full_like(apart, width)) - width
+    if huber_delta:
+        apart = torch.hypot(apart, torch.full_like(apart, huber_delta)) - huber_delta
     loss = distance_weight * apart
-    if size_weight:
-        loss = loss + size_weight * predicted.abs().sum(-1)
+    if l1_weight:
+        loss = loss + l1_weight * predicted.abs().sum(-1)
     return masked_mean(loss.flatten(1), valid.flatten(1))
 
 
 def _known(predicted: Tensor, truth: Tensor, valid: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
     require_alike("predicted", predicted, truth)
-    predicted, truth = widen(predicted, truth)
+    predicted, truth = promote(predicted, truth)
     if valid is None:
         valid = torch.ones_like(truth[..., 0], dtype=torch.bool)
     require_mask(valid, truth.shape[:-1])
     keep = valid[..., None]
-    return hidden_as_zero(predicted, keep), hidden_as_zero(truth, keep), valid
+    return zero_masked(predicted, keep), zero_masked(truth, keep), valid

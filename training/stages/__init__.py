@@ -1,1 +1,1 @@
-"""The stages of a training: which networks run, on what, and what is minimised."""
+"""Training stages: which networks run, on which input, and what is minimised."""

@@ -1,38 +1,32 @@
-"""Which stage a recipe means."""
+"""The stage of each kind."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
 from diff4splat.models.factory import Networks
-from diff4splat.training.recipe import StageKind
-from diff4splat.training.stages.autoencoder import AutoencoderStage
-from diff4splat.training.stages.branch import MotionDiffusionStage
-from diff4splat.training.stages.depth import DepthStage
-from diff4splat.training.stages.generated import ImageTo4dFinetuneStage
-from diff4splat.training.stages.generator import VideoDiffusionStage
-from diff4splat.training.stages.joint import JointStage
+from diff4splat.training.recipe.kinds import StageKind
+from diff4splat.training.stages.kinds.dynamic import DynamicStage
+from diff4splat.training.stages.kinds.joint import JointStage
+from diff4splat.training.stages.kinds.monocular_depth import MonocularDepthStage
+from diff4splat.training.stages.kinds.motion import MotionStage
+from diff4splat.training.stages.kinds.motion_diffusion import MotionDiffusionStage
+from diff4splat.training.stages.kinds.posed_video_pretrain import PosedVideoPretrainStage
+from diff4splat.training.stages.kinds.static import StaticStage
+from diff4splat.training.stages.kinds.vae import AutoencoderStage
+from diff4splat.training.stages.kinds.video_diffusion import VideoDiffusionStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
-from diff4splat.training.stages.reconstruction import (
-    DynamicStage,
-    MotionStage,
-    SightStage,
-    StaticStage,
-)
-from diff4splat.training.stages.told import ImageTo4dStage
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
     {
         "vae": AutoencoderStage,
-        "sight": SightStage,
+        "posed_video_pretrain": PosedVideoPretrainStage,
         "static": StaticStage,
         "motion": MotionStage,
-        "depth": DepthStage,
-        "told": ImageTo4dStage,
-        "branch": MotionDiffusionStage,
         "dynamic": DynamicStage,
-        "generator": VideoDiffusionStage,
+        "monocular_depth": MonocularDepthStage,
+        "motion_diffusion": MotionDiffusionStage,
+        "video_diffusion": VideoDiffusionStage,
         "joint": JointStage,
-        "generated": ImageTo4dFinetuneStage,
     }
 )
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.atomic import write_text
-from diff4splat.training.recipe import Gate, StageRecipe
-from diff4splat.training.trainer.run_files import RESULT_FILE, finite
+from diff4splat.training.recipe.stage import Gate, StageRecipe
+from diff4splat.training.trainer.logs.run_files import RESULT_FILE, finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""How a call of ``run_stage`` is carried out, and what it returns."""
+"""How a call of ``fit_stage`` is carried out, and what it returns."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Literal
 
 from diff4splat.errors import ConfigError
 from diff4splat.progress.phases import Phases
-from diff4splat.training.recipe import TrainerSettings
+from diff4splat.training.recipe.trainer import TrainerSettings
 
 Outcome = Literal["finished", "signalled", "step_limit", "time_limit"]
 """Why training returned; all but ``finished`` go on with the next call."""
@@ -30,6 +30,8 @@ class RunSettings:
     seed: int
     fingerprint: str
     """Hash of everything that decides what is learnt; a checkpoint with another is refused."""
+    earlier_fingerprint: str | None = None
+    """The fingerprint that an earlier release gave the same stage; accepted too."""
     trainer: TrainerSettings = field(default_factory=TrainerSettings)
     start_from: Path | None = None
     """Folder of the finished stage before this one: its weights and averages are taken over."""

@@ -2,7 +2,7 @@
 
 For every 16×16 tile: the Gaussians whose 3-sigma box touches it, nearest first, a dense
 (pixels × Gaussians) matrix of alphas, a cumulative product, autograd for the way back. Footprints
-as in docs/rendering.md.
+as in docs/reference/rendering.md.
 """
 
 from dataclasses import dataclass

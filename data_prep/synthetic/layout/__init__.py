@@ -1,1 +1,1 @@
-"""Where things stand: scene kinds, backdrops, and the space that motions and cameras need."""
+"""Layout of a scene: kinds, backdrops, props and the free space for motions and cameras."""

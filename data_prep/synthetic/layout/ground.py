@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.draws import Draws
-from diff4splat.data_prep.synthetic.layout.plan import Placed
-from diff4splat.data_prep.synthetic.motions.act import resting
+from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
+from diff4splat.data_prep.synthetic.motions.context import rest_positions
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.shape import one
 from diff4splat.data_prep.synthetic.shapes.surface import Surface, grid_triangles, surface
 from diff4splat.data_prep.synthetic.shapes.sweep import plane_waves
@@ -26,7 +26,7 @@ class Terrain:
     flat_m: float
     far_m: float
     hills_m: float
-    draws: Draws
+    rng: Rng
 
     def height(
         self, x: Float64[np.ndarray, "*b"], z: Float64[np.ndarray, "*b"]
@@ -36,15 +36,15 @@ class Terrain:
             return np.zeros_like(x)
         distance = np.hypot(x, z)
         points = np.stack([x, 0 * x, z], -1)
-        near = plane_waves(points, self.draws.child("near"), 0.25 / self.flat_m, 2)
-        far = plane_waves(points, self.draws.child("far"), 0.5 / self.far_m, 3)
+        near = plane_waves(points, self.rng.child("near"), 0.25 / self.flat_m, 2)
+        far = plane_waves(points, self.rng.child("far"), 0.5 / self.far_m, 3)
         rise = np.clip((distance - self.flat_m) / (2.0 * self.flat_m), 0.0, 1.0) ** 2
         hill = np.clip((distance - 3.0 * self.flat_m) / (0.7 * self.far_m), 0.0, 1.0) ** 1.5
         return 0.05 * self.flat_m * rise * (near + 0.4) + self.hills_m * hill * (0.75 + 0.55 * far)
 
 
-def ground(terrain: Terrain, role: str) -> Placed:
-    """The disc itself."""
+def ground(terrain: Terrain, role: str) -> PlacedObject:
+    """The ground mesh."""
     inner = 0.2 * terrain.flat_m
     radius = inner * (terrain.far_m / inner) ** np.linspace(0.0, 1.0, _RINGS)
     angle = np.arange(_SECTORS) * (2 * np.pi / _SECTORS)
@@ -52,7 +52,7 @@ def ground(terrain: Terrain, role: str) -> Placed:
     z = (radius[:, None] * np.sin(angle)).ravel()
     disc = _disc(x, z, terrain)
     shape = one(role, disc)
-    return Placed(family="ground", shape=shape, parts=resting(shape))
+    return PlacedObject(family="ground", shape=shape, parts=rest_positions(shape))
 
 
 def _disc(x: Float64[np.ndarray, " n"], z: Float64[np.ndarray, " n"], terrain: Terrain) -> Surface:

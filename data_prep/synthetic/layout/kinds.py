@@ -11,15 +11,13 @@ from dataclasses import dataclass
 class SceneKind:
     """One kind of place."""
 
-    phrase: str
-    """How captions name it."""
-    stage_m: tuple[float, float]
+    area_radius_m: tuple[float, float]
     tilt_deg: tuple[float, float]
-    """How far the camera looks down."""
+    """Tilt of the camera."""
     ground: str
-    """Role of what things stand on."""
+    """Material role of the ground."""
     tags: frozenset[str]
-    """Which families stand around: see ``Family.places``."""
+    """Tags of the static families: see ``Family.places``."""
     props: tuple[int, int]
     far: frozenset[str] = frozenset()
     far_count: tuple[int, int] = (0, 0)
@@ -27,15 +25,14 @@ class SceneKind:
     is_under_water: bool = False
     hills_m: tuple[float, float] = (0.0, 0.0)
     weight: float = 1.0
-    """How often it comes, beside the others."""
+    """Relative frequency."""
 
 
 SCENE_KINDS: dict[str, SceneKind] = {
     "room": SceneKind(
         weight=2.0,
-        phrase="in a room",
         tags=frozenset(["room"]),
-        stage_m=(0.7, 1.3),
+        area_radius_m=(0.7, 1.3),
         tilt_deg=(6.0, 28.0),
         ground="floor",
         props=(4, 7),
@@ -43,9 +40,8 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "tabletop": SceneKind(
         weight=1.5,
-        phrase="on a table",
         tags=frozenset(["table"]),
-        stage_m=(0.16, 0.34),
+        area_radius_m=(0.16, 0.34),
         tilt_deg=(10.0, 34.0),
         ground="wood",
         props=(4, 8),
@@ -53,10 +49,9 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "meadow": SceneKind(
         weight=1.5,
-        phrase="in a meadow",
         tags=frozenset(["ground"]),
         far=frozenset(["tree", "conifer", "house", "windmill", "bush"]),
-        stage_m=(1.2, 3.6),
+        area_radius_m=(1.2, 3.6),
         tilt_deg=(2.0, 20.0),
         ground="lawn",
         props=(7, 14),
@@ -65,10 +60,9 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "garden": SceneKind(
         weight=1.5,
-        phrase="in a garden",
         tags=frozenset(["ground"]),
         far=frozenset(["tree", "house", "bush", "fence"]),
-        stage_m=(0.8, 2.2),
+        area_radius_m=(0.8, 2.2),
         tilt_deg=(4.0, 24.0),
         ground="lawn",
         props=(8, 14),
@@ -77,10 +71,9 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "dunes": SceneKind(
         weight=0.7,
-        phrase="on sand",
         tags=frozenset(["sand"]),
         far=frozenset(["conifer", "tower", "bush"]),
-        stage_m=(1.0, 3.4),
+        area_radius_m=(1.0, 3.4),
         tilt_deg=(2.0, 20.0),
         ground="sand",
         props=(5, 10),
@@ -89,10 +82,9 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "street": SceneKind(
         weight=1.5,
-        phrase="in a street",
         tags=frozenset(["street"]),
         far=frozenset(["house", "flats", "tree", "tower"]),
-        stage_m=(1.4, 3.6),
+        area_radius_m=(1.4, 3.6),
         tilt_deg=(3.0, 20.0),
         ground="asphalt",
         props=(4, 8),
@@ -101,18 +93,16 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "courtyard": SceneKind(
         weight=1.5,
-        phrase="in a courtyard",
         tags=frozenset(["street", "ground"]),
-        stage_m=(1.1, 2.6),
+        area_radius_m=(1.1, 2.6),
         tilt_deg=(4.0, 26.0),
         ground="paving",
         props=(5, 9),
     ),
     "seabed": SceneKind(
         weight=0.6,
-        phrase="under water",
         tags=frozenset(["sea"]),
-        stage_m=(0.7, 1.8),
+        area_radius_m=(0.7, 1.8),
         tilt_deg=(2.0, 18.0),
         ground="sand",
         props=(9, 15),

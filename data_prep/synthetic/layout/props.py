@@ -1,23 +1,23 @@
-"""Choosing things that suit a place, at natural sizes, and standing them where there is room."""
+"""Static props: families that suit a scene, at natural sizes, at free positions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
-from diff4splat.data_prep.synthetic.layout.plan import Placed, Plan
-from diff4splat.data_prep.synthetic.motions.act import Posed, resting
+from diff4splat.data_prep.synthetic.layout.floor_plan import FloorPlan, PlacedObject
+from diff4splat.data_prep.synthetic.motions.context import PartPositions, rest_positions
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
 from diff4splat.data_prep.synthetic.shapes.surface import about_y
 
 
-def natural_shape(
-    family: str, wanted_m: float, draws: Draws, limits_m: tuple[float, float] = (0.0, 100.0)
+def shape_of_size(
+    family: str, wanted_m: float, rng: Rng, limits_m: tuple[float, float] = (0.0, 100.0)
 ) -> Shape | None:
     """A shape whose largest extent is near ``wanted_m``; None when no natural size comes near."""
-    shape = FAMILIES[family].make(draws)
+    shape = FAMILIES[family].make(rng)
     extent = float(np.max(shape.bounds[1] - shape.bounds[0])) / shape.height
     wanted = wanted_m / extent
     ranges = [(max(a, limits_m[0]), min(b, limits_m[1])) for a, b in FAMILIES[family].heights_m]
@@ -30,102 +30,106 @@ def natural_shape(
     return shape.of_height(height)
 
 
-def standing(
+def place_static(
     family: str, shape: Shape, x: float, z: float, *, yaw: float, y: float = 0.0
-) -> Placed:
-    """A thing at rest at its place, turned by ``yaw``."""
+) -> PlacedObject:
+    """A static object at a position, rotated by ``yaw``."""
     turn = about_y(yaw).T
     at = np.array([x, y, z])
-    parts: Posed = tuple(part @ turn + at for part in resting(shape))
-    return Placed(family=family, shape=shape, parts=parts, size_m=shape.height)
+    parts: PartPositions = tuple(part @ turn + at for part in rest_positions(shape))
+    return PlacedObject(family=family, shape=shape, parts=parts, size_m=shape.height)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Site:
-    """Where props may go."""
+class PropArea:
+    """The area and the families of props."""
 
-    plan: Plan
-    stage_m: float
+    plan: FloorPlan
+    area_radius_m: float
     holds: Callable[[float, float, float], bool]
     families: tuple[str, ...]
     view_yaw: float = 0.0
 
 
-def scatter(site: Site, count: int, draws: Draws, budget: int) -> list[Placed]:
-    """Up to ``count`` things around the stage within a budget of triangles."""
-    found: list[Placed] = []
+def scatter(area: PropArea, count: int, rng: Rng, budget: int) -> list[PlacedObject]:
+    """Up to ``count`` props around the centre, within a budget of triangles."""
+    placed_objects: list[PlacedObject] = []
     for number in range(3 * count):
-        if len(found) >= count:
+        if len(placed_objects) >= count:
             break
-        mine = draws.child("prop", number)
-        placed = _try_prop(site, mine)
+        child = rng.child("prop", number)
+        placed = _try_prop(area, child)
         if placed is not None and placed.shape.triangles <= budget:
             budget -= placed.shape.triangles
-            found.append(placed)
-    return found
+            placed_objects.append(placed)
+    return placed_objects
 
 
-def _try_prop(site: Site, draws: Draws) -> Placed | None:
-    family = draws.pick(site.families)
-    size = site.stage_m * draws.between(0.22, 0.6) * draws.pick((0.6, 1.0, 1.0, 1.7))
-    shape = natural_shape(family, size, draws)
+def _try_prop(area: PropArea, rng: Rng) -> PlacedObject | None:
+    family = rng.choice(area.families)
+    size = area.area_radius_m * rng.uniform(0.22, 0.6) * rng.choice((0.6, 1.0, 1.0, 1.7))
+    shape = shape_of_size(family, size, rng)
     if shape is None:
         return None
     radius = 0.94 * shape.radius
     for _ in range(10):
-        angle = draws.between(0.0, 2 * np.pi)
-        out = site.stage_m * draws.between(0.25, 2.3)
+        angle = rng.uniform(0.0, 2 * np.pi)
+        out = area.area_radius_m * rng.uniform(0.25, 2.3)
         x, z = float(out * np.cos(angle)), float(out * np.sin(angle))
-        if not (site.holds(x, z, radius) and site.plan.is_free(x, z, radius)):
+        if not (area.holds(x, z, radius) and area.plan.is_free(x, z, radius)):
             continue
-        if site.plan.is_clear(x, z, radius, shape.height):
-            site.plan.take(x, z, radius)
-            return standing(family, shape, x, z, yaw=draws.between(0.0, 2 * np.pi))
+        if area.plan.is_clear(x, z, radius, shape.height):
+            area.plan.take(x, z, radius)
+            return place_static(family, shape, x, z, yaw=rng.uniform(0.0, 2 * np.pi))
     return None
 
 
-def against_walls(site: Site, walls, draws: Draws, count: int) -> list[Placed]:
+def against_walls(area: PropArea, walls, rng: Rng, count: int) -> list[PlacedObject]:
     """Bookcases, sofas and the like with their backs to the back wall."""
-    found = []
+    placed_objects = []
     for number in range(count):
-        mine = draws.child("wall", number)
-        family = mine.pick(site.families)
-        shape = natural_shape(family, mine.between(1.2, 2.0), mine)
+        child = rng.child("wall", number)
+        family = child.choice(area.families)
+        shape = shape_of_size(family, child.uniform(1.2, 2.0), child)
         if shape is None:
             continue
         depth = float(shape.bounds[1][0] - shape.bounds[0][0]) / 2
         half = float(shape.bounds[1][2] - shape.bounds[0][2]) / 2
         own = np.array(
-            [mine.between(-walls.left + half, walls.right - half), 0.0, walls.back - depth - 0.03]
+            [child.uniform(-walls.left + half, walls.right - half), 0.0, walls.back - depth - 0.03]
         )
         x, _, z = (walls.to_world(own)).tolist()
-        if site.plan.is_free(x, z, half) and site.plan.is_clear(x, z, half, shape.height):
-            site.plan.take(x, z, half)
-            found.append(standing(family, shape, x, z, yaw=walls.yaw + np.pi / 2, y=walls.floor_y))
-    return found
+        if area.plan.is_free(x, z, half) and area.plan.is_clear(x, z, half, shape.height):
+            area.plan.take(x, z, half)
+            placed_objects.append(
+                place_static(family, shape, x, z, yaw=walls.yaw + np.pi / 2, y=walls.floor_y)
+            )
+    return placed_objects
 
 
-def far_things(site: Site, count: int, draws: Draws, budget: int, height_at) -> list[Placed]:
-    """Trees and houses behind the stage, upright on the terrain; their fronts face the stage."""
-    found: list[Placed] = []
+def far_objects(area: PropArea, count: int, rng: Rng, budget: int, height_at) -> list[PlacedObject]:
+    """Distant trees and houses, upright on the terrain, with their fronts towards the centre."""
+    placed_objects: list[PlacedObject] = []
     for number in range(3 * count):
-        if len(found) >= count:
+        if len(placed_objects) >= count:
             break
-        mine = draws.child("far", number)
-        family = mine.pick(site.families)
+        child = rng.child("far", number)
+        family = child.choice(area.families)
         low, high = FAMILIES[family].heights_m[0]
-        shape = FAMILIES[family].make(mine).of_height(mine.between(low, high))
-        angle = site.view_yaw + mine.between(-0.95, 0.95)
-        out = site.stage_m * 2.4 + shape.radius + mine.between(0.0, 1.0) ** 1.6 * 22.0
+        shape = FAMILIES[family].make(child).of_height(child.uniform(low, high))
+        angle = area.view_yaw + child.uniform(-0.95, 0.95)
+        out = area.area_radius_m * 2.4 + shape.radius + child.uniform(0.0, 1.0) ** 1.6 * 22.0
         x, z = float(out * np.sin(angle)), float(out * np.cos(angle))
-        if shape.triangles > budget or not site.plan.is_free(x, z, 0.8 * shape.radius):
+        if shape.triangles > budget or not area.plan.is_free(x, z, 0.8 * shape.radius):
             continue
-        if not site.plan.is_clear(x, z, shape.radius, shape.height):
+        if not area.plan.is_clear(x, z, shape.radius, shape.height):
             continue
-        site.plan.take(x, z, 0.8 * shape.radius)
+        area.plan.take(x, z, 0.8 * shape.radius)
         budget -= shape.triangles
         sunk = -height_at(x, z, 0.6 * shape.radius)
-        found.append(
-            standing(family, shape, x, z, yaw=np.pi / 2 + angle + mine.between(-0.5, 0.5), y=sunk)
+        placed_objects.append(
+            place_static(
+                family, shape, x, z, yaw=np.pi / 2 + angle + child.uniform(-0.5, 0.5), y=sunk
+            )
         )
-    return found
+    return placed_objects

@@ -1,28 +1,28 @@
-"""All motions: who can do them, and whether they lead somewhere."""
+"""All motions, the families that can perform them, and whether they travel."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 from diff4splat.data_prep.synthetic.motions import articulated, rigid, soft
-from diff4splat.data_prep.synthetic.motions.act import Act, Performance
+from diff4splat.data_prep.synthetic.motions.context import MotionContext, MotionResult
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES, Family
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """One way to move."""
+    """One kind of motion."""
 
-    perform: Callable[[Act], Performance]
+    perform: Callable[[MotionContext], MotionResult]
     ability: str
-    """What a family must be able to do."""
+    """Ability that a family needs."""
     travels: bool
-    """Goes along a heading; captions then say where to."""
+    """Whether it travels along a heading, which captions then mention."""
     heights_m: tuple[float, float] = (0.0, 100.0)
-    """Sizes at which it looks right: small things bounce too fast to be seen."""
+    """Plausible heights; small objects bounce too fast to be visible."""
 
     def suits(self, family: Family) -> bool:
-        """Whether the family can do it at some natural size."""
+        """Whether the family can perform it at a natural size."""
         low, high = self.heights_m
         return self.ability in family.abilities and any(
             a <= high and b >= low for a, b in family.heights_m
@@ -30,7 +30,7 @@ class Motion:
 
 
 def _motion(
-    perform: Callable[[Act], Performance],
+    perform: Callable[[MotionContext], MotionResult],
     ability: str,
     *,
     travels: bool = False,
@@ -71,5 +71,5 @@ MOTIONS: dict[str, Motion] = {
 
 @cache
 def families_for(motion: str) -> tuple[str, ...]:
-    """Names of the families that can do it."""
+    """Names of the families that can perform it."""
     return tuple(name for name, family in FAMILIES.items() if MOTIONS[motion].suits(family))

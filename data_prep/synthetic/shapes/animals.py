@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.facets import box, extruded
 from diff4splat.data_prep.synthetic.shapes.revolve import ball, rod
 from diff4splat.data_prep.synthetic.shapes.shape import Joint, Part, Shape
@@ -10,10 +10,10 @@ from diff4splat.data_prep.synthetic.shapes.surface import Surface, about_x, merg
 from diff4splat.data_prep.synthetic.shapes.sweep import tube
 
 
-def make_quadruped(draws: Draws) -> Shape:
+def make_quadruped(rng: Rng) -> Shape:
     """A four-legged animal that looks to +x, between a dog and a foal."""
-    leg, long = draws.between(0.38, 0.56), draws.between(0.42, 0.55)
-    fat, neck = draws.between(0.13, 0.19), draws.between(0.12, 0.3)
+    leg, long = rng.uniform(0.38, 0.56), rng.uniform(0.42, 0.55)
+    fat, neck = rng.uniform(0.13, 0.19), rng.uniform(0.12, 0.3)
     back = -leg - fat * 0.8
     s = np.array([-1.12, -1.0, -0.6, 0.0, 0.6, 1.0, 1.15])
     thick = fat * np.array([0.25, 0.8, 1.0, 0.88, 1.02, 0.85, 0.3])
@@ -96,9 +96,9 @@ def _leg(x: float, z: float, leg: float, fat: float) -> Surface:
     return tube(path, np.array([0.5, 0.5, 0.27, 0.21, 0.25]) * fat, 8)
 
 
-def make_bird(draws: Draws) -> Shape:
+def make_bird(rng: Rng) -> Shape:
     """A bird in flight with two-part wings along z; it looks to +x."""
-    fat, span = draws.between(0.13, 0.18), draws.between(0.62, 0.9)
+    fat, span = rng.uniform(0.13, 0.18), rng.uniform(0.62, 0.9)
     s = np.array([-0.52, -0.4, -0.15, 0.12, 0.3, 0.42, 0.5, 0.56])
     thick = fat * np.array([0.15, 0.45, 0.9, 1.0, 0.75, 0.68, 0.55, 0.1])
     lift = np.array([0.0, 0.0, 0.0, 0.0, -0.04, -0.08, -0.09, -0.08])
@@ -142,9 +142,9 @@ def _slab(outline: list[tuple[float, float]], y: float, thick: float = 0.022) ->
     return upright.turned(about_x(np.pi / 2)).at(y=y)
 
 
-def make_fish(draws: Draws) -> Shape:
+def make_fish(rng: Rng) -> Shape:
     """A fish that looks to +x and stays above the ground."""
-    high, flat = draws.between(0.2, 0.32), draws.between(0.45, 0.65)
+    high, flat = rng.uniform(0.2, 0.32), rng.uniform(0.45, 0.65)
     s = np.linspace(-0.75, 0.6, 12)
     u = (s + 0.75) / 1.35
     thick = high * np.clip(1.9 * np.sin(np.pi * u**1.15) ** 0.8 * 0.52 + 0.07, 0.05, 1)
@@ -181,10 +181,10 @@ def make_fish(draws: Draws) -> Shape:
     return Shape(parts=parts)
 
 
-def make_car(draws: Draws) -> Shape:
+def make_car(rng: Rng) -> Shape:
     """A small car that drives to +x; wheels turn about z."""
-    long, wide, radius = draws.between(2.1, 2.6), draws.between(1.05, 1.2), draws.between(0.2, 0.25)
-    front = draws.between(0.25, 0.4)
+    long, wide, radius = rng.uniform(2.1, 2.6), rng.uniform(1.05, 1.2), rng.uniform(0.2, 0.25)
+    front = rng.uniform(0.25, 0.4)
     low = radius * 0.75
     half = long / 2
     profile = [

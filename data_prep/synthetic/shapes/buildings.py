@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.facets import box, boxes, extruded, faceted
 from diff4splat.data_prep.synthetic.shapes.revolve import revolved
 from diff4splat.data_prep.synthetic.shapes.shape import Joint, Part, Shape, one, several
@@ -30,14 +30,14 @@ def _gable(depth: float, width: float, rise: float, over: float) -> Surface:
     return faceted(points, [*around, *ends])
 
 
-def _openings(draws: Draws, size: tuple[float, float, float], floors: int):
+def _openings(rng: Rng, size: tuple[float, float, float], floors: int):
     """Window frames, panes and a door on the front (+x) and both sides."""
     depth, height, width = size
     frames, panes = [], []
     count = max(2, round(width / 0.42))
     tall = 0.42 * height / floors
     wide = 0.62 * tall
-    door = draws.integer(0, count - 1)
+    door = rng.integer(0, count - 1)
     for floor in range(floors):
         sill = -height * (floor + 0.34) / floors
         for k in range(count):
@@ -54,11 +54,11 @@ def _openings(draws: Draws, size: tuple[float, float, float], floors: int):
     return boxes(frames, 0.006), boxes(panes, 0.004)
 
 
-def make_house(draws: Draws) -> Shape:
+def make_house(rng: Rng) -> Shape:
     """A house with a gable roof, windows, a door and a chimney; its front is +x."""
-    depth, width, rise = draws.between(0.7, 1.0), draws.between(0.9, 1.6), draws.between(0.3, 0.45)
-    floors = draws.integer(1, 2)
-    frames, panes = _openings(draws, (depth, 0.64, width), floors)
+    depth, width, rise = rng.uniform(0.7, 1.0), rng.uniform(0.9, 1.6), rng.uniform(0.3, 0.45)
+    floors = rng.integer(1, 2)
+    frames, panes = _openings(rng, (depth, 0.64, width), floors)
     triangle = np.array([(-depth / 2, 0.0), (depth / 2, 0.0), (0.0, rise)])
     attic = extruded(triangle, width, 0.002).at(y=-0.63)
     chimney = box((0.1, 0.3, 0.1), 0.01).at(-0.2 * depth, -0.64 - 0.45 * rise, 0.25 * width)
@@ -67,9 +67,9 @@ def make_house(draws: Draws) -> Shape:
     return several(facade=walls, roof=roof, plaster=frames, pane=panes, brick=chimney)
 
 
-def make_tower(draws: Draws) -> Shape:
+def make_tower(rng: Rng) -> Shape:
     """A round tower with a pointed roof and slits."""
-    radius = draws.between(0.13, 0.19)
+    radius = rng.uniform(0.13, 0.19)
     wall = [(1.12 * radius, 0.72), (1.12 * radius, 0.66), (radius, 0.62), (radius, 0.0)]
     body = revolved(
         [[(0.0, 0.72), wall[0]], wall[:2], wall[1:3], wall[2:], [wall[-1], (0.0, 0.0)]], 26
@@ -84,31 +84,31 @@ def make_tower(draws: Draws) -> Shape:
     return several(block=body, roof=hat, pane=merged(*slits))
 
 
-def make_block_of_flats(draws: Draws) -> Shape:
+def make_block_of_flats(rng: Rng) -> Shape:
     """A tall plain building with rows of windows."""
-    depth, width, floors = draws.between(0.5, 0.8), draws.between(0.5, 1.0), draws.integer(3, 5)
-    frames, panes = _openings(draws, (depth, 0.96, width), floors)
+    depth, width, floors = rng.uniform(0.5, 0.8), rng.uniform(0.5, 1.0), rng.integer(3, 5)
+    frames, panes = _openings(rng, (depth, 0.96, width), floors)
     edge = boxes([((depth + 0.06, 0.05, width + 0.06), (0.0, -0.95, 0.0))], 0.01)
     return several(
         facade=box((depth, 0.97, width), 0.006), pane=panes, plaster=merged(frames, edge)
     )
 
 
-def make_fence(draws: Draws) -> Shape:
+def make_fence(rng: Rng) -> Shape:
     """A run of pickets along z."""
-    count, gap = draws.integer(9, 13), draws.between(0.19, 0.26)
+    count, gap = rng.integer(9, 13), rng.uniform(0.19, 0.26)
     long = gap * count
     pickets = [
-        ((0.035, draws.between(0.92, 1.0), 0.62 * gap), (0.0, 0.0, gap * (k + 0.5) - long / 2))
+        ((0.035, rng.uniform(0.92, 1.0), 0.62 * gap), (0.0, 0.0, gap * (k + 0.5) - long / 2))
         for k in range(count)
     ]
     rails = [((0.05, 0.09, long), (-0.045, -h, 0.0)) for h in (0.2, 0.68)]
     return one("fence", boxes([*pickets, *rails], 0.01))
 
 
-def make_arch(draws: Draws) -> Shape:
+def make_arch(rng: Rng) -> Shape:
     """An arch of stone; one walks through along x."""
-    inner, thick = draws.between(0.24, 0.34), draws.between(0.13, 0.2)
+    inner, thick = rng.uniform(0.24, 0.34), rng.uniform(0.13, 0.2)
     spring = 0.98 - inner - thick
     angle = np.linspace(0.0, np.pi, 13)
     outer = [
@@ -128,20 +128,20 @@ def make_arch(draws: Draws) -> Shape:
             *hollow[::-1],
         ]
     )
-    slab = extruded(outline, draws.between(0.2, 0.32), 0.012)
+    slab = extruded(outline, rng.uniform(0.2, 0.32), 0.012)
     return one("block", slab.turned(about_y(np.pi / 2)))
 
 
-def make_wall(draws: Draws) -> Shape:
+def make_wall(rng: Rng) -> Shape:
     """A low garden wall with a coping, along z."""
-    long = draws.between(2.5, 4.5)
+    long = rng.uniform(2.5, 4.5)
     body = box((0.3, 0.9, long), 0.01)
     return several(brick=body, block=box((0.4, 0.1, long + 0.08), 0.02).at(y=-0.9))
 
 
-def make_windmill(draws: Draws) -> Shape:
+def make_windmill(rng: Rng) -> Shape:
     """A windmill whose sails turn about x."""
-    del draws
+    del rng
     body = revolved(
         [[(0.0, 0.62), (0.1, 0.62)], [(0.1, 0.62), (0.16, 0.0)], [(0.16, 0.0), (0.0, 0.0)]], 24
     )

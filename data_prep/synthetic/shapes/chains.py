@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.facets import box
 from diff4splat.data_prep.synthetic.shapes.revolve import ball, rod
 from diff4splat.data_prep.synthetic.shapes.shape import Joint, Part, Shape, several
@@ -10,11 +10,11 @@ from diff4splat.data_prep.synthetic.shapes.surface import about_x, merged
 from diff4splat.data_prep.synthetic.shapes.sweep import tube
 
 
-def make_snake(draws: Draws) -> Shape:
+def make_snake(rng: Rng) -> Shape:
     """A snake stretched out along x with its head at the front."""
-    thick = draws.between(0.55, 0.8)
+    thick = rng.uniform(0.55, 0.8)
     s = np.linspace(0, 1, 40)
-    length = draws.between(7.0, 10.0)
+    length = rng.uniform(7.0, 10.0)
     radius = 0.5 * thick * np.clip(np.minimum(3.5 * s, 1.0), 0.06, 1)
     radius *= 1 - 0.35 * np.exp(-(((s - 0.88) / 0.04) ** 2))
     radius[-4:] *= [1.25, 1.2, 0.9, 0.35]
@@ -28,9 +28,9 @@ def make_snake(draws: Draws) -> Shape:
     return several(scales=tube(path, radius, 12), rubber=merged(*eyes))
 
 
-def make_caterpillar(draws: Draws) -> Shape:
+def make_caterpillar(rng: Rng) -> Shape:
     """A row of soft balls with a head and feelers."""
-    count, step = draws.integer(6, 8), 0.72
+    count, step = rng.integer(6, 8), 0.72
     rear = -0.5 * step * (count - 1)
     body = [
         ball(0.5 - 0.02 * abs(k - count / 2), 16).at(x=rear + step * k) for k in range(count - 1)
@@ -53,10 +53,10 @@ def make_caterpillar(draws: Draws) -> Shape:
     return several(skin=merged(*body), accent=merged(head), rubber=merged(*feelers, *feet))
 
 
-def make_robot_arm(draws: Draws) -> Shape:
+def make_robot_arm(rng: Rng) -> Shape:
     """A robot arm of two links with a gripper on a turning foot."""
-    first, second = draws.between(0.5, 0.6), draws.between(0.4, 0.5)
-    wide = draws.between(0.11, 0.15)
+    first, second = rng.uniform(0.5, 0.6), rng.uniform(0.4, 0.5)
+    wide = rng.uniform(0.11, 0.15)
     elbow = (0.0, -0.16 - first, 0.0)
     wrist = (second, elbow[1], 0.0)
     foot = merged(rod(0.26, 0.08, bevel=0.02, segments=22), rod(0.15, 0.16, segments=18))

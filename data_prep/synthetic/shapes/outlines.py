@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.facets import extruded
 from diff4splat.data_prep.synthetic.shapes.shape import Shape, one
 
@@ -60,25 +60,25 @@ def _star(points: int, inner: float) -> Float64[np.ndarray, "n 2"]:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
 
 
-def make_star(draws: Draws) -> Shape:
+def make_star(rng: Rng) -> Shape:
     """A star with 5 to 7 points."""
-    outline = _star(draws.integer(5, 7), draws.between(0.45, 0.6))
-    return one("toy", extruded(outline, draws.between(0.35, 0.6), 0.06))
+    outline = _star(rng.integer(5, 7), rng.uniform(0.45, 0.6))
+    return one("toy", extruded(outline, rng.uniform(0.35, 0.6), 0.06))
 
 
-def make_gear(draws: Draws) -> Shape:
+def make_gear(rng: Rng) -> Shape:
     """A gear wheel."""
-    teeth = draws.integer(8, 12)
+    teeth = rng.integer(8, 12)
     step = np.pi / teeth
     angle = np.concatenate(
         [(2 * k * step + np.array([-0.55, -0.35, 0.35, 0.55]) * step) for k in range(teeth)]
     )
     radius = np.tile([0.8, 1.0, 1.0, 0.8], teeth)
     outline = np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
-    return one("metal", extruded(outline, draws.between(0.3, 0.5), 0.04))
+    return one("metal", extruded(outline, rng.uniform(0.3, 0.5), 0.04))
 
 
-def make_heart(draws: Draws) -> Shape:
+def make_heart(rng: Rng) -> Shape:
     """A heart."""
     angle = np.linspace(0, 2 * np.pi, 28, endpoint=False)
     x = np.sin(angle) ** 3
@@ -86,10 +86,10 @@ def make_heart(draws: Draws) -> Shape:
         13 * np.cos(angle) - 5 * np.cos(2 * angle) - 2 * np.cos(3 * angle) - np.cos(4 * angle)
     ) / 16
     outline = np.stack([x, height], -1)[::-1]
-    return one("toy", extruded(np.ascontiguousarray(outline), draws.between(0.4, 0.7), 0.08))
+    return one("toy", extruded(np.ascontiguousarray(outline), rng.uniform(0.4, 0.7), 0.08))
 
 
-def make_letter(draws: Draws) -> Shape:
+def make_letter(rng: Rng) -> Shape:
     """A capital letter."""
-    outline = np.array(_LETTERS[draws.pick(sorted(_LETTERS))], np.float64)
-    return one("toy", extruded(outline, draws.between(0.2, 0.4), 0.03))
+    outline = np.array(_LETTERS[rng.choice(sorted(_LETTERS))], np.float64)
+    return one("toy", extruded(outline, rng.uniform(0.2, 0.4), 0.03))

@@ -7,7 +7,7 @@ give it its outline.
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.revolve import ball, revolved, smooth_profile
 from diff4splat.data_prep.synthetic.shapes.shape import Shape, one, several
 from diff4splat.data_prep.synthetic.shapes.surface import Surface, merged, surface
@@ -15,48 +15,48 @@ from diff4splat.data_prep.synthetic.shapes.sweep import leaves, lump, tube
 
 
 def _on_lumps(
-    centers: Float64[np.ndarray, "c 3"], radii: Float64[np.ndarray, " c"], count: int, draws: Draws
+    centers: Float64[np.ndarray, "c 3"], radii: Float64[np.ndarray, " c"], count: int, rng: Rng
 ) -> Float64[np.ndarray, "n 3"]:
-    which = (draws.unit(count) * len(centers)).astype(np.int64)
-    way = draws.normal(count, 3)
+    which = (rng.unit(count) * len(centers)).astype(np.int64)
+    way = rng.normal(count, 3)
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-    return centers[which] + way * (radii[which] * draws.array(0.85, 1.15, count))[:, None]
+    return centers[which] + way * (radii[which] * rng.uniform_array(0.85, 1.15, count))[:, None]
 
 
 def _crown(
-    centers: Float64[np.ndarray, "c 3"], radii: Float64[np.ndarray, " c"], count: int, draws: Draws
+    centers: Float64[np.ndarray, "c 3"], radii: Float64[np.ndarray, " c"], count: int, rng: Rng
 ) -> Surface:
     lumps = [
-        lump(draws, roughness=0.22, level=2, frequency=0.7).scaled(float(r)).at(*c.tolist())
+        lump(rng, roughness=0.22, level=2, frequency=0.7).scaled(float(r)).at(*c.tolist())
         for c, r in zip(centers, radii, strict=True)
     ]
-    points = _on_lumps(centers, radii, count, draws)
-    sizes = float(radii.mean()) * draws.array(0.28, 0.5, count)
-    return merged(*lumps, leaves(points, sizes, draws))
+    points = _on_lumps(centers, radii, count, rng)
+    sizes = float(radii.mean()) * rng.uniform_array(0.28, 0.5, count)
+    return merged(*lumps, leaves(points, sizes, rng))
 
 
-def make_tree(draws: Draws) -> Shape:
+def make_tree(rng: Rng) -> Shape:
     """A broad-leaved tree."""
-    fork, wide = draws.between(0.28, 0.42), draws.between(0.2, 0.32)
-    count = draws.integer(4, 7)
-    angle = np.arange(count) * (2 * np.pi / count) + draws.array(0.0, 1.2, count)
-    out = draws.array(0.35, 0.8, count) * wide
-    height = -draws.array(fork + 0.16, 0.86, count)
+    fork, wide = rng.uniform(0.28, 0.42), rng.uniform(0.2, 0.32)
+    count = rng.integer(4, 7)
+    angle = np.arange(count) * (2 * np.pi / count) + rng.uniform_array(0.0, 1.2, count)
+    out = rng.uniform_array(0.35, 0.8, count) * wide
+    height = -rng.uniform_array(fork + 0.16, 0.86, count)
     centers = np.stack([out * np.cos(angle), height, out * np.sin(angle)], -1)
-    radii = draws.array(0.13, 0.2, count) * (wide / 0.26)
-    bend = draws.array(-0.03, 0.03, 2)
+    radii = rng.uniform_array(0.13, 0.2, count) * (wide / 0.26)
+    bend = rng.uniform_array(-0.03, 0.03, 2)
     stem = np.array([[0, 0.02, 0], [bend[0], -0.5 * fork, bend[1]], [0, -fork, 0], [0, -0.75, 0]])
     wood = [tube(stem, np.array([0.05, 0.036, 0.03, 0.008]), 9)]
     for center in centers:
         path = np.stack([stem[2], 0.5 * (stem[2] + center) + [0, 0.03, 0], center])
         wood.append(tube(path, np.array([0.022, 0.014, 0.006]), 6))
-    return several(leaf=_crown(centers, radii, 420, draws), bark=merged(*wood))
+    return several(leaf=_crown(centers, radii, 420, rng), bark=merged(*wood))
 
 
-def make_conifer(draws: Draws) -> Shape:
+def make_conifer(rng: Rng) -> Shape:
     """A fir: tiers of drooping needles."""
-    tiers, wide = draws.integer(5, 7), draws.between(0.2, 0.3)
-    low = draws.between(0.08, 0.16)
+    tiers, wide = rng.integer(5, 7), rng.uniform(0.2, 0.3)
+    low = rng.uniform(0.08, 0.16)
     skirts = []
     for k in range(tiers):
         bottom = low + (0.86 - low) * k / tiers
@@ -79,19 +79,19 @@ def make_conifer(draws: Draws) -> Shape:
     return several(needle=merged(*skirts), bark=trunk)
 
 
-def make_bush(draws: Draws) -> Shape:
+def make_bush(rng: Rng) -> Shape:
     """A bush that touches the ground."""
-    count = draws.integer(3, 5)
+    count = rng.integer(3, 5)
     angle = np.arange(count) * (2 * np.pi / count)
-    out = draws.array(0.1, 0.45, count)
-    radii = draws.array(0.34, 0.5, count)
+    out = rng.uniform_array(0.1, 0.45, count)
+    radii = rng.uniform_array(0.34, 0.5, count)
     centers = np.stack([out * np.cos(angle), -0.85 * radii, out * np.sin(angle)], -1)
-    return several(leaf=_crown(centers, radii, 260, draws))
+    return several(leaf=_crown(centers, radii, 260, rng))
 
 
-def make_pot_plant(draws: Draws) -> Shape:
+def make_pot_plant(rng: Rng) -> Shape:
     """Long leaves that bend out of a pot."""
-    rim, high = draws.between(0.17, 0.24), draws.between(0.26, 0.36)
+    rim, high = rng.uniform(0.17, 0.24), rng.uniform(0.26, 0.36)
     side = smooth_profile([(rim, high), (0.97 * rim, 0.8 * high), (0.7 * rim, 0.0)], 5)
     pot = revolved(
         [
@@ -102,23 +102,23 @@ def make_pot_plant(draws: Draws) -> Shape:
         ],
         26,
     )
-    count = draws.integer(12, 20)
-    blades = _blades(count, draws, reach=(0.18, 0.5), height=(0.35, 0.66), width=0.055)
+    count = rng.integer(12, 20)
+    blades = _blades(count, rng, reach=(0.18, 0.5), height=(0.35, 0.66), width=0.055)
     return several(leaf=blades.at(y=0.05 - high), pot=pot)
 
 
-def make_grass(draws: Draws) -> Shape:
+def make_grass(rng: Rng) -> Shape:
     """A tuft of grass."""
-    return one("grass", _blades(26, draws, reach=(0.15, 0.6), height=(0.5, 1.0), width=0.05))
+    return one("grass", _blades(26, rng, reach=(0.15, 0.6), height=(0.5, 1.0), width=0.05))
 
 
 def _blades(
-    count: int, draws: Draws, reach: tuple[float, float], height: tuple[float, float], width: float
+    count: int, rng: Rng, reach: tuple[float, float], height: tuple[float, float], width: float
 ) -> Surface:
     """Blades that rise from the origin and bend outward; five rows of two vertices each."""
-    angle, s = draws.array(0.0, 2 * np.pi, count)[:, None], np.linspace(0, 1, 5)[None]
-    out = draws.array(*reach, count)[:, None] * s**1.8 + 0.05 * draws.unit(count)[:, None]
-    up = -draws.array(*height, count)[:, None] * (s - 0.22 * s**3)
+    angle, s = rng.uniform_array(0.0, 2 * np.pi, count)[:, None], np.linspace(0, 1, 5)[None]
+    out = rng.uniform_array(*reach, count)[:, None] * s**1.8 + 0.05 * rng.unit(count)[:, None]
+    up = -rng.uniform_array(*height, count)[:, None] * (s - 0.22 * s**3)
     half = 0.5 * width * (1.05 - s**2) * (0.4 + 1.8 * s * (1 - 0.5 * s))
     middle = np.stack([out * np.cos(angle), up, out * np.sin(angle)], -1)
     side = np.stack([-np.sin(angle), 0 * angle, np.cos(angle)], -1) * half[..., None]
@@ -133,9 +133,9 @@ def _blades(
     return surface(vertices, triangles.astype(np.int32), uv)
 
 
-def make_flower(draws: Draws) -> Shape:
+def make_flower(rng: Rng) -> Shape:
     """A flower with a ring of petals on a stem."""
-    petals, wide = draws.integer(7, 11), draws.between(0.17, 0.24)
+    petals, wide = rng.integer(7, 11), rng.uniform(0.17, 0.24)
     angle = np.arange(petals) * (2 * np.pi / petals)
     s = np.linspace(0.12, 1, 5)
     half = wide * 0.42 * np.sin(np.pi * s**0.8) + 0.012
@@ -151,14 +151,14 @@ def make_flower(draws: Draws) -> Shape:
     uv = vertices[:, [0, 2]]
     path = np.array([[0.0, 0.0, 0.0], [0.03, -0.45, 0.01], [0.0, -0.9, 0.0]])
     stem = tube(path, np.array([0.018, 0.014, 0.014]), 6)
-    low = _blades(5, draws, reach=(0.1, 0.25), height=(0.2, 0.4), width=0.07)
+    low = _blades(5, rng, reach=(0.1, 0.25), height=(0.2, 0.4), width=0.07)
     corolla = surface(vertices, triangles.astype(np.int32), uv)
     return several(petal=corolla, leaf=merged(stem, low), accent=ball(0.05, 12).at(y=-0.88))
 
 
-def make_rock(draws: Draws) -> Shape:
+def make_rock(rng: Rng) -> Shape:
     """A weathered boulder, flattened where it lies."""
-    body = lump(draws, roughness=draws.between(0.25, 0.45), level=3, frequency=0.5)
-    body = body.stretched(draws.between(0.8, 1.4), draws.between(0.6, 0.9), draws.between(0.8, 1.3))
+    body = lump(rng, roughness=rng.uniform(0.25, 0.45), level=3, frequency=0.5)
+    body = body.stretched(rng.uniform(0.8, 1.4), rng.uniform(0.6, 0.9), rng.uniform(0.8, 1.3))
     body.vertices[:, 1] = np.minimum(body.vertices[:, 1], 0.35 + 0.1 * body.vertices[:, 1])
     return one("rock", body)

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.revolve import (
     arc,
     ball,
@@ -17,10 +17,10 @@ from diff4splat.data_prep.synthetic.shapes.surface import merged
 from diff4splat.data_prep.synthetic.shapes.sweep import tube
 
 
-def make_vase(draws: Draws) -> Shape:
+def make_vase(rng: Rng) -> Shape:
     """A vase, open at the top."""
-    belly, neck, lip = draws.between(0.2, 0.36), draws.between(0.09, 0.16), draws.between(0.12, 0.2)
-    foot, low = draws.between(0.1, 0.18), draws.between(0.25, 0.5)
+    belly, neck, lip = rng.uniform(0.2, 0.36), rng.uniform(0.09, 0.16), rng.uniform(0.12, 0.2)
+    foot, low = rng.uniform(0.1, 0.18), rng.uniform(0.25, 0.5)
     outer = smooth_profile([(lip, 1.0), (neck, 0.84), (belly, low), (foot, 0.0)], 8)
     inner = smooth_profile([(0.0, 0.7), (0.85 * neck, 0.8), (lip - 0.02, 1.0)], 5)
     return one(
@@ -28,9 +28,9 @@ def make_vase(draws: Draws) -> Shape:
     )
 
 
-def make_bowl(draws: Draws) -> Shape:
+def make_bowl(rng: Rng) -> Shape:
     """A bowl with a foot."""
-    width, foot = draws.between(0.8, 1.3), draws.between(0.3, 0.5)
+    width, foot = rng.uniform(0.8, 1.3), rng.uniform(0.3, 0.5)
     outer = smooth_profile([(width, 1.0), (0.86 * width, 0.5), (foot, 0.12), (foot, 0.0)], 6)
     inner = smooth_profile([(0.0, 0.16), (0.55 * width, 0.3), (width - 0.06, 1.0)], 6)
     return one(
@@ -38,10 +38,10 @@ def make_bowl(draws: Draws) -> Shape:
     )
 
 
-def make_bottle(draws: Draws) -> Shape:
+def make_bottle(rng: Rng) -> Shape:
     """A bottle with a stopper."""
-    body, neck = draws.between(0.14, 0.2), draws.between(0.045, 0.065)
-    shoulder = draws.between(0.5, 0.68)
+    body, neck = rng.uniform(0.14, 0.2), rng.uniform(0.045, 0.065)
+    shoulder = rng.uniform(0.5, 0.68)
     side = smooth_profile(
         [(neck, 0.92), (neck, shoulder + 0.14), (body, shoulder), (body, 0.02)], 7
     )
@@ -49,11 +49,11 @@ def make_bottle(draws: Draws) -> Shape:
     return several(glass=glass, wood=rod(0.85 * neck, 0.1, bevel=0.01).at(y=-0.9))
 
 
-def make_lamp(draws: Draws) -> Shape:
+def make_lamp(rng: Rng) -> Shape:
     """A table lamp: turned foot and cloth shade."""
-    wide, narrow = draws.between(0.28, 0.38), draws.between(0.14, 0.24)
+    wide, narrow = rng.uniform(0.28, 0.38), rng.uniform(0.14, 0.24)
     foot = smooth_profile(
-        [(0.03, 0.62), (0.04, 0.5), (draws.between(0.09, 0.16), 0.25), (0.06, 0.08), (0.16, 0.04)],
+        [(0.03, 0.62), (0.04, 0.5), (rng.uniform(0.09, 0.16), 0.25), (0.06, 0.08), (0.16, 0.04)],
         6,
     )
     stand = revolved(
@@ -70,9 +70,9 @@ def make_lamp(draws: Draws) -> Shape:
     return several(shade=shade, ceramic=stand)
 
 
-def make_mug(draws: Draws) -> Shape:
+def make_mug(rng: Rng) -> Shape:
     """A mug with a handle."""
-    radius = draws.between(0.38, 0.48)
+    radius = rng.uniform(0.38, 0.48)
     side = [(radius, 1.0), (radius, 0.06)]
     inside = [(0.0, 0.14), (radius - 0.06, 0.14), (radius - 0.06, 1.0)]
     body = revolved(
@@ -93,9 +93,9 @@ def make_mug(draws: Draws) -> Shape:
     return one("ceramic", merged(body, tube(path, np.full(9, 0.055), 8)))
 
 
-def make_barrel(draws: Draws) -> Shape:
+def make_barrel(rng: Rng) -> Shape:
     """A barrel with hoops."""
-    belly = draws.between(0.38, 0.46)
+    belly = rng.uniform(0.38, 0.46)
     rim = 0.8 * belly
     side = smooth_profile([(rim, 1.0), (belly, 0.5), (rim, 0.0)], 7)
     hoops = [
@@ -126,9 +126,9 @@ def _hoop(radius: float, height: float):
     )
 
 
-def make_pillar(draws: Draws) -> Shape:
+def make_pillar(rng: Rng) -> Shape:
     """A column with base and capital."""
-    radius = draws.between(0.08, 0.12)
+    radius = rng.uniform(0.08, 0.12)
     wide = 1.45 * radius
     points = [
         (wide, 1.0),
@@ -144,9 +144,9 @@ def make_pillar(draws: Draws) -> Shape:
     return one("stone", revolved([[(0.0, 1.0), points[0]], *runs, [points[-1], (0.0, 0.0)]], 26))
 
 
-def make_mushroom(draws: Draws) -> Shape:
+def make_mushroom(rng: Rng) -> Shape:
     """A toadstool."""
-    wide = draws.between(0.36, 0.55)
+    wide = rng.uniform(0.36, 0.55)
     cap = smooth_profile([(0.0, 1.0), (0.6 * wide, 0.93), (wide, 0.66), (0.9 * wide, 0.6)], 7)
     under = [cap[-1], (0.12, 0.64), (0.0, 0.64)]
     stem = smooth_profile([(0.1, 0.66), (0.09, 0.3), (0.14, 0.0)], 6)
@@ -154,9 +154,9 @@ def make_mushroom(draws: Draws) -> Shape:
     return several(cap=revolved([cap, under], 28), plaster=stalk)
 
 
-def make_balloon(draws: Draws) -> Shape:
+def make_balloon(rng: Rng) -> Shape:
     """A balloon on a string."""
-    fat = draws.between(0.26, 0.32)
+    fat = rng.uniform(0.26, 0.32)
     body = smooth_profile(
         [(0.0, 1.0), (0.75 * fat, 0.94), (fat, 0.74), (0.55 * fat, 0.5), (0.02, 0.4)], 8
     )
@@ -166,7 +166,7 @@ def make_balloon(draws: Draws) -> Shape:
     return several(toy=skin, plaster=tube(string, np.full(14, 0.006), 5))
 
 
-def make_lantern(draws: Draws) -> Shape:
+def make_lantern(rng: Rng) -> Shape:
     """A street lamp: post, arm ring and glass head."""
     post = rod(0.018, 0.86, segments=10)
     foot = revolved(
@@ -176,7 +176,7 @@ def make_lantern(draws: Draws) -> Shape:
         ],
         14,
     )
-    wide = draws.between(0.055, 0.08)
+    wide = rng.uniform(0.055, 0.08)
     hat = revolved(
         [[(0.0, 1.0), (0.015, 0.985), (1.25 * wide, 0.955)], [(1.25 * wide, 0.955), (0.0, 0.95)]],
         14,
@@ -186,9 +186,9 @@ def make_lantern(draws: Draws) -> Shape:
     )
 
 
-def make_stool(draws: Draws) -> Shape:
+def make_stool(rng: Rng) -> Shape:
     """A round stool with splayed legs."""
-    radius = draws.between(0.3, 0.42)
+    radius = rng.uniform(0.3, 0.42)
     seat = rod(radius, 0.1, bevel=0.025, segments=26).at(y=-0.9)
     legs = []
     for k in range(4):
@@ -199,16 +199,16 @@ def make_stool(draws: Draws) -> Shape:
     return several(wood=merged(seat, *legs))
 
 
-def make_pumpkin(draws: Draws) -> Shape:
+def make_pumpkin(rng: Rng) -> Shape:
     """A pumpkin: a flattened ball with ribs."""
-    ribs = draws.integer(8, 12)
+    ribs = rng.integer(8, 12)
     body = revolved([arc((0.0, 0.45), 0.45, (90.0, -90.0), 13)], 6 * ribs)
     angle = np.arctan2(body.vertices[:, 2], body.vertices[:, 0])
     rib = 1.0 - 0.09 * np.abs(np.sin(0.5 * ribs * angle)) ** 0.5
     rib = 1.1 * (1.0 - 0.12 * np.abs(np.cos(0.5 * ribs * angle)) ** 3) * rib
     dent = 1.0 - 0.12 * np.exp(-((body.vertices[:, 0] ** 2 + body.vertices[:, 2] ** 2) / 0.02))
     shaped = body.stretched()
-    shaped.vertices[:, [0, 2]] *= rib[:, None] * draws.between(1.0, 1.3)
+    shaped.vertices[:, [0, 2]] *= rib[:, None] * rng.uniform(1.0, 1.3)
     shaped.vertices[:, 1] = -0.45 + (shaped.vertices[:, 1] + 0.45) * dent
     stalk = np.array([[0.0, -0.82, 0.0], [0.02, -0.92, 0.0], [0.07, -1.0, 0.02]])
     return several(pumpkin=shaped, bark=tube(stalk, np.array([0.07, 0.045, 0.04]), 8))

@@ -7,7 +7,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes import (
     animals,
     buildings,
@@ -26,7 +26,7 @@ from diff4splat.data_prep.synthetic.shapes.shape import Shape
 class Family:
     """One kind of thing."""
 
-    make: Callable[[Draws], Shape]
+    make: Callable[[Rng], Shape]
     noun: str
     heights_m: tuple[tuple[float, float], ...]
     abilities: frozenset[str]
@@ -34,7 +34,7 @@ class Family:
 
 
 def _family(
-    make: Callable[[Draws], Shape],
+    make: Callable[[Rng], Shape],
     noun: str,
     heights_m: tuple[tuple[float, float], ...],
     abilities: str,

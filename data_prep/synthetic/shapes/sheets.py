@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.revolve import ball, rod
 from diff4splat.data_prep.synthetic.shapes.shape import Shape, several
 from diff4splat.data_prep.synthetic.shapes.surface import (
@@ -24,16 +24,16 @@ def cloth(width: float, height: float, steps: tuple[int, int] = (22, 14)) -> Sur
     return both_sides(sheet, 0.006 * height)
 
 
-def make_flag(draws: Draws) -> Shape:
+def make_flag(rng: Rng) -> Shape:
     """A flag on a pole."""
-    high, long = draws.between(0.26, 0.36), draws.between(0.45, 0.65)
+    high, long = rng.uniform(0.26, 0.36), rng.uniform(0.45, 0.65)
     pole = merged(rod(0.014, 0.985, segments=10), ball(0.024, 12).at(y=-0.952))
     return several(cloth=cloth(long, high).at(x=0.014, y=high - 0.97), metal=pole)
 
 
-def make_towel(draws: Draws) -> Shape:
+def make_towel(rng: Rng) -> Shape:
     """A towel on a line between two posts."""
-    wide, long = draws.between(0.34, 0.48), draws.between(0.54, 0.74)
+    wide, long = rng.uniform(0.34, 0.48), rng.uniform(0.54, 0.74)
     span = 1.3 * wide
     posts = [rod(0.022, 1.0, segments=8).at(x=side * span / 2) for side in (-1, 1)]
     line = tube(np.array([[-span / 2, -0.95, 0.0], [span / 2, -0.95, 0.0]]), np.full(2, 0.007), 6)
@@ -42,9 +42,9 @@ def make_towel(draws: Draws) -> Shape:
     )
 
 
-def make_banner(draws: Draws) -> Shape:
+def make_banner(rng: Rng) -> Shape:
     """A long banner that hangs from an arm."""
-    wide, long = draws.between(0.2, 0.3), draws.between(0.55, 0.7)
+    wide, long = rng.uniform(0.2, 0.3), rng.uniform(0.55, 0.7)
     mast = rod(0.016, 1.0, segments=10)
     arm = tube(np.array([[0.0, -0.94, 0.0], [wide + 0.05, -0.94, 0.0]]), np.full(2, 0.01), 8)
     foot = rod(0.12, 0.03, bevel=0.01, segments=16)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from diff4splat.data_prep.synthetic.draws import Draws
+from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.revolve import half_around
 from diff4splat.data_prep.synthetic.shapes.surface import (
     Surface,
@@ -85,13 +85,13 @@ def torus(major: float, minor: float, segments: tuple[int, int] = (32, 14)) -> S
 
 
 def plane_waves(
-    points: Float64[np.ndarray, "*b 3"], draws: Draws, frequency: float, octaves: int = 3
+    points: Float64[np.ndarray, "*b 3"], rng: Rng, frequency: float, octaves: int = 3
 ) -> Float64[np.ndarray, "*b"]:
     """Smooth noise, mostly within -1 and 1; ``frequency`` in waves per metre."""
     total = np.zeros(points.shape[:-1])
     for octave in range(octaves):
-        direction = draws.normal(6, 3) * (frequency * 2.0**octave)
-        phase = draws.array(0.0, 2 * np.pi, 6)
+        direction = rng.normal(6, 3) * (frequency * 2.0**octave)
+        phase = rng.uniform_array(0.0, 2 * np.pi, 6)
         total += (0.5**octave / 3.0) * np.sin(points @ direction.T * 3.6 + phase).sum(-1)
     return total
 
@@ -132,21 +132,21 @@ def _subdivided(
     return np.concatenate([vertices, middle]), new.transpose(0, 2, 1).reshape(-1, 3)
 
 
-def lump(draws: Draws, *, roughness: float, level: int = 3, frequency: float = 0.45) -> Surface:
+def lump(rng: Rng, *, roughness: float, level: int = 3, frequency: float = 0.45) -> Surface:
     """A ball of radius 1 around the origin, displaced by noise."""
     unit, triangles = _icosphere(level)
-    vertices = unit * (1 + roughness * plane_waves(unit, draws, frequency))[:, None]
+    vertices = unit * (1 + roughness * plane_waves(unit, rng, frequency))[:, None]
     return surface(vertices, triangles, 2.0 * np.stack([unit[:, 0] + unit[:, 2], unit[:, 1]], -1))
 
 
 def leaves(
-    centers: Float64[np.ndarray, "n 3"], sizes: Float64[np.ndarray, " n"], draws: Draws
+    centers: Float64[np.ndarray, "n 3"], sizes: Float64[np.ndarray, " n"], rng: Rng
 ) -> Surface:
     """One folded leaf of four corners per point, turned at random but mostly facing up."""
     count = len(centers)
-    along = draws.normal(count, 3) + np.array([0.0, 0.25, 0.0])
+    along = rng.normal(count, 3) + np.array([0.0, 0.25, 0.0])
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6)
-    across = np.cross(along, draws.normal(count, 3) * 0.6 + np.array([0.0, -1.0, 0.0]))
+    across = np.cross(along, rng.normal(count, 3) * 0.6 + np.array([0.0, -1.0, 0.0]))
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-6)
     fold = np.cross(along, across)
     length = sizes[:, None]
@@ -161,5 +161,7 @@ def leaves(
         np.int32
     )
     uv = np.array([[0.0, -0.5], [0.28, 0.0], [0.0, 0.5], [-0.28, 0.0]])
-    flat = (uv[None] * sizes[:, None, None] + draws.array(0.0, 3.0, count, 1, 2)).reshape(-1, 2)
+    flat = (uv[None] * sizes[:, None, None] + rng.uniform_array(0.0, 3.0, count, 1, 2)).reshape(
+        -1, 2
+    )
     return surface(np.stack(corners, 1).reshape(-1, 3), triangles, flat)

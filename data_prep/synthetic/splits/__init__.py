@@ -23,7 +23,7 @@ VERSION = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowed:
-    """Names of one kind that a split may use, and those among them that training lacks."""
+    """Allowed names of one kind, and the subset absent from training."""
 
     names: tuple[str, ...]
     new: frozenset[str]
@@ -47,7 +47,7 @@ class Allowed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
-    """Everything a split may use."""
+    """All allowed names of a split."""
 
     families: Allowed
     textures: Allowed
@@ -57,7 +57,7 @@ class Split:
 
 
 def known_names() -> dict[str, frozenset[str]]:
-    """All names there are, by list."""
+    """All existing names, by list."""
     textures = {option.family for role in ROLES.values() for option in role.options}
     tables = (FAMILIES, textures, MOTIONS, PALETTES, SCENE_KINDS)
     lists = ("families", "textures", "motions", "palettes", "scenes")

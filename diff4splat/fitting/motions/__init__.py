@@ -1,1 +1,1 @@
-"""Motions that can be learned: which numbers they have, and which ``Motion`` these make."""
+"""Learned motions: their parameters, and the ``Motion`` of the current values."""

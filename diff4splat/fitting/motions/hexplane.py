@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.fitting.parameter_table import ParameterTable
-from diff4splat.fitting.settings import Rates, Weights
+from diff4splat.fitting.settings import LearningRates, LossWeights
 from diff4splat.scene.motion.hexplane.decoder import DecoderSize, make_decoder
 from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
 from diff4splat.scene.motion.hexplane.planes import HexPlaneSize, make_planes
@@ -39,26 +39,26 @@ class HexPlaneField:
         return {}
 
     def shared(self) -> Mapping[str, Tensor]:
-        """Planes and layers, as ``HexPlaneMotion`` names them."""
+        """Planes and decoder layers, named as in ``HexPlaneMotion``."""
         return self._start.tensors()
 
     def motion(
         self, table: ParameterTable, moving_index: Int[Tensor, " m"], degree: int
     ) -> HexPlaneMotion:
-        """The field as it is now."""
+        """The current field."""
         del degree
         field = self._start.with_tensors({name: table[name] for name in self._names})
         return replace(field, moving_index=moving_index)
 
-    def rates(self, rates: Rates, extent: float, progress: float) -> Mapping[str, float]:
-        """Planes learn faster than layers; the layer that tells offsets in extents."""
+    def rates(self, rates: LearningRates, extent: float, progress: float) -> Mapping[str, float]:
+        """Planes learn faster than layers; offset output scales with the extent."""
         planes, decoder = rates.planes.at(progress), rates.decoder.at(progress)
-        found = {n: planes if n.startswith("planes") else decoder for n in self._names}
+        rates_of = {n: planes if n.startswith("planes") else decoder for n in self._names}
         offsets = {n: decoder * extent for n in self._names if n.startswith("position.1")}
-        return found | offsets
+        return rates_of | offsets
 
-    def penalty(self, table: ParameterTable, weights: Weights) -> Tensor | None:
-        """Smooth planes, and time planes near 1."""
+    def penalty(self, table: ParameterTable, weights: LossWeights) -> Tensor | None:
+        """Smoothness of the planes, and time planes close to 1."""
         planes = self._start.with_tensors({name: table[name] for name in self._names}).planes
         terms = penalties(planes)
         return (
@@ -68,7 +68,7 @@ class HexPlaneField:
         )
 
     def split_in_time(
-        self, rows: Mapping[str, Tensor], chosen: Tensor, generator: torch.Generator
+        self, rows: Mapping[str, Tensor], selected: Tensor, generator: torch.Generator
     ) -> None:
-        """None: time is not a column."""
-        del rows, chosen, generator
+        """None: there are no per-Gaussian times."""
+        del rows, selected, generator

@@ -1,4 +1,4 @@
-"""What the fitting loop knows of a motion.
+"""The interface of a learned motion.
 
 Axes: ``n`` Gaussians, ``m`` moving Gaussians.
 """
@@ -11,36 +11,36 @@ from jaxtyping import Int
 from torch import Tensor
 
 from diff4splat.fitting.parameter_table import ParameterTable
-from diff4splat.fitting.settings import Rates, Weights
+from diff4splat.fitting.settings import LearningRates, LossWeights
 from diff4splat.scene.motion.protocol import Motion
 
 
 @runtime_checkable
 class LearnedMotion(Protocol):
-    """A kind of motion whose numbers lie in the table of the scene."""
+    """A motion whose parameters are in the parameter table of the scene."""
 
     def columns(self, count: int) -> Mapping[str, Tensor]:
-        """What each of ``count`` Gaussians gets beside its canonical numbers."""
+        """Initial per-Gaussian parameters of the motion."""
         ...
 
     def shared(self) -> Mapping[str, Tensor]:
-        """What all Gaussians share."""
+        """Initial parameters that all Gaussians share."""
         ...
 
     def motion(self, table: ParameterTable, moving_index: Int[Tensor, " m"], degree: int) -> Motion:
-        """The motion that the numbers make; differentiable. ``degree`` is of the colours."""
+        """The motion with the current parameters; differentiable. ``degree`` is of the colours."""
         ...
 
-    def rates(self, rates: Rates, extent: float, progress: float) -> Mapping[str, float]:
-        """Learning rates of columns and shared numbers after a share of the stage."""
+    def rates(self, rates: LearningRates, extent: float, progress: float) -> Mapping[str, float]:
+        """Learning rates of all parameters after the share ``progress`` of the stage."""
         ...
 
-    def penalty(self, table: ParameterTable, weights: Weights) -> Tensor | None:
-        """Weighted regularisers; None where there are none."""
+    def penalty(self, table: ParameterTable, weights: LossWeights) -> Tensor | None:
+        """Weighted regularisers; None without any."""
         ...
 
     def split_in_time(
-        self, rows: Mapping[str, Tensor], chosen: Tensor, generator: torch.Generator
+        self, rows: Mapping[str, Tensor], selected: Tensor, generator: torch.Generator
     ) -> tuple[Mapping[str, Tensor], Mapping[str, Tensor]] | None:
-        """Two sets of rows, earlier and later, in place of one; None where time is not a column."""
+        """Earlier and later halves of the ``selected`` rows; None without per-Gaussian times."""
         ...

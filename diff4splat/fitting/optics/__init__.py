@@ -1,1 +1,1 @@
-"""Cameras of a capture while they are learned: lens, focus, aperture, read-out and focal length."""
+"""Learned camera parameters: lens, focus, aperture, read-out and focal length."""

@@ -1,4 +1,4 @@
-"""What all cameras of a capture share beside their poses: optics, and a factor of focal lengths."""
+"""Camera parameters that all frames of a capture share: optics and a factor of focal lengths."""
 
 from dataclasses import dataclass, field, replace
 
@@ -18,11 +18,11 @@ def _one() -> Float[Tensor, ""]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraModel:
-    """As far as it is known by now; tensors with gradients are being learned."""
+    """Shared camera parameters; tensors with gradients are optimised."""
 
     optics: Optics = field(default_factory=Optics)
     focal_factor: Float[Tensor, ""] = field(default_factory=_one)
-    """Of the focal lengths that the capture names."""
+    """Multiplies the focal lengths of the capture."""
 
     def camera(self, capture: Capture, index: int) -> PhysicalCamera:
         """The camera of one frame."""
@@ -31,15 +31,16 @@ class CameraModel:
         return replace(given, camera=replace(given.camera, focal_px=focal_px), optics=self.optics)
 
 
-def model_of(capture: Capture) -> CameraModel:
-    """What the capture says."""
+def camera_model_of(capture: Capture) -> CameraModel:
+    """The camera parameters of the capture."""
     return CameraModel() if capture.optics is None else CameraModel(optics=capture.optics)
 
 
-def shows(optics: Optics | None) -> bool:
-    """Whether pictures through ``optics`` differ from a pinhole's, at least of what moves."""
+def differs_from_pinhole(optics: Optics | None) -> bool:
+    """Whether images through ``optics`` differ from pinhole images, at least of moving content."""
     if optics is None:
         return False
-    spreads = optics.aperture is not None and counts(optics.aperture.radius)
-    rolls = optics.shutter is not None and counts(optics.shutter.readout_s)
-    return not is_pinhole(optics.lens) or spreads or rolls or counts(optics.exposure_s)
+    has_aperture = optics.aperture is not None and counts(optics.aperture.radius)
+    has_readout = optics.shutter is not None and counts(optics.shutter.readout_s)
+    has_exposure = counts(optics.exposure_s)
+    return not is_pinhole(optics.lens) or has_aperture or has_readout or has_exposure

@@ -31,7 +31,7 @@ class PosedVideo:
         if tuple(want) != tuple(got):
             raise ShapeError(
                 f"PosedVideo.cameras: expected batch, frames and size {want}, got {got}; "
-                "give every picture its camera"
+                "give every frame its camera"
             )
 
     def sample(self, index: int) -> "PosedVideo":

@@ -7,8 +7,8 @@ import pytest
 from ablations.clock import StepClock, step_seconds, steps_for, typical_s
 
 from diff4splat.configs.recipes import recipe_by_name
-from diff4splat.training.recipe import StageRecipe
-from diff4splat.training.trainer.run_files import LOG_FILE
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.trainer.logs.run_files import LOG_FILE
 
 
 def stage() -> StageRecipe:

@@ -13,11 +13,11 @@ from ablations.variants import FULL, VARIANTS, Variant, recipe_of, reduced, with
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import ConfigError
 from diff4splat.training.latent_statistics import write_statistics
-from diff4splat.training.recipe import Recipe
-from diff4splat.training.recipe_json import recipe_to_json
-from diff4splat.training.stage_run import RECIPE_FILE, StageRun
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_to_json
+from diff4splat.training.train_stage import RECIPE_FILE, StageRequest
 from diff4splat.training.trainer.gates import StoredResult, write_result
-from diff4splat.training.trainer.run_files import EventLog
+from diff4splat.training.trainer.logs.run_files import EventLog
 from diff4splat.training.trainer.settings import StageResult
 
 STEPS = {"static-low": 30, "motion": 20, "dynamic": 50}
@@ -36,7 +36,7 @@ def begun(folder: Path, finished: bool, recipe: Recipe = BASE) -> Path:
     return folder
 
 
-def trained_at_once(asked: StageRun) -> StageResult:
+def trained_at_once(asked: StageRequest) -> StageResult:
     """What training leaves behind, with seconds made up here."""
     count = asked.stop_after_steps or asked.recipe.stage(asked.stage).steps
     folder = begun(asked.folder / asked.stage, asked.stop_after_steps is None, asked.recipe)
@@ -83,7 +83,9 @@ def test_seconds_of_stages_left_out_become_steps_of_the_dynamic_one(
 
 
 def test_a_motion_stage_that_learns_the_same_is_a_link(lab: Lab) -> None:
-    other = Variant(name="other", title="other", changes=("stages.dynamic.losses.depth=0",))
+    other = Variant(
+        name="other", title="other", changes=("stages.dynamic.losses.reconstruction.depth=0",)
+    )
     assert [cost.shared for cost in train_variant(other, lab)] == [True, True, False]
     assert (lab.out / "other" / "motion").resolve() == lab.out / "full" / "motion"
     assert not (lab.out / "other" / "dynamic").is_symlink()

@@ -24,8 +24,8 @@ from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.configs.stages import motion_stage
 from diff4splat.errors import ConfigError
 from diff4splat.training.prerequisites import sources_of_parts
-from diff4splat.training.recipe import Recipe
-from diff4splat.training.recipe_json import changed
+from diff4splat.training.recipe.overrides import override
+from diff4splat.training.recipe.recipe import Recipe
 
 STEPS = {STATIC: 30, MOTION: 20, DYNAMIC: 50}
 BASE = reduced(recipe_by_name("small"), STEPS)
@@ -52,11 +52,12 @@ def recipe(name: str) -> Recipe:
 
 
 def losses(name: str, key: str) -> list[float]:
-    return [getattr(recipe(name).stage(stage).losses, key) for stage in (STATIC, DYNAMIC)]
+    static, dynamic = (recipe(name).stage(stage).losses for stage in (STATIC, DYNAMIC))
+    return [getattr(static, key), getattr(dynamic.reconstruction, key)]
 
 
 def test_all_stages_are_short_small_and_sampled_in_the_training_process() -> None:
-    larger = changed(recipe_by_name("small"), [f"stages.{DYNAMIC}.data.size_px=[96, 96]"])
+    larger = override(recipe_by_name("small"), [f"stages.{DYNAMIC}.data.size_px=[96, 96]"])
     found = reduced(larger, STEPS)
     stages = [found.stage(name) for name in STAGES]
     assert [stage.name for stage in found.stages] == ["vae", STATIC, MOTION, DYNAMIC]
@@ -101,14 +102,15 @@ def test_without_motion_stage_the_dynamic_one_differs_in_length_alone() -> None:
 
 def test_without_motion_loss_that_weight_differs_as_well() -> None:
     dynamic, kept = (recipe(name).stage(DYNAMIC) for name in ("no-motion-loss", "no-motion-stage"))
-    assert dynamic.losses.motion == 0
+    assert dynamic.losses.motion.weight == 0
     assert replace(dynamic, losses=kept.losses) == kept
 
 
 def test_without_deformation_the_static_kind_goes_on_with_the_data_of_the_dynamic_one() -> None:
     found, kept = (recipe(name).stage(DYNAMIC) for name in ("no-deformation", "no-motion-stage"))
     assert (found.kind, found.trained) == ("static", ("ldrm",))
-    assert replace(found, kind=kept.kind, trained=kept.trained) == kept
+    assert found.losses == kept.losses.reconstruction
+    assert replace(found, kind=kept.kind, trained=kept.trained, losses=kept.losses) == kept
 
 
 def test_depth_losses_go_in_both_stages_that_render() -> None:
@@ -127,8 +129,8 @@ def test_without_order_one_stage_starts_from_nothing_at_the_rate_of_what_does() 
 def test_pictures_are_true_in_training_and_judging() -> None:
     found = recipe("pictures")
     assert found.model.ldrm.reads == "frames"
-    assert all(found.stage(stage).true_pictures for stage in STAGES)
-    assert [one.name for one in VARIANTS if one.true_pictures] == ["pictures"]
+    assert all(found.stage(stage).use_ground_truth_frames for stage in STAGES)
+    assert [one.name for one in VARIANTS if one.use_ground_truth_frames] == ["pictures"]
 
 
 def test_parts_of_the_detail_decoder_are_left_out_one_at_a_time() -> None:
@@ -148,15 +150,15 @@ def test_static_stages_are_shared_exactly_where_nothing_in_them_differs() -> Non
 @pytest.mark.parametrize(
     ("change", "shared"),
     [
-        (f"stages.{DYNAMIC}.losses.motion=1", True),
-        (f"stages.{MOTION}.losses.motion=1", False),
+        (f"stages.{DYNAMIC}.losses.motion.weight=1", True),
+        (f"stages.{MOTION}.losses.weight=1", False),
         # The motion stage itself is the same, but not the networks that it starts with.
         (f"stages.{STATIC}.losses.depth=0", False),
         ("model.detail.depths=0", False),
     ],
 )
 def test_motion_stages_are_shared_where_the_static_ones_are(change: str, shared: bool) -> None:
-    assert is_shared(changed(BASE, [change]), MOTION, BASE) is shared
+    assert is_shared(override(BASE, [change]), MOTION, BASE) is shared
 
 
 def test_the_full_variant_comes_first_whatever_is_chosen() -> None:

@@ -11,8 +11,8 @@ from oracles_clips import make_clip
 
 from diff4splat.data.clip_folder import ClipFolder, Selection
 from diff4splat.data.clip_part import ClipPart
+from diff4splat.data.codecs.encode import Coding
 from diff4splat.data.licenses import commercial_ok
-from diff4splat.data.members.encode import Coding
 from diff4splat.data.shard_reader import ShardReader
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import InputError
@@ -132,5 +132,5 @@ def test_other_licences(name: str) -> None:
 def test_other_processes_read_it(folder: ClipFolder) -> None:
     # Started afresh: a fork of a process with threads may hang in whatever a thread was holding.
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        sums = list(pool.map(depth_sum, [folder] * 3, range(3), timeout=60))
+        sums = list(pool.map(depth_sum, [folder] * 3, range(3), timeout=300))
     assert sums == [depth_sum(folder, position) for position in range(3)]

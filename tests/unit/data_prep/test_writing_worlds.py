@@ -12,8 +12,8 @@ from oracles_clip_equality import first_difference
 
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data_prep import writing
-from diff4splat.data_prep.synthetic.drawing.clips import draw_clip
-from diff4splat.data_prep.synthetic.drawing.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.data_prep.writing import WorldJob, write_worlds
 from diff4splat.errors import ConfigError, FileFormatError, OutputError

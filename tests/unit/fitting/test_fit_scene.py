@@ -10,22 +10,32 @@ from small_fits import ball_capture, balls
 
 from diff4splat.errors import CheckpointError, DivergenceError, InputError
 from diff4splat.fitting.evaluator import mean_psnr_db
-from diff4splat.fitting.fit import FitResult, FitRun, fit_scene
-from diff4splat.fitting.model_init import standing_model
-from diff4splat.fitting.scene_bounds import find_region
-from diff4splat.fitting.settings import Decay, Density, FitSettings, Rates, Stillness
+from diff4splat.fitting.fit import fit_scene
+from diff4splat.fitting.fit_types import FitRequest, FitResult
+from diff4splat.fitting.model.model_init import static_model
+from diff4splat.fitting.model.scene_bounds import scene_bounds
+from diff4splat.fitting.settings import (
+    DensitySettings,
+    FitSettings,
+    LearningRates,
+    LogLinearDecay,
+    StaticDetectionSettings,
+)
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.motion.hexplane.decoder import DecoderSize
 from diff4splat.scene.motion.hexplane.planes import HexPlaneSize
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 
+pytestmark = pytest.mark.usefixtures("module_as_shipped")
 SETTINGS = FitSettings(
-    coarse_steps=60,
-    fine_steps=160,
+    coarse_steps=40,
+    fine_steps=80,
     harmonics=0,
-    stillness=Stillness(min_score=0.01),
-    rates=Rates(planes=Decay(first=5e-2, last=1e-2), decoder=Decay(first=1e-2, last=1e-3)),
+    stillness=StaticDetectionSettings(min_score=0.01),
+    rates=LearningRates(
+        planes=LogLinearDecay(first=5e-2, last=1e-2), decoder=LogLinearDecay(first=1e-2, last=1e-3)
+    ),
     planes=HexPlaneSize(space=(8, 8, 8), time=4, channels=4, multipliers=(1,)),
     decoder=DecoderSize(width=16),
     checkpoint_every=20,
@@ -34,10 +44,12 @@ SETTINGS = FitSettings(
 )
 
 
-def run(folder: Path, **changes) -> FitRun:
+def run(folder: Path, **changes) -> FitRequest:
     capture = changes.pop("capture", None) or ball_capture()
     options = {name: changes.pop(name) for name in ("init", "stop_after_s") if name in changes}
-    return FitRun(capture=capture, settings=replace(SETTINGS, **changes), folder=folder, **options)
+    return FitRequest(
+        capture=capture, settings=replace(SETTINGS, **changes), folder=folder, **options
+    )
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +91,7 @@ def interrupt_at(monkeypatch, stage: str, step: int) -> None:
     original = StageLoop._take_step
 
     def stopping(self) -> None:
-        if self.course.name == stage and self.step == step:
+        if self.stage.name == stage and self.step == step:
             raise KeyboardInterrupt
         original(self)
 
@@ -101,7 +113,7 @@ def test_another_fit_in_the_same_folder_is_refused(tmp_path: Path):
 
 
 def test_divergence_keeps_the_last_good_state(tmp_path: Path, monkeypatch):
-    from diff4splat.fitting.objective import Objective
+    from diff4splat.fitting.objective.step_objective import Objective
 
     original, calls = Objective.loss, [0]
 
@@ -114,11 +126,11 @@ def test_divergence_keeps_the_last_good_state(tmp_path: Path, monkeypatch):
     with pytest.raises(DivergenceError, match=r"state of step \d+ is kept"):
         fit_scene(run(tmp_path, coarse_steps=400))
     monkeypatch.undo()
-    from diff4splat.fitting import checkpoint
-    from diff4splat.fitting.identity import fingerprint
+    from diff4splat.fitting.checkpoint import load_checkpoint
+    from diff4splat.fitting.fingerprint import fingerprint
 
     asked = run(tmp_path, coarse_steps=400)
-    kept = checkpoint.load(tmp_path, fingerprint(asked.capture, asked.settings, None))
+    kept = load_checkpoint(tmp_path, fingerprint(asked.capture, asked.settings, None))
     assert kept.step == 100
     assert all(bool(torch.isfinite(value).all()) for value in kept.tensors.values())
 
@@ -174,5 +186,5 @@ def test_nothing_held_out_is_said_and_fitted(tmp_path: Path):
 
 def test_a_fit_starts_within_its_budget() -> None:
     capture = ball_capture(views=3, times=1)
-    few = replace(SETTINGS, density=Density(budget=17))
-    assert len(standing_model(capture, find_region(capture), few)) <= 17
+    few = replace(SETTINGS, density=DensitySettings(budget=17))
+    assert len(static_model(capture, scene_bounds(capture), few)) <= 17

@@ -11,35 +11,37 @@ from traced_fits import COUNT, flight, gaussians, photographed, said, scene
 
 from diff4splat.data.capture.capture import Capture
 from diff4splat.errors import ConfigError
-from diff4splat.fitting.canonical import raw_gaussians
-from diff4splat.fitting.density import flat_half_pictures
-from diff4splat.fitting.evaluator import Judge
-from diff4splat.fitting.fit import FitRun, fit_scene
-from diff4splat.fitting.frame_renderer import Sight, half_pictures
-from diff4splat.fitting.model import SceneModel
-from diff4splat.fitting.model_init import field_bounds
+from diff4splat.fitting.evaluator import Evaluator
+from diff4splat.fitting.fit import fit_scene
+from diff4splat.fitting.fit_types import FitRequest
+from diff4splat.fitting.frames.frame_renderer import FrameRenderer
+from diff4splat.fitting.frames.frame_schedule import FrameSchedule
+from diff4splat.fitting.frames.frame_store import FrameStore
+from diff4splat.fitting.model.canonical import params_from_gaussians
+from diff4splat.fitting.model.model_init import field_bounds
+from diff4splat.fitting.model.scene_model import SceneModel
+from diff4splat.fitting.model.static_detection import error_variation
 from diff4splat.fitting.motions.hexplane import HexPlaneField
 from diff4splat.fitting.motions.protocol import LearnedMotion
-from diff4splat.fitting.motions.spacetime import Pulses
-from diff4splat.fitting.motions.still import Still
-from diff4splat.fitting.objective import Objective
+from diff4splat.fitting.motions.spacetime import SpacetimeGaussians
+from diff4splat.fitting.motions.static import NoMotion
+from diff4splat.fitting.objective.gradient_statistics import ndc_scale, pinhole_ndc_scale
+from diff4splat.fitting.objective.step_objective import Objective
 from diff4splat.fitting.optics.learned import LearnedOptics
-from diff4splat.fitting.pictures import FrameStore, Schedule
 from diff4splat.fitting.settings import (
     CameraSettings,
     FitSettings,
-    Rates,
-    Stillness,
-    Weights,
+    LearningRates,
+    LossWeights,
+    StaticDetectionSettings,
 )
-from diff4splat.fitting.static_detection import error_variation
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
 
 FISHEYE = Optics(lens=OpenCVFisheye(coefficients=torch.zeros(4), max_angle_rad=0.45))
 READOUT_S = 0.2
 SETTINGS = FitSettings(
-    coarse_steps=10, fine_steps=20, harmonics=0, stillness=Stillness(min_score=0.0),
+    coarse_steps=10, fine_steps=20, harmonics=0, stillness=StaticDetectionSettings(min_score=0.0),
     camera=CameraSettings(samples=2, shown_samples=2, start=2), checkpoint_every=100,
 )  # fmt: skip
 
@@ -58,19 +60,23 @@ def motions() -> dict[str, LearnedMotion]:
     field = HexPlaneField(
         (SETTINGS.planes, SETTINGS.decoder), field_bounds(gaussians().means), (0.0, 1.0), 0
     )
-    return {"still": Still((0.0, 1.0)), "pulses": Pulses((0.0, 1.0), 0.1), "field": field}
+    return {
+        "still": NoMotion((0.0, 1.0)),
+        "pulses": SpacetimeGaussians((0.0, 1.0), 0.1),
+        "field": field,
+    }
 
 
 def model_of(motion: LearnedMotion, optics: LearnedOptics | None = None) -> SceneModel:
-    rows = raw_gaussians(gaussians(), 0)
-    moves = torch.full((COUNT,), not isinstance(motion, Still))
+    rows = params_from_gaussians(gaussians(), 0)
+    moves = torch.full((COUNT,), not isinstance(motion, NoMotion))
     return SceneModel(rows, motion, moves, optics)
 
 
 def objective(capture: Capture, **camera) -> Objective:
-    settings = replace(SETTINGS, camera=replace(SETTINGS.camera, **camera), weights=Weights())
-    sight = Sight(capture=capture, settings=settings.camera)
-    return Objective(sight=sight, store=FrameStore(capture), settings=settings)
+    settings = replace(SETTINGS, camera=replace(SETTINGS.camera, **camera), weights=LossWeights())
+    renderer = FrameRenderer(capture=capture, settings=settings.camera)
+    return Objective(renderer=renderer, store=FrameStore(capture), settings=settings)
 
 
 @pytest.mark.parametrize("name", ["still", "pulses", "field"])
@@ -94,12 +100,12 @@ def test_the_read_out_is_recovered_while_the_scene_is_known():
     made, goal = model_of(motions()["pulses"], parts), objective(capture, learn=("readout",))
     with torch.no_grad():
         made.table["velocities"].copy_(flight().velocities)
-    schedule = Schedule(capture, 1, 0)
+    schedule = FrameSchedule(capture, 1, 0)
     for number in range(4, 34):
         goal.loss(made, *schedule.frames(number), 0, number).loss.backward()
-        made.table.step({"camera_readout": Rates().readout.at(number / 34) * 4})
-        made.bound()
-    found = parts.facts(made.table)["readout"]
+        made.table.step({"camera_readout": LearningRates().readout.at(number / 34) * 4})
+        made.clamp_params()
+    found = parts.report(made.table)["readout"]
     assert found["start"] == pytest.approx(0.5 * READOUT_S)
     assert found["recovered"] == pytest.approx(READOUT_S, rel=0.1)
 
@@ -127,7 +133,7 @@ def test_a_stopped_fit_that_learns_cameras_goes_on_exactly(tmp_path: Path, monke
     capture = photographed(scene(flight()), optics)
 
     def run(folder: str):
-        return fit_scene(FitRun(capture=capture, settings=settings, folder=tmp_path / folder))
+        return fit_scene(FitRequest(capture=capture, settings=settings, folder=tmp_path / folder))
 
     whole = run("whole")
     for stage, step in (("coarse", 3), ("fine", 3)):
@@ -148,7 +154,7 @@ def interrupt_at(monkeypatch, stage: str, step: int) -> None:
     original = StageLoop._take_step
 
     def stopping(self) -> None:
-        if self.course.name == stage and self.step == step:
+        if self.stage.name == stage and self.step == step:
             raise KeyboardInterrupt
         original(self)
 
@@ -157,11 +163,11 @@ def interrupt_at(monkeypatch, stage: str, step: int) -> None:
 
 def test_pixels_that_the_lens_does_not_see_have_no_part():
     capture = fisheye()
-    goal, made = objective(capture), model_of(Still((0.0, 1.0)))
+    goal, made = objective(capture), model_of(NoMotion((0.0, 1.0)))
     loss = goal.loss(made, 0.4, [0], 0).loss.detach()
-    judge = Judge(sight=goal.sight, store=goal.store)
-    quality = judge.frames(made.scene(0, goal.sight.path), None, [0])[0]
-    seen = judge.picture(made.scene(0, goal.sight.path), None, 0)[1]
+    evaluator = Evaluator(renderer=goal.renderer, store=goal.store)
+    quality = evaluator.frames(made.scene(0, goal.renderer.path), None, [0])[0]
+    seen = evaluator.image(made.scene(0, goal.renderer.path), None, 0)[1]
     assert 0 < int((~seen).sum()) < seen.numel()
     spoilt = [
         replace(frame, rgb=torch.where(seen[..., None], frame.rgb, 1.0))
@@ -169,14 +175,16 @@ def test_pixels_that_the_lens_does_not_see_have_no_part():
     ]
     other = objective(replace(capture, frames=Pictures(shown=spoilt)))
     assert float(other.loss(made, 0.4, [0], 0).loss.detach()) == float(loss) < 0.01
-    judge = Judge(sight=other.sight, store=other.store)
-    assert judge.frames(made.scene(0, goal.sight.path), None, [0])[0].psnr_db == quality.psnr_db
+    evaluator = Evaluator(renderer=other.renderer, store=other.store)
+    assert (
+        evaluator.frames(made.scene(0, goal.renderer.path), None, [0])[0].psnr_db == quality.psnr_db
+    )
 
 
 def test_samples_differ_from_step_to_step_and_not_from_run_to_run():
     aperture = Aperture(radius=0.3, focus_distance=1.0)
     goal, made = objective(photographed(scene(), Optics(aperture=aperture))), None
-    made = model_of(Still((0.0, 1.0)))
+    made = model_of(NoMotion((0.0, 1.0)))
     losses = [goal.loss(made, 0.4, [0], 0, step).loss.detach() for step in (1, 1, 2)]
     first, again, other = map(float, losses)
     assert first == again != other
@@ -186,9 +194,9 @@ def test_half_a_picture_is_as_long_for_rays_as_for_the_rasteriser():
     capture = ball_capture(views=1, times=1, held=())
     pose = capture.cameras.world_from_camera[0].float()
     ahead = pose[:3, 3] + pose[:3, 2] * torch.tensor([[1.0], [3.0], [-2.0]])
-    flat = flat_half_pictures(ahead, capture.cameras)
+    flat = pinhole_ndc_scale(ahead, capture.cameras)
     torch.testing.assert_close(
-        half_pictures(ahead, [capture.physical_camera(0)], 0.0), flat, rtol=1e-3, atol=0
+        ndc_scale(ahead, [capture.physical_camera(0)], 0.0), flat, rtol=1e-3, atol=0
     )
 
 
@@ -199,9 +207,9 @@ def test_who_moves_is_found_through_a_lens_too():
         time_centers_s=torch.tensor([0.5]), time_deviations_s=torch.tensor([10.0]),
     )  # fmt: skip
     capture = photographed(scene(motion), lens, views=4, times_s=(0.0, 0.5, 1.0))
-    sight = Sight(capture=capture)
+    renderer = FrameRenderer(capture=capture)
     varies = error_variation(
-        scene(motion).state_at(0.5), sight, FrameStore(capture), Schedule(capture, 2, 0)
+        scene(motion).state_at(0.5), renderer, FrameStore(capture), FrameSchedule(capture, 2, 0)
     )
     assert int(varies.argmax()) == 3
 
@@ -209,39 +217,45 @@ def test_who_moves_is_found_through_a_lens_too():
 @pytest.mark.parametrize("backend", ["raster", "reference", "gsplat"])
 def test_a_rasteriser_is_refused_for_cameras_with_effects(backend: str):
     with pytest.raises(ConfigError, match="expected 'trace' or 'auto'"):
-        Sight(capture=fisheye(), backend=backend)
+        FrameRenderer(capture=fisheye(), backend=backend)
     plain = said(fisheye(), None)
-    assert not Sight(capture=plain, backend=backend).traced
+    assert not FrameRenderer(capture=plain, backend=backend).traced
     with pytest.raises(ConfigError, match="to learn focal"):
-        Sight(capture=plain, backend=backend, settings=CameraSettings(learn=("focal",)))
+        FrameRenderer(capture=plain, backend=backend, settings=CameraSettings(learn=("focal",)))
 
 
 def test_rays_are_followed_where_they_are_needed_or_asked_for():
     capture = fisheye()
-    assert Sight(capture=capture).traced
+    assert FrameRenderer(capture=capture).traced
     plain = said(capture, None)
-    assert not Sight(capture=plain).traced
-    assert Sight(capture=plain, backend="trace").traced
+    assert not FrameRenderer(capture=plain).traced
+    assert FrameRenderer(capture=plain, backend="trace").traced
     shut = said(capture, Optics(shutter=Shutter(readout_s=0.0)))
-    assert not Sight(capture=shut).traced
+    assert not FrameRenderer(capture=shut).traced
 
 
 def test_flow_is_refused_through_optics():
     capture = fisheye()
-    settings = replace(SETTINGS, weights=Weights(flow=1.0))
+    settings = replace(SETTINGS, weights=LossWeights(flow=1.0))
     with pytest.raises(ConfigError, match="flow is that of pinholes"):
-        Objective(sight=Sight(capture=capture), store=FrameStore(capture), settings=settings)
+        Objective(
+            renderer=FrameRenderer(capture=capture), store=FrameStore(capture), settings=settings
+        )
 
 
 def test_residuals_come_from_other_samples_than_gradients(monkeypatch: pytest.MonkeyPatch):
     aperture = Aperture(radius=0.2, focus_distance=1.5)
-    capture, seeds, learn = photographed(scene(), Optics(aperture=aperture)), [], Sight.learn
+    capture, seeds, learn = (
+        photographed(scene(), Optics(aperture=aperture)),
+        [],
+        FrameRenderer.learn,
+    )
 
     def noted(self, scene, camera, index, outputs, seed):
         seeds.append((seed, torch.is_grad_enabled()))
         return learn(self, scene, camera, index, outputs, seed)
 
-    monkeypatch.setattr(Sight, "learn", noted)
+    monkeypatch.setattr(FrameRenderer, "learn", noted)
     loss = objective(capture, samples=2).loss
     for number in (0, 1):
         loss(model_of(motions()["still"]), 0.0, [0, 1], 0, number)
@@ -250,7 +264,7 @@ def test_residuals_come_from_other_samples_than_gradients(monkeypatch: pytest.Mo
 
 
 def test_one_ray_per_pixel_is_its_own_residual(monkeypatch: pytest.MonkeyPatch):
-    calls, learn = [], Sight.learn
-    monkeypatch.setattr(Sight, "learn", lambda *given: calls.append(1) or learn(*given))
+    calls, learn = [], FrameRenderer.learn
+    monkeypatch.setattr(FrameRenderer, "learn", lambda *given: calls.append(1) or learn(*given))
     objective(fisheye()).loss(model_of(motions()["still"]), 0.0, [0], 0)
     assert calls == [1]

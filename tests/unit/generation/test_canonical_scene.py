@@ -78,7 +78,7 @@ def test_pixels_that_an_earlier_key_frame_shows_are_left_out() -> None:
     assert bool(duplicates.any())
     assert torch.equal(scene.cell_index, (~duplicates).flatten().nonzero()[:, 0])
     assert len(scene.gaussians) == len(scene.cell_index) + BORDER
-    (omission,) = log.omissions
+    (omission,) = log.skipped
     assert omission.saved == f"{int(duplicates.sum()):,} Gaussians"
 
 
@@ -101,7 +101,7 @@ def test_pruning_keeps_cells_and_border_in_step() -> None:
     assert 0 < int(kept.sum()) < len(kept)
     assert torch.equal(pruned.gaussians.means, scene.gaussians.means[kept])
     assert torch.equal(pruned.cell_index, scene.cell_index[kept[: len(scene.cell_index)]])
-    (omission,) = log.omissions
+    (omission,) = log.skipped
     assert omission.error == float(scene.gaussians.opacities[~kept].max())
 
 
@@ -111,10 +111,10 @@ def test_dropping_what_no_renderer_draws_costs_nothing() -> None:
     faint[0] = 0.5
     scene = replace(scene, gaussians=replace(scene.gaussians, opacities=faint))
     prune_cells(scene, 1 / 255, log)
-    assert [omission.error for omission in log.omissions] == [0.0]
+    assert [omission.error for omission in log.skipped] == [0.0]
     silent = RunLog()
     assert len(prune_cells(scene, 0.0, silent).gaussians) == len(faint)
-    assert len(silent.omissions) == 0
+    assert len(silent.skipped) == 0
 
 
 def test_a_scene_must_keep_a_gaussian_but_a_fill_need_not() -> None:

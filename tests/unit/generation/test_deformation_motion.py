@@ -70,11 +70,11 @@ def test_a_network_that_is_the_identity_is_not_run() -> None:
     network.register_forward_pre_hook(lambda *_: pytest.fail("it ran"))
     motion = deform(network, canonical(), KEY_TIMES_S, UNITS, log)
     assert isinstance(motion, StaticMotion) and motion.time_range_s == (0.0, 2.0)
-    assert [omission.what for omission in log.omissions] == ["deformation network"]
+    assert [omission.what for omission in log.skipped] == ["deformation network"]
 
 
 def test_without_a_network_nothing_moves() -> None:
     log = RunLog()
     motion = deform(None, canonical(), KEY_TIMES_S, UNITS, log)
     assert isinstance(motion, StaticMotion) and motion.time_range_s == (0.0, 2.0)
-    assert len(log.omissions) == 0
+    assert len(log.skipped) == 0

@@ -12,7 +12,7 @@ from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.models.config.sizes import small_size
 from diff4splat.models.factory import PARTS, create_networks
 from diff4splat.models.hub.model import Model, with_parts
@@ -107,7 +107,7 @@ def test_gaussians_that_hardly_move_store_no_keys(
     trimmed = pipeline(image, "forward", settings=generous, log=log)
     strict = pipeline(image, "forward", settings=replace(QUICK, static_threshold_px=0.0))
     assert len(trimmed.motion.moving_index) < len(strict.motion.moving_index)
-    assert "key times of static Gaussians" in {omission.what for omission in log.omissions}
+    assert "key times of static Gaussians" in {omission.what for omission in log.skipped}
 
 
 def test_a_prompt_changes_the_scene_and_loads_the_text_encoder(
@@ -119,8 +119,8 @@ def test_a_prompt_changes_the_scene_and_loads_the_text_encoder(
     plain = pipeline(image, "arc", settings=QUICK, log=plain_log)
     prompted = pipeline(image, "arc", "a red ball rolls", settings=QUICK, log=log)
     assert not torch.equal(plain.gaussians.sh[:50], prompted.gaussians.sh[:50])
-    assert "text_encoder" in {omission.what for omission in plain_log.omissions}
-    assert "text_encoder" not in {omission.what for omission in log.omissions}
+    assert "text_encoder" in {omission.what for omission in plain_log.skipped}
+    assert "text_encoder" not in {omission.what for omission in log.skipped}
     assert prompted.provenance.prompt == "a red ball rolls"
 
 
@@ -174,7 +174,7 @@ def test_unknown_and_too_large_models_are_refused(tmp_path: Path) -> None:
 def test_a_single_camera_and_a_file_name_are_enough(
     pipeline: Diff4SplatPipeline, image: InputImage, tmp_path: Path
 ) -> None:
-    from diff4splat.io.images import write_png
+    from diff4splat.io.photos.images import write_png
 
     write_png(torch.rand(40, 60, 3), tmp_path / "photo.png")
     scene = pipeline(tmp_path / "photo.png", "static", settings=QUICK)

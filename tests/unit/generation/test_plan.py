@@ -110,7 +110,7 @@ def test_the_log_says_why_a_network_does_not_run(
 ) -> None:
     log = RunLog()
     planned("small", trained, request_).record(config(), log)
-    (entry,) = [entry for entry in log.omissions if entry.what == part]
+    (entry,) = [entry for entry in log.skipped if entry.what == part]
     assert (entry.why, entry.error) == (why, error)
     assert entry.saved == f"{parameter_counts(config())[part]:,} weights neither loaded nor run"
 

@@ -56,7 +56,7 @@ def test_without_priors_the_image_is_a_static_plane() -> None:
     log = RunLog()
     maps = maps_of(model_of(), log=log)
     assert torch.equal(maps.depth, torch.full((SIDE_PX, SIDE_PX), PLANE_DEPTH))
-    assert maps.displacement is None and len(log.omissions) == 0
+    assert maps.displacement is None and len(log.skipped) == 0
     assert "sample motion" not in log.phases.seconds
 
 
@@ -105,5 +105,5 @@ def test_one_latent_frame_has_no_motion() -> None:
 def test_saved_guidance_passes_are_noted() -> None:
     log = RunLog()
     maps_of(model_of("motion_unet"), log=log)
-    (omission,) = log.omissions
+    (omission,) = log.skipped
     assert omission.what == "guidance pass" and "weight of 1" in omission.why

@@ -79,7 +79,7 @@ def test_dropped_tracks_moved_by_at_most_the_threshold() -> None:
     dropped[pruned.moving_index] = False
     assert 20 < int(dropped.sum()) < COUNT - 20
     assert float(displacement_px(gaussians, motion)[dropped].max()) <= 0.5
-    (omission,) = log.omissions
+    (omission,) = log.skipped
     assert omission.error == 0.5
     pixels, _ = project(CAMERA, pruned.state_at(gaussians, 1.0).means[dropped])
     torch.testing.assert_close(pixels, project(CAMERA, gaussians.means[dropped])[0])

@@ -104,7 +104,7 @@ def test_without_geometry_of_the_image_every_cell_is_filled(tiny: Model) -> None
 def test_a_fill_may_be_too_faint_to_keep(tiny: Model) -> None:
     fill, log = filled(tiny, min_opacity=1.0)
     assert len(fill.gaussians.gaussians) == 0 and bool(fill.grid.filled.any())
-    assert "faint Gaussians" in {omission.what for omission in log.omissions}
+    assert "faint Gaussians" in {omission.what for omission in log.skipped}
 
 
 def test_a_fill_moves_unless_there_is_no_deformation(tiny: Model) -> None:
@@ -125,9 +125,9 @@ def test_the_render_condition_is_used(tiny: Model) -> None:
 
 def test_seeds_and_text_decide(tiny: Model) -> None:
     plain, log = filled(tiny)
-    assert "no prompt" in {omission.why for omission in log.omissions}
+    assert "no prompt" in {omission.why for omission in log.skipped}
     text = torch.randn(1, 4, tiny.config.text.width)
     prompted, log = filled(tiny, text=text)
-    assert "no prompt" not in {omission.why for omission in log.omissions}
+    assert "no prompt" not in {omission.why for omission in log.skipped}
     left, right = (each.gaussians.gaussians.sh for each in (plain, prompted))
     assert left.shape != right.shape or not torch.equal(left, right)

@@ -7,7 +7,13 @@ from torch import nn
 
 from diff4splat.models.config.sizes import SIZES, paper_size, size_by_name, small_size
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import Networks, create_networks, parameter_counts
+from diff4splat.models.factory import (
+    PARTS,
+    Networks,
+    create_networks,
+    model_parts,
+    parameter_counts,
+)
 
 
 def weights(part: nn.Module) -> torch.Tensor:
@@ -51,11 +57,23 @@ def test_parts_draw_from_streams_of_their_own() -> None:
     assert ratio.std() > 0.1  # one stream would give the same numbers up to a factor
 
 
-def test_leaving_out_the_text_encoder_changes_nothing_else() -> None:
-    full, without = create_networks(tiny_size()), create_networks(tiny_size(), with_text=False)
+def test_leaving_out_a_part_changes_nothing_else() -> None:
+    full = create_networks(tiny_size())
+    without = create_networks(tiny_size(), parts=("vae", "dit", "ldrm", "deformation"))
     assert without.text_encoder is None
     assert [name for name, _ in without.parts()] == ["vae", "dit", "ldrm", "deformation"]
     assert same(dataclasses.replace(full, text_encoder=None), without)
+
+
+def test_parts_that_the_model_lacks_are_not_built() -> None:
+    assert model_parts(tiny_size()) == ("vae", "text_encoder", "dit", "ldrm", "deformation")
+    assert model_parts(small_size()) == PARTS
+    networks = create_networks(tiny_size(), parts=("vae", "motion_unet"))
+    assert [name for name, _ in networks.parts()] == ["vae"]
+
+
+def test_no_parts_are_no_networks() -> None:
+    assert create_networks(tiny_size(), parts=()) == Networks()
 
 
 def test_fresh_networks_are_the_identity() -> None:
@@ -78,7 +96,7 @@ def test_meta_networks_allocate_nothing() -> None:
 @pytest.mark.parametrize("name", SIZES)
 def test_counts_name_every_part(name: str) -> None:
     counts = parameter_counts(size_by_name(name))
-    assert list(counts) == ["vae", "text_encoder", "dit", "ldrm", "deformation"]
+    assert tuple(counts) == model_parts(size_by_name(name))
     assert min(counts.values()) > 0
 
 
@@ -107,13 +125,8 @@ def test_documentation_lists_the_counts() -> None:
         encoding="utf-8"
     )
     counts = [parameter_counts(make()) for make in SIZES.values()]
-    rows = {part: [table[part] for table in counts] for part in counts[0]}
+    rows = {part: [table.get(part) for table in counts] for part in PARTS}
     rows["total"] = [sum(table.values()) for table in counts]
     for part, row in rows.items():
-        assert f"| {part} | {' | '.join(f'{count:,}' for count in row)} |" in text
-
-
-def test_parts_that_are_not_needed_have_shapes_but_no_weights() -> None:
-    full, some = create_networks(tiny_size()), create_networks(tiny_size(), needed=("ldrm",))
-    assert torch.equal(weights(full.ldrm), weights(some.ldrm))
-    assert {parameter.device.type for parameter in some.dit.parameters()} == {"meta"}
+        cells = " | ".join("–" if count is None else f"{count:,}" for count in row)
+        assert f"| {part} | {cells} |" in text

@@ -21,46 +21,41 @@ from diff4splat.training.prerequisites import (
     starting_networks,
     trained_networks,
 )
-from diff4splat.training.recipe import Gate, Recipe
-from diff4splat.training.stage_run import StageRun, train_stage
-from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import Gate
+from diff4splat.training.train_stage import StageRequest, train_stage
+from diff4splat.training.trainer.checkpoints.export import load_parts
 
 BUILDS_ON = {
     "vae": {},
     "static-low": {"vae": "vae"},
     "static-high": {"vae": "vae", "ldrm": "static-low"},
     "dynamic": {"vae": "vae", "ldrm": "static-high"},
-    "generator": {"vae": "vae"},
+    "video_diffusion": {"vae": "vae"},
     "joint": {
         "vae": "vae",
         "ldrm": "dynamic",
         "deformation": "dynamic",
-        "text_encoder": "generator",
-        "dit": "generator",
+        "text_encoder": "video_diffusion",
+        "dit": "video_diffusion",
     },
 }
-CONTINUES = {"static-high": "static-low", "dynamic": "static-high", "joint": "generator"}
-WITH_SIGHT = {
-    "sight": {},
-    "static-low": {"vae": "vae", "ldrm": "sight"},
+CONTINUES = {"static-high": "static-low", "dynamic": "static-high", "joint": "video_diffusion"}
+SMALL_BUILDS_ON = {
+    "posed_video_pretrain": {},
+    "static-low": {"vae": "vae", "ldrm": "posed_video_pretrain"},
     "motion": {"vae": "vae", "ldrm": "static-low"},
     "dynamic": {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
-    "single": {"vae": "vae", "ldrm": "dynamic"},
-    "depth": {"ldrm": "single"},
-    "told": {"vae": "vae", "ldrm": "depth", "deformation": "dynamic"},
-    "generator": {"vae": "vae", "ldrm": "told"},
-    "branch": {"text_encoder": "generator", "dit": "generator"},
-    "joint": BUILDS_ON["joint"] | {"ldrm": "told", "dit": "branch"},
+    "monocular_depth": {"ldrm": "dynamic"},
+    "video_diffusion": {"vae": "vae", "ldrm": "monocular_depth"},
+    "motion_diffusion": {"text_encoder": "video_diffusion", "dit": "video_diffusion"},
 }
 """What differs in ``small``, at its only size: seeing is learnt first, and motion by itself."""
-SIGHT_CONTINUES = {
-    "static-low": "sight",
+SMALL_CONTINUES = {
+    "static-low": "posed_video_pretrain",
     "dynamic": "motion",
-    "single": "dynamic",
-    "depth": "single",
-    "told": "depth",
-    "branch": "generator",
-    "joint": "told",
+    "monocular_depth": "dynamic",
+    "motion_diffusion": "video_diffusion",
 }
 
 
@@ -70,9 +65,9 @@ SIGHT_CONTINUES = {
 )
 def test_parts_come_from_the_last_stage_that_trained_them(name: str, stage: str) -> None:
     recipe = recipe_by_name(name)
-    sees = any(other.kind == "sight" for other in recipe.stages)
-    builds_on = BUILDS_ON | (WITH_SIGHT if sees else {})
-    continues = CONTINUES | (SIGHT_CONTINUES if sees else {})
+    sees = any(other.kind == "posed_video_pretrain" for other in recipe.stages)
+    builds_on = BUILDS_ON | (SMALL_BUILDS_ON if sees else {})
+    continues = CONTINUES | (SMALL_CONTINUES if sees else {})
     found = sources_of_parts(recipe, recipe.stage(stage))
     assert {part: earlier.name for part, earlier in found.items()} == builds_on[stage]
     before = continued_stage(recipe, recipe.stage(stage), found)
@@ -90,7 +85,7 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recipe, Path]:
     shards = write_shards(tmp_path_factory.mktemp("shards"))
     recipe, run = reading(shards), tmp_path_factory.mktemp("run")
     for stage in ("vae", "static-low"):
-        train_stage(StageRun(recipe=recipe, stage=stage, folder=run))
+        train_stage(StageRequest(recipe=recipe, stage=stage, folder=run))
     return recipe, run
 
 
@@ -128,7 +123,7 @@ def test_gates_of_all_stages_before_are_looked_at(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"static-low: expected 100 steps .* got 1; .*ignore"):
         required(recipe, high, tmp_path, False)
     # Another branch is not asked for.
-    required(recipe, "generator", tmp_path, False)
+    required(recipe, "video_diffusion", tmp_path, False)
 
 
 def test_stages_start_with_averaged_weights(begun: tuple[Recipe, Path]) -> None:
@@ -173,7 +168,7 @@ def test_an_unfinished_stage_hands_on_its_averages_but_counts_as_untrained(
     for stage in ("vae", "static-low"):
         (tmp_path / stage).symlink_to(run / stage)
     train_stage(
-        StageRun(
+        StageRequest(
             recipe=recipe,
             stage="static-high",
             folder=tmp_path,

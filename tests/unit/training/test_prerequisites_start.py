@@ -14,7 +14,7 @@ from torch import nn
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.models.factory import PARTS, create_networks
-from diff4splat.models.hub.pretrained import Model, load_model, with_text_encoder
+from diff4splat.models.hub.model import Model, load_model
 from diff4splat.training.prerequisites import (
     continued_stage,
     last_checkpoint,
@@ -24,9 +24,9 @@ from diff4splat.training.prerequisites import (
     starting_networks,
     trained_networks,
 )
-from diff4splat.training.recipe import Recipe
-from diff4splat.training.stage_run import MODEL_FOLDER, StageRun, train_stage
-from diff4splat.training.trainer.export import load_parts
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.train_stage import MODEL_FOLDER, StageRequest, train_stage
+from diff4splat.training.trainer.checkpoints.export import load_parts
 
 
 def same(network: nn.Module, other: nn.Module) -> bool:
@@ -50,11 +50,11 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recipe, Path]:
     """An autoencoder of two steps."""
     recipe = reading(write_shards(tmp_path_factory.mktemp("shards")))
     run = tmp_path_factory.mktemp("run")
-    train_stage(StageRun(recipe=recipe, stage="vae", folder=run))
+    train_stage(StageRequest(recipe=recipe, stage="vae", folder=run))
     return recipe, run
 
 
-@pytest.mark.parametrize("stage", ["vae", "static-low", "dynamic", "generator", "joint"])
+@pytest.mark.parametrize("stage", ["vae", "static-low", "dynamic", "video_diffusion", "joint"])
 def test_without_a_model_every_part_comes_from_its_stage(stage: str, tmp_path: Path) -> None:
     recipe = recipe_by_name("test")
     wanted = sources_of_parts(recipe, recipe.stage(stage))
@@ -64,8 +64,8 @@ def test_without_a_model_every_part_comes_from_its_stage(stage: str, tmp_path: P
 def test_parts_that_are_trained_ask_for_no_stage(start: Model, tmp_path: Path) -> None:
     recipe = recipe_by_name("test")
     assert names(recipe, "dynamic", tmp_path, start) == {}
-    assert names(recipe, "generator", tmp_path, start) == {}
-    rest = {"text_encoder": "generator", "dit": "generator"}
+    assert names(recipe, "video_diffusion", tmp_path, start) == {}
+    rest = {"text_encoder": "video_diffusion", "dit": "video_diffusion"}
     assert names(recipe, "joint", tmp_path, start) == rest
     sources = stages_before(recipe, recipe.stage("dynamic"), tmp_path, start)
     require_prerequisites(recipe, sources, tmp_path, False)
@@ -172,9 +172,9 @@ def test_a_stage_is_trained_with_nothing_but_the_model_before_it(
 ) -> None:
     recipe, _ = begun
     with pytest.raises(ConfigError, match="train that stage first"):
-        train_stage(StageRun(recipe=recipe, stage="static-low", folder=tmp_path))
+        train_stage(StageRequest(recipe=recipe, stage="static-low", folder=tmp_path))
     given = as_trained(with_text_encoder(start), "vae")
-    asked = StageRun(recipe=recipe, stage="static-low", folder=tmp_path, start=given)
+    asked = StageRequest(recipe=recipe, stage="static-low", folder=tmp_path, start=given)
     assert train_stage(asked).outcome == "finished"
     whole = load_model(tmp_path / MODEL_FOLDER)
     assert whole.trained == {"vae", "ldrm"}

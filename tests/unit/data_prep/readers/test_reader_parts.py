@@ -12,16 +12,21 @@ from capture_folders import rig_cameras, seer, write_picture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diff4splat.data_prep.readers import layers
-from diff4splat.data_prep.readers.camera_numbers import camera_numbers
-from diff4splat.data_prep.readers.depth_file import grey_levels
-from diff4splat.data_prep.readers.float_files import exr_channels
-from diff4splat.data_prep.readers.layers import Layers
-from diff4splat.data_prep.readers.lens import Lens, seen_at, source_pixels
-from diff4splat.data_prep.readers.picture_file import PictureFile, Pixels
-from diff4splat.data_prep.readers.places import inside, last_number, natural_key, picture_at
-from diff4splat.data_prep.readers.points import cloud_from, read_cloud
-from diff4splat.data_prep.readers.recent import Recent
+from diff4splat.data_prep.readers.common.camera_ids import assign_camera_ids
+from diff4splat.data_prep.readers.common.intrinsics import Intrinsics, distort, undistortion_map
+from diff4splat.data_prep.readers.files import pixel_layers
+from diff4splat.data_prep.readers.files.depth_file import grey_levels
+from diff4splat.data_prep.readers.files.file_discovery import (
+    find_image,
+    last_number,
+    natural_key,
+    resolve_inside,
+)
+from diff4splat.data_prep.readers.files.float_files import exr_channels
+from diff4splat.data_prep.readers.files.image_file import ImageFile, Pixels
+from diff4splat.data_prep.readers.files.lru_cache import LruCache
+from diff4splat.data_prep.readers.files.pixel_layers import PixelLayers
+from diff4splat.data_prep.readers.files.point_cloud import cloud_from_arrays, read_cloud
 from diff4splat.errors import FileFormatError
 
 small = st.floats(-0.2, 0.2)
@@ -32,7 +37,7 @@ small = st.floats(-0.2, 0.2)
     radial=st.tuples(small, small, small), tangential=st.tuples(small, small), seed=st.integers()
 )
 def test_a_lens_bends_as_opencv_says(radial, tangential, seed) -> None:
-    lens = Lens(
+    lens = Intrinsics(
         focal_px=(50.0, 55.0),
         center_px=(31.0, 17.0),
         size_px=(40, 60),
@@ -44,12 +49,12 @@ def test_a_lens_bends_as_opencv_says(radial, tangential, seed) -> None:
     matrix = np.array([[50.0, 0, 31], [0, 55, 17], [0, 0, 1]])
     bends = np.array([*radial[:2], *tangential, radial[2]])
     want = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, bends)[0][:, 0]
-    np.testing.assert_allclose(np.stack(seen_at(lens, *xy.T), -1), want, atol=1e-9)
+    np.testing.assert_allclose(np.stack(distort(lens, *xy.T), -1), want, atol=1e-9)
 
 
 def test_a_lens_may_be_skewed() -> None:
     camera = seer(0.3, skew_px=5.0, radial=(-0.3, 0.1, 0.05), tangential=(0.03, -0.02))
-    lens = Lens(
+    lens = Intrinsics(
         focal_px=camera.focal_px,
         center_px=camera.center_px,
         size_px=camera.size_px,
@@ -59,40 +64,40 @@ def test_a_lens_may_be_skewed() -> None:
     )
     for point in np.random.default_rng(0).uniform(-1, 1, (9, 3)):
         x, y, z = camera.rows() @ (point - camera.position)
-        got = seen_at(lens, np.array([x / z]), np.array([y / z]))
+        got = distort(lens, np.array([x / z]), np.array([y / z]))
         np.testing.assert_allclose(np.concatenate(got), camera.seen_px(point), atol=1e-12)
 
 
 def test_a_straight_lens_takes_every_pixel_from_where_it_is() -> None:
-    lens = Lens(focal_px=(50.0, 55.0), center_px=(31.0, 17.0), size_px=(40, 60))
-    column, row = source_pixels(lens)
+    lens = Intrinsics(focal_px=(50.0, 55.0), center_px=(31.0, 17.0), size_px=(40, 60))
+    column, row = undistortion_map(lens)
     np.testing.assert_allclose(column[7], np.arange(60), atol=1e-4)
     np.testing.assert_allclose(row[:, 7], np.arange(40), atol=1e-4)
 
 
 def test_where_a_lens_folds_back_nothing_is_found() -> None:
-    lens = Lens(
+    lens = Intrinsics(
         focal_px=(20.0, 20.0), center_px=(30.0, 20.0), size_px=(40, 60), radial=(-0.4, 0.0, 0.0)
     )
-    column, _ = source_pixels(lens)
+    column, _ = undistortion_map(lens)
     turning = 20 * math.sqrt(1 / 1.2)
     inside_px = np.hypot(*np.meshgrid(np.arange(60) - 29.5, np.arange(40) - 19.5)) < turning
     assert np.array_equal(column > -1.5, inside_px)
 
 
 def test_a_lens_follows_its_picture() -> None:
-    lens = Lens(focal_px=(50.0, 55.0), center_px=(31.0, 17.0), size_px=(40, 60), skew_px=2.0)
-    half = lens.coarser(2)
+    lens = Intrinsics(focal_px=(50.0, 55.0), center_px=(31.0, 17.0), size_px=(40, 60), skew_px=2.0)
+    half = lens.downscaled(2)
     assert (half.focal_px, half.center_px, half.size_px) == ((25, 27.5), (15.5, 8.5), (20, 30))
     assert half.skew_px == 1
-    assert lens.fitted((20, 30), "x") == half
-    assert lens.fitted((40, 60), "x") == lens
-    assert lens.is_bent
-    assert not replace(lens, model="fisheye").is_bent
+    assert lens.scaled_to((20, 30), "x") == half
+    assert lens.scaled_to((40, 60), "x") == lens
+    assert lens.is_distorted
+    assert not replace(lens, model="fisheye").is_distorted
     with pytest.raises(
         FileFormatError, match="x: expected a picture shaped as its camera, 60 x 40"
     ):
-        lens.fitted((40, 50), "x")
+        lens.scaled_to((40, 50), "x")
 
 
 def test_a_block_counts_when_all_of_it_does_and_its_depth_is_one_of_its_depths() -> None:
@@ -100,7 +105,7 @@ def test_a_block_counts_when_all_of_it_does_and_its_depth_is_one_of_its_depths()
     counts = np.ones((4, 6), bool)
     counts[0, 0] = False
     depth = np.array([[0, 2, 5, 5, 0, 0], [8, 4, 5, 9, 0, 0]] * 2, np.float32)
-    got = layers.coarser(Layers(rgb=rgb, counts=counts, depth=depth), 2)
+    got = pixel_layers.downscale(PixelLayers(rgb=rgb, counts=counts, depth=depth), 2)
     np.testing.assert_allclose(got.rgb[0, 0], rgb[:2, :2].mean((0, 1)))
     assert got.counts.tolist() == [[False, True, True], [True] * 3]
     assert got.depth.tolist() == [[4, 5, 0], [4, 5, 0]]
@@ -110,7 +115,7 @@ def test_straightening_keeps_depth_of_one_side() -> None:
     depth = np.where(np.arange(8) < 4, 1, 9).astype(np.float32)[None].repeat(4, 0)
     column, row = np.meshgrid(np.arange(8, dtype=np.float32) + 0.3, np.arange(4, dtype=np.float32))
     rgb = np.zeros((4, 8, 3), np.float32)
-    got = layers.straightened(Layers(rgb=rgb, depth=depth), column, row)
+    got = pixel_layers.undistort(PixelLayers(rgb=rgb, depth=depth), column, row)
     assert set(np.unique(got.depth)) <= {0, 1, 9}
     assert got.counts[:, :-1].all()
     assert not got.counts[:, -1].any()
@@ -118,7 +123,7 @@ def test_straightening_keeps_depth_of_one_side() -> None:
 
 def test_nan_in_transparency_does_not_count() -> None:
     rgb, alpha = np.full((1, 3, 3), 0.5, np.float32), np.array([[1, 0, np.nan]], np.float32)
-    got = layers.over_background(Pixels(rgb=rgb, alpha=alpha), (1.0, 1.0, 1.0))
+    got = pixel_layers.composite_over(Pixels(rgb=rgb, alpha=alpha), (1.0, 1.0, 1.0))
     assert got.counts.tolist() == [[True, True, False]]
     assert got.rgb[0, :, 0].tolist() == [0.5, 1, 1]
 
@@ -128,18 +133,18 @@ def test_nan_in_transparency_does_not_count() -> None:
 )
 def test_names_that_leave_the_folder_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(FileFormatError, match="here: expected a path inside"):
-        inside(tmp_path, name, "here")
+        resolve_inside(tmp_path, name, "here")
 
 
 @pytest.mark.parametrize("name", ["a.png", "./b/a.png", "b/../a.png", "...png", "b\\a.png"])
 def test_names_that_stay_are_taken(tmp_path: Path, name: str) -> None:
-    assert inside(tmp_path, name, "here").resolve().is_relative_to(tmp_path.resolve())
+    assert resolve_inside(tmp_path, name, "here").resolve().is_relative_to(tmp_path.resolve())
 
 
 def test_a_suffix_may_be_left_away(tmp_path: Path) -> None:
     write_picture(tmp_path / "r_0.1.png", np.zeros((2, 2, 3), np.uint8))
-    assert picture_at(tmp_path, "./r_0.1", "x") == tmp_path / "r_0.1.png"
-    assert picture_at(tmp_path, "r_0.1.png", "x") == tmp_path / "r_0.1.png"
+    assert find_image(tmp_path, "./r_0.1", "x") == tmp_path / "r_0.1.png"
+    assert find_image(tmp_path, "r_0.1.png", "x") == tmp_path / "r_0.1.png"
 
 
 def test_numbers_in_names_sort_as_numbers() -> None:
@@ -154,15 +159,15 @@ def poses(*angles: float) -> torch.Tensor:
 
 
 def test_cameras_are_told_apart_by_what_comes_back() -> None:
-    assert camera_numbers(poses(0.2, 0.1, 0.2, 0.1), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
-    assert camera_numbers(poses(0.1, 0.2, 0.3, 0.4), [0.0, 1.0, 2.0, 3.0]) == [0, 0, 0, 0]
-    assert camera_numbers(poses(0.1, 0.2, 0.3, 0.4), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
+    assert assign_camera_ids(poses(0.2, 0.1, 0.2, 0.1), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
+    assert assign_camera_ids(poses(0.1, 0.2, 0.3, 0.4), [0.0, 1.0, 2.0, 3.0]) == [0, 0, 0, 0]
+    assert assign_camera_ids(poses(0.1, 0.2, 0.3, 0.4), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
     # The same place at the same time is no second picture of one camera.
-    assert camera_numbers(poses(0.1, 0.1, 0.2, 0.2), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
+    assert assign_camera_ids(poses(0.1, 0.1, 0.2, 0.2), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
 
 
 def test_a_store_forgets_what_was_not_used_for_longest() -> None:
-    store = Recent(30)
+    store = LruCache(30)
     for key in "abc":
         store.put(key, (np.zeros(10, np.uint8),))
     assert store.get("a") is not None
@@ -178,7 +183,7 @@ def test_a_store_forgets_what_was_not_used_for_longest() -> None:
 def test_grey_and_palette_pictures_are_pictures(tmp_path: Path, channels: int) -> None:
     levels = np.full((5, 7, channels), 51, np.uint8)
     cv2.imwrite(str(tmp_path / "a.png"), levels)
-    picture = PictureFile(file=tmp_path / "a.png")
+    picture = ImageFile(file=tmp_path / "a.png")
     assert (picture.size_px(), picture.has_alpha()) == ((5, 7), channels == 4)
     np.testing.assert_allclose(picture.read().rgb, 0.2, atol=1e-7)
 
@@ -195,15 +200,15 @@ def test_grey_and_palette_pictures_are_pictures(tmp_path: Path, channels: int) -
 def test_arrays_that_are_no_pictures_are_refused(tmp_path: Path, array, message: str) -> None:
     np.save(tmp_path / "a.npy", array)
     with pytest.raises(FileFormatError, match=message):
-        PictureFile(file=tmp_path / "a.npy").read()
+        ImageFile(file=tmp_path / "a.npy").read()
 
 
 def test_arrays_of_bytes_are_levels(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.full((2, 2, 4), 255, np.uint8))
     np.save(tmp_path / "b.npy", np.full((2, 2, 3), 65535, np.uint16))
-    assert PictureFile(file=tmp_path / "a.npy").has_alpha()
+    assert ImageFile(file=tmp_path / "a.npy").has_alpha()
     for name in ("a.npy", "b.npy"):
-        assert float(PictureFile(file=tmp_path / name).read().rgb.min()) == 1
+        assert float(ImageFile(file=tmp_path / name).read().rgb.min()) == 1
 
 
 @pytest.mark.parametrize("read", [exr_channels, grey_levels, read_cloud])
@@ -236,7 +241,7 @@ def test_colours_of_points_are_bytes_or_shares(tmp_path: Path, kind: str) -> Non
 
 
 def test_a_cloud_of_nothing_finite_is_none() -> None:
-    cloud, notes = cloud_from(np.full((2, 3), np.inf), None, "x")
+    cloud, notes = cloud_from_arrays(np.full((2, 3), np.inf), None, "x")
     assert cloud is None
     assert notes == (
         "x: 2 points that are not finite were dropped",

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import re
 
 import pytest
 
@@ -7,10 +8,12 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.models.config.model import (
     ActivationConfig,
     DeformationConfig,
-    DetailConfig,
     DitConfig,
     LdrmConfig,
     ModelConfig,
+    MonocularDepthConfig,
+    MotionUNetConfig,
+    RefinementConfig,
     TextConfig,
     VaeConfig,
 )
@@ -27,21 +30,20 @@ OTHER_VALUES = {
     "widths": [5, 6, 8],
     "level_widths": [9, 6, 4],
     "pixel_patch": 4,
-    "buckets": 64,
+    "relative_position_buckets": 64,
     "grid_stride": 2,
     "width": 48,
-    "surroundings": 8,
-    "linear_code": True,
-    "noise_px": 1.5,
-    "picture_width": 8,
-    "range": [2.0, 9.0],
-    "predicts": "clean",
-    "draft": True,
-    "motion": True,
+    "channels": 8,
+    "border_cells": 8,
+    "pca_shortcut": True,
+    "static_threshold_px": 1.5,
+    "depth_range": [2.0, 9.0],
+    "prediction_type": "clean",
+    "render_condition": True,
     "pooled_text": True,
 }
 """Valid values where doubling the old one is not."""
-BOUND = [("ldrm", "reads"), ("dit", "motion_width"), ("dit", "motion_outline")]
+BOUND = [("ldrm", "input"), ("motion_unet", "mask_refiner_width")]
 """Fields that may not change alone."""
 
 
@@ -53,55 +55,48 @@ def test_json_round_trip_is_exact(name: str) -> None:
 
 def test_json_lists_every_field() -> None:
     data = json.loads(test_size().to_json())
-    assert set(data) == {field.name for field in dataclasses.fields(ModelConfig)}
+    assert set(data) == {field.name for field in dataclasses.fields(ModelConfig)} | {"version"}
     assert all(leaf in data[part] for part, leaf in LEAVES)
 
 
-@pytest.mark.parametrize(("part", "leaf"), [pair for pair in LEAVES if pair not in BOUND])
-def test_every_field_changes_the_fingerprint(part: str, leaf: str) -> None:
+def test_every_field_changes_the_fingerprint() -> None:
+    prints = [test_size().fingerprint()]
+    free = [pair for pair in LEAVES if pair not in BOUND]
+    for part, leaf in free:
+        data = json.loads(test_size().to_json())
+        old = data[part][leaf]
+        data[part][leaf] = OTHER_VALUES.get(leaf, 2 * old if isinstance(old, int | float) else None)
+        prints.append(ModelConfig.from_json(json.dumps(data)).fingerprint())
+        assert prints[-1] != prints[0], (part, leaf)
+    assert all(re.fullmatch("[0-9a-f]{12}", each) for each in prints)
+
+
+def test_the_mask_refiner_changes_the_fingerprint() -> None:
+    motion = MotionUNetConfig(width=8)
+    refined = dataclasses.replace(motion, mask_refiner_width=4)
+    configs = [dataclasses.replace(test_size(), motion_unet=one) for one in (motion, refined)]
+    assert len({config.fingerprint() for config in (*configs, test_size())}) == 3
+
+
+@pytest.mark.usefixtures("as_shipped")
+@pytest.mark.parametrize("fill", ["", None, True, "image"])
+def test_an_unknown_fill_is_refused(fill: object) -> None:
+    data = json.loads(test_size().to_json()) | {"default_fill": fill}
+    with pytest.raises(ConfigError, match=r"ModelConfig\.default_fill: expected none or video"):
+        ModelConfig.from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("version", [0, 3, "2", True, None, []])
+def test_another_version_is_refused(version: object) -> None:
+    data = json.loads(test_size().to_json()) | {"version": version}
+    with pytest.raises(ConfigError, match=r"expected version 1 or 2, got .*a newer diff4splat"):
+        ModelConfig.from_json(json.dumps(data))
+
+
+def test_parts_that_a_stored_model_does_not_name_are_left_out() -> None:
     data = json.loads(test_size().to_json())
-    old = data[part][leaf]
-    data[part][leaf] = OTHER_VALUES.get(leaf, 2 * old if isinstance(old, int | float) else None)
-    changed = ModelConfig.from_json(json.dumps(data))
-    assert changed.fingerprint() != test_size().fingerprint()
-    assert len(changed.fingerprint()) == 12 and int(changed.fingerprint(), 16) >= 0
-
-
-def test_a_branch_for_motion_needs_a_motion_and_room_for_its_heads() -> None:
-    dit = dataclasses.replace(test_size().dit, motion=True, motion_width=8)
-    outlined = dataclasses.replace(dit, motion_outline=4)
-    prints = {dataclasses.replace(test_size(), dit=own).fingerprint() for own in (dit, outlined)}
-    assert len(prints | {test_size().fingerprint()}) == 3
-    for change, words in (
-        ({"motion": False}, "DitConfig.motion: expected true where a branch tells it"),
-        ({"motion_width": 6}, "motion_width: expected 0 or a multiple of 4, twice the heads"),
-        ({"motion_width": -8}, "motion_width: expected 0 or a multiple"),
-        ({"motion_width": True}, "motion_width: expected 0 or a multiple"),
-        ({"motion_outline": -1}, "motion_outline: expected a whole number of at least 0, got -1"),
-        ({"motion_outline": True}, "motion_outline: expected a whole number"),
-        ({"motion_width": 0, "motion_outline": 4}, "expected 0 without a branch that it belongs"),
-    ):
-        with pytest.raises(ConfigError, match=words):
-            dataclasses.replace(dit, **change)
-
-
-@pytest.mark.parametrize("width", [-1, True])
-def test_a_network_for_the_depth_of_pictures_has_a_whole_width(width: int) -> None:
-    with pytest.raises(ConfigError, match="picture_width: expected a whole number of at least 0"):
-        DetailConfig(width=6, picture_width=width)
-
-
-def test_models_stored_before_a_picture_told_its_depth_have_none() -> None:
-    data = json.loads(test_size().to_json())
-    del data["detail"]["picture_width"]
-    assert ModelConfig.from_json(json.dumps(data)) == test_size()
-
-
-def test_models_stored_before_there_were_details_have_none() -> None:
-    data = json.loads(test_size().to_json())
-    del data["detail"], data["vae"]["linear_code"], data["ldrm"]["reads"]
-    for later in ("predicts", "draft", "motion", "motion_width", "pooled_text"):
-        del data["dit"][later]
+    for later in ("refinement", "monocular_depth", "motion_unet", "default_fill"):
+        del data[later]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
 
@@ -145,24 +140,35 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
         (DitConfig, {"blocks": True}, "DitConfig.blocks: expected a whole number"),
         (DitConfig, {"frequency_width": 15}, "DitConfig.frequency_width: expected an even number"),
         (LdrmConfig, {"grid_stride": 3}, "LdrmConfig.grid_stride: expected 1 or 2"),
-        (LdrmConfig, {"reads": "sounds"}, "LdrmConfig.reads: expected latents or frames"),
-        (VaeConfig, {"linear_code": 1}, "VaeConfig.linear_code: expected true or false"),
+        (DitConfig, {"prediction_type": "noise"}, "prediction_type: expected velocity or clean"),
+        (DitConfig, {"render_condition": 1}, "DitConfig.render_condition: expected true or false"),
+        (LdrmConfig, {"input": "audio"}, "LdrmConfig.input: expected latents or frames"),
+        (VaeConfig, {"pca_shortcut": 1}, "VaeConfig.pca_shortcut: expected true or false"),
         (
             VaeConfig,
-            {"linear_code": True, "latent_channels": 769},
+            {"pca_shortcut": True, "latent_channels": 769},
             "latent_channels: expected at most the 768 values of a block",
         ),
-        (DetailConfig, {"width": -1}, "DetailConfig.width: expected a whole number of at least 0"),
-        (DetailConfig, {"depths": True}, "DetailConfig.depths: expected a whole number"),
-        (DetailConfig, {"match_channels": 0}, "match_channels: expected a whole number"),
-        (DetailConfig, {"surroundings": 6}, "surroundings: expected a multiple of 4, got 6"),
-        (DetailConfig, {"range": (2.0, 1.0)}, "DetailConfig.range: expected two rising depths"),
-        (DetailConfig, {"range": ("1", "2")}, "DetailConfig.range: expected two rising depths"),
-        (DetailConfig, {"range": None}, "DetailConfig.range: expected two rising depths"),
+        (RefinementConfig, {"channels": -1}, "channels: expected a whole number of at least 0"),
+        (RefinementConfig, {"cost_volume_depths": True}, "depths: expected a whole number"),
+        (RefinementConfig, {"match_channels": 0}, "match_channels: expected a whole number"),
+        (RefinementConfig, {"border_cells": 6}, "border_cells: expected a multiple of 4, got 6"),
+        (RefinementConfig, {"depth_range": (2.0, 1.0)}, "depth_range: expected two rising depths"),
+        (RefinementConfig, {"depth_range": ("1", "2")}, "depth_range: expected two rising depths"),
+        (RefinementConfig, {"depth_range": None}, "depth_range: expected two rising depths"),
+        (MonocularDepthConfig, {"channels": -1}, "channels: expected a whole number of at least 0"),
+        (MonocularDepthConfig, {"channels": True}, "channels: expected a whole number"),
+        (MotionUNetConfig, {"heads": 0}, "MotionUNetConfig.heads: expected a whole number"),
+        (MotionUNetConfig, {"width": 12}, "width: expected 0 or a multiple of 8, twice the heads"),
+        (MotionUNetConfig, {"width": -8}, "width: expected a whole number of at least 0"),
+        (MotionUNetConfig, {"width": True}, "width: expected a whole number"),
+        (MotionUNetConfig, {"mask_refiner_width": -1}, "mask_refiner_width: expected a whole"),
+        (MotionUNetConfig, {"mask_refiner_width": 4}, "expected 0 without the network that it"),
+        (DeformationConfig, {"static_threshold_px": -1.0}, "expected a number from 0 on"),
         (VaeConfig, {"widths": (4, 8)}, "VaeConfig.widths: expected at least 3 widths"),
         (VaeConfig, {"widths": (4, 8, -1)}, "VaeConfig.widths: expected whole numbers"),
         (TextConfig, {"max_bytes": 0}, "TextConfig.max_bytes: expected a whole number"),
-        (TextConfig, {"buckets": 30}, "TextConfig.buckets: expected a multiple of 4"),
+        (TextConfig, {"relative_position_buckets": 30}, "buckets: expected a multiple of 4"),
         (TextConfig, {"max_distance": 8}, "TextConfig.max_distance: expected above 8"),
         (DeformationConfig, {"level_widths": (1, 2)}, "level_widths: expected three widths"),
         (DeformationConfig, {"level_widths": (1, 2, 0)}, "level_widths: expected whole numbers"),
@@ -223,24 +229,24 @@ def test_grid_stride_needs_large_enough_tokens() -> None:
         dataclasses.replace(config, vae=vae, ldrm=ldrm)
 
 
-def test_frames_are_read_by_a_detail_decoder_alone() -> None:
-    config, detail = test_size(), DetailConfig(width=6)
-    ldrm = dataclasses.replace(config.ldrm, reads="frames")
-    with pytest.raises(ConfigError, match="expected latents where there is no detail decoder"):
+def test_frames_as_input_need_refinement() -> None:
+    config, refinement = test_size(), RefinementConfig(channels=6)
+    ldrm = dataclasses.replace(config.ldrm, input="frames")
+    with pytest.raises(ConfigError, match="expected latents without a refinement decoder"):
         dataclasses.replace(config, ldrm=ldrm)
-    both = dataclasses.replace(config, ldrm=ldrm, detail=detail)
+    both = dataclasses.replace(config, ldrm=ldrm, refinement=refinement)
     assert ModelConfig.from_json(both.to_json()) == both
-    assert both.fingerprint() != dataclasses.replace(config, detail=detail).fingerprint()
+    assert both.fingerprint() != dataclasses.replace(config, refinement=refinement).fingerprint()
 
 
-def test_details_need_whole_pixels_and_tokens_of_sixteen() -> None:
-    config, detail = test_size(), DetailConfig(width=6)
+def test_refinement_needs_whole_pixels_and_tokens_of_sixteen() -> None:
+    config, refinement = test_size(), RefinementConfig(channels=6)
     halves = dataclasses.replace(config.ldrm, grid_stride=2)
-    with pytest.raises(ConfigError, match="grid_stride: expected 1 with a detail decoder"):
-        dataclasses.replace(config, ldrm=halves, detail=detail)
+    with pytest.raises(ConfigError, match="grid_stride: expected 1 with a refinement decoder"):
+        dataclasses.replace(config, ldrm=halves, refinement=refinement)
     vae = dataclasses.replace(config.vae, pixel_patch=4)
-    with pytest.raises(ConfigError, match="expected tokens of 16 px with a detail decoder, got 32"):
-        dataclasses.replace(config, vae=vae, detail=detail)
+    with pytest.raises(ConfigError, match=r"tokens of 16 px with a refinement decoder, got 32"):
+        dataclasses.replace(config, vae=vae, refinement=refinement)
 
 
 def test_unknown_size_lists_the_known() -> None:

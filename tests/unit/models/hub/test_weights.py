@@ -7,7 +7,7 @@ from safetensors.torch import load_file, save_file
 
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError, OutputError
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import create_networks
+from diff4splat.models.factory import Networks, create_networks
 from diff4splat.models.hub.weights import (
     load_config,
     load_networks,
@@ -23,6 +23,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "model"
 
 
+def load(folder: Path, parts: tuple[str, ...] | None = None) -> Networks:
+    return load_networks(folder, load_config(folder), parts)
+
+
 def rewrite(folder: Path, part: str, change: dict[str, torch.Tensor | None]) -> None:
     tensors = load_file(part_file(folder, part)) | change
     save_file(
@@ -35,11 +39,11 @@ def test_weights_are_as_readable_as_the_configuration(folder: Path) -> None:
     assert len(modes) == 1
 
 
-@pytest.mark.parametrize("with_text", [True, False])
-def test_round_trip_is_exact(folder: Path, with_text: bool) -> None:
-    config, networks = load_networks(folder, with_text=with_text)
-    assert config == tiny_size()
-    want = create_networks(tiny_size(), seed=5, with_text=with_text)
+@pytest.mark.parametrize("parts", [None, ("dit",), ("ldrm", "vae"), ()])
+def test_round_trip_is_exact(folder: Path, parts: tuple[str, ...] | None) -> None:
+    assert load_config(folder) == tiny_size()
+    networks = load(folder, parts)
+    want = create_networks(tiny_size(), seed=5, parts=parts)
     for (name, part), (other, reference) in zip(networks.parts(), want.parts(), strict=True):
         assert name == other
         for key, value in reference.state_dict().items():
@@ -47,7 +51,7 @@ def test_round_trip_is_exact(folder: Path, with_text: bool) -> None:
 
 
 def test_loaded_networks_can_be_trained_and_run(folder: Path) -> None:
-    _, networks = load_networks(folder)
+    networks = load(folder)
     out = networks.ldrm(torch.randn(1, 4, 1, 2, 2), torch.randn(1, 6, 1, 16, 16)).gaussians
     out.sum().backward()
     assert networks.ldrm.to_gaussians.bias.grad.any()
@@ -57,7 +61,7 @@ def test_statistics_travel_with_the_weights(tmp_path: Path) -> None:
     networks = create_networks(tiny_size())
     networks.vae.set_statistics(torch.arange(4.0), torch.full((4,), 2.0))
     save_networks(networks, tiny_size(), tmp_path)
-    _, loaded = load_networks(tmp_path)
+    loaded = load(tmp_path)
     assert torch.equal(loaded.vae.latent_mean, torch.arange(4.0))
 
 
@@ -66,7 +70,7 @@ def test_half_precision_on_disk_is_float32_in_memory(tmp_path: Path, dtype: torc
     networks = create_networks(tiny_size())
     save_networks(networks, tiny_size(), tmp_path, dtype)
     assert {t.dtype for t in load_file(part_file(tmp_path, "dit")).values()} == {dtype}
-    _, loaded = load_networks(tmp_path)
+    loaded = load(tmp_path)
     for key, value in networks.dit.state_dict().items():
         assert loaded.dit.state_dict()[key].dtype == torch.float32
         assert torch.equal(loaded.dit.state_dict()[key], value.to(dtype).float())
@@ -95,14 +99,14 @@ def test_missing_keys_are_counted_and_three_are_named(folder: Path) -> None:
     with pytest.raises(
         CheckpointError, match=r"ldrm weights: missing 4 \(.*, .*, .*, …\)"
     ) as caught:
-        load_networks(folder)
+        load(folder)
     assert sum(key in str(caught.value) for key in keys) == 3
 
 
 def test_unexpected_keys_are_named(folder: Path) -> None:
     rewrite(folder, "vae", {"extra": torch.zeros(1)})
     with pytest.raises(CheckpointError, match=r"vae weights: unexpected 1 \(extra\)"):
-        load_networks(folder)
+        load(folder)
 
 
 def test_wrong_shapes_are_named(folder: Path) -> None:
@@ -110,21 +114,52 @@ def test_wrong_shapes_are_named(folder: Path) -> None:
     with pytest.raises(
         CheckpointError, match=r"wrong shape of 1 \(head.bias \(3,\) instead of \(16,\)\)"
     ):
-        load_networks(folder)
+        load(folder)
+
+
+def test_a_part_that_may_lack_is_random(folder: Path) -> None:
+    part_file(folder, "dit").unlink()
+    networks = load_networks(folder, tiny_size(), ("dit", "vae"), may_lack=("dit", "vae"))
+    want = create_networks(tiny_size(), seed=0).dit, create_networks(tiny_size(), seed=5).vae
+    for part, reference in zip((networks.dit, networks.vae), want, strict=True):
+        for key, value in reference.state_dict().items():
+            assert torch.equal(part.state_dict()[key], value), key
+
+
+@pytest.mark.parametrize("damage", ["nan", "cut", "missing key", "gone"])
+def test_only_the_files_of_asked_parts_matter(folder: Path, damage: str) -> None:
+    file = part_file(folder, "ldrm")
+    if damage == "nan":
+        rewrite(folder, "ldrm", {"merge.bias": torch.full((24,), float("nan"))})
+    elif damage == "missing key":
+        rewrite(folder, "ldrm", {"merge.bias": None})
+    else:
+        file.write_bytes(file.read_bytes()[:-9]) if damage == "cut" else file.unlink()
+    assert load(folder, ("vae", "dit")).ldrm is None
+    with pytest.raises((CheckpointError, FileFormatError), match="ldrm"):
+        load(folder, ("vae", "ldrm"))
+
+
+def test_the_hash_of_some_parts_sees_those_alone(folder: Path) -> None:
+    before = weights_sha256(folder, ("vae",)), weights_sha256(folder, ("ldrm", "vae"))
+    assert weights_sha256(folder, ("vae", "ldrm")) == before[1] != before[0]
+    rewrite(folder, "ldrm", {"to_gaussians.bias": torch.full((12,), 1e-3)})
+    assert weights_sha256(folder, ("vae",)) == before[0]
+    assert weights_sha256(folder, ("ldrm", "vae")) != before[1]
 
 
 def test_absent_part_is_named(folder: Path) -> None:
     part_file(folder, "text_encoder").unlink()
-    assert load_networks(folder, with_text=False)[1].text_encoder is None
+    assert load(folder, ("vae", "dit")).text_encoder is None
     with pytest.raises(CheckpointError, match=r"text_encoder\.safetensors: expected a weight file"):
-        load_networks(folder)
+        load(folder)
 
 
 def test_a_folder_without_a_model(tmp_path: Path) -> None:
     with pytest.raises(CheckpointError, match=r"expected a model folder with config\.json"):
         load_config(tmp_path)
     with pytest.raises(CheckpointError, match="expected a model folder"):
-        load_networks(tmp_path / "nowhere")
+        load(tmp_path / "nowhere")
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "noise", "pickle"])
@@ -138,14 +173,14 @@ def test_damaged_files_are_refused(folder: Path, damage: str) -> None:
             {"empty": b"", "cut": whole[: len(whole) // 2], "noise": bytes(range(256)) * 9}[damage]
         )
     with pytest.raises(FileFormatError, match="expected safetensors, got a damaged file"):
-        load_networks(folder)
+        load(folder)
 
 
 def test_unknown_setting_in_the_configuration(folder: Path) -> None:
     data = json.loads((folder / "config.json").read_text()) | {"colour": 1}
     (folder / "config.json").write_text(json.dumps(data))
     with pytest.raises(ConfigError, match="got 'colour'"):
-        load_networks(folder)
+        load(folder)
 
 
 def test_configuration_that_is_not_text(folder: Path) -> None:

@@ -4,10 +4,10 @@ import pytest
 import torch
 
 from diff4splat.errors import ShapeError
-from diff4splat.generation.layered_image.border_extension import border_extension
+from diff4splat.generation.layered_image.border_extension import BEHIND, border_extension
 from diff4splat.generation.layered_image.visibility import visible_in_earlier_frame
-from diff4splat.geometry.camera import Camera, pinhole, project
-from diff4splat.geometry.depth import unproject
+from diff4splat.geometry.camera import Camera, pinhole, project, stack_cameras
+from diff4splat.geometry.depth import distance_from_depth, unproject
 from diff4splat.geometry.rays import world_rays
 from diff4splat.models.blocks.conv_block import convex_upsample
 from diff4splat.models.ldrm.refinement.cost_volume import UNSEEN, cost_volume
@@ -87,18 +87,22 @@ def test_enlargement_is_a_weighted_mean_of_neighbours() -> None:
             torch.testing.assert_close(got[0, :, y, x], want)
 
 
-def test_surrounding_cells_look_along_the_rays_of_the_picture() -> None:
+def test_border_cells_lie_on_the_rays_of_the_image() -> None:
     camera = pinhole(10.0, (8, 12))
-    base = border_extension(torch.rand(8, 12, 3), torch.full((8, 12), 2.0), camera, 4)
-    assert base.distance.shape == (1, 10, 11)
-    torch.testing.assert_close(base.distance, torch.full((1, 10, 11), 2.2))
-    _, rays = world_rays(base.cameras)
-    _, want = world_rays(camera.resized((2, 3)))
-    torch.testing.assert_close(rays[0, 4:-4, 4:-4], want)
+    layer = border_extension(torch.rand(8, 12, 3), torch.full((8, 12), 2.0), camera, 4)
+    assert layer.depth.shape == layer.camera.size_px == (10, 11)
+    cameras = stack_cameras([layer.camera])
+    distance = distance_from_depth(cameras, layer.depth[None])[0, 4:-4, 4:-4]
+    inner = stack_cameras([camera.resized((2, 3))])
+    own = distance_from_depth(camera, torch.full((8, 12), 2.0))
+    want = torch.nn.functional.avg_pool2d(own[None], 4)[0] * BEHIND
+    torch.testing.assert_close(distance, want)
+    _, rays = world_rays(cameras)
+    torch.testing.assert_close(rays[0, 4:-4, 4:-4], world_rays(inner)[1][0])
 
 
-def test_a_sight_needs_a_camera_for_every_picture() -> None:
+def test_a_posed_video_needs_a_camera_for_every_frame() -> None:
     one = cameras(0.0, 0.1)
     batch = one.with_pose(one.world_from_camera[None])
-    with pytest.raises(ShapeError, match=r"Sight.cameras: expected .* \(1, 5, 8, 12\), got"):
+    with pytest.raises(ShapeError, match=r"PosedVideo.cameras: expected .* \(1, 5, 8, 12\), got"):
         PosedVideo(rgb=torch.zeros(1, 3, 5, *SIZE), cameras=batch)

@@ -1,4 +1,4 @@
-"""The detail decoder's networks: zero when fresh, exact at a Gaussian's own time, finite."""
+"""Refinement: zero when fresh, no offset at a key frame's time, finite."""
 
 from dataclasses import replace
 
@@ -7,42 +7,46 @@ import torch
 from oracles_models import randomised
 
 from diff4splat.errors import ShapeError
-from diff4splat.generation.keyframe_gaussians import canonical_gaussians
+from diff4splat.generation.canonical_scene import reconstruct_refined
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import plucker_map
-from diff4splat.models.config.model import DetailConfig
+from diff4splat.models.config.model import RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.ldrm.ldrm import Ldrm
+from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
+from diff4splat.models.ldrm.refinement import motion_features
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.progress.run_log import RunLog
+from diff4splat.scene.gaussians import Gaussians
 
-DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4)
-CONFIG = replace(tiny_size(), detail=DETAIL)
+REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
+CONFIG = replace(tiny_size(), refinement=REFINEMENT)
 
 
 def inputs(frames: int, size: tuple[int, int], batch: int = 1) -> tuple:
     poses = torch.eye(4).repeat(batch, frames, 1, 1)
     poses[..., 0, 3] = 0.1 * torch.arange(frames)
-    sight = PosedVideo(
+    video = PosedVideo(
         rgb=torch.rand(batch, 3, frames, *size), cameras=pinhole(30.0, size).with_pose(poses)
     )
     latent = torch.randn(batch, 4, 1 + frames // 4, size[0] // 8, size[1] // 8)
-    return latent, plucker_map(sight.cameras).movedim(1, 2), sight
+    return latent, plucker_map(video.cameras).movedim(1, 2), video
 
 
 @pytest.mark.parametrize(("frames", "size"), [(1, (32, 48)), (5, (64, 32))])
-@pytest.mark.parametrize("reads", ["latents", "frames"])
+@pytest.mark.parametrize("source", ["latents", "frames"])
 def test_fresh_maps_are_zero_and_of_key_frames(
-    frames: int, size: tuple[int, int], reads: str
+    frames: int, size: tuple[int, int], source: str
 ) -> None:
-    config = replace(CONFIG, ldrm=replace(CONFIG.ldrm, reads=reads))
+    config = replace(CONFIG, ldrm=replace(CONFIG.ldrm, input=source))
     maps = Ldrm(config)(*inputs(frames, size, 2))
     assert maps.gaussians.shape == (2, 12, 1 + frames // 4, *size)
-    assert maps.surroundings.shape == (2, 12, size[0] // 4 + 8, size[1] // 4 + 8)
-    assert not maps.gaussians.any() and not maps.surroundings.any()
+    assert maps.border.shape == (2, 12, size[0] // 4 + 8, size[1] // 4 + 8)
+    assert not maps.gaussians.any() and not maps.border.any()
 
 
-def test_nothing_moves_at_its_own_time() -> None:
+def test_nothing_moves_at_the_time_of_its_key_frame() -> None:
     maps = randomised(Ldrm(CONFIG))(*inputs(5, (32, 48)))
     network = randomised(RefinedDeformation(CONFIG))
     for time, key in ((0.0, 0), (1.0, 1)):
@@ -51,20 +55,41 @@ def test_nothing_moves_at_its_own_time() -> None:
         assert not raw[:, :, key].any() and bool(raw[:, :, 1 - key].any())
 
 
+def gaussians(maps: RawGaussianMaps, video: PosedVideo) -> Gaussians:
+    return reconstruct_refined(maps, video, CONFIG.activation, RunLog()).gaussians
+
+
+@pytest.mark.parametrize("change", [{"cost_volume_depths": 0}, {"border_cells": 0}])
+def test_the_cost_volume_and_the_border_can_be_left_out(change: dict[str, int]) -> None:
+    config = replace(CONFIG, refinement=replace(REFINEMENT, **change))
+    maps = randomised(Ldrm(config))(*inputs(5, (32, 32)))
+    assert maps.gaussians.shape == (1, 12, 2, 32, 32) and bool(maps.gaussians.isfinite().all())
+    assert (maps.border is None) == ("border_cells" in change)
+
+
+def test_a_static_video_needs_no_optical_flow(monkeypatch: pytest.MonkeyPatch) -> None:
+    network, given = randomised(Ldrm(CONFIG)), inputs(5, (32, 32))
+    moving = network(*given)
+    monkeypatch.delattr(motion_features, "track_flow")
+    static = network(*given, moving=False)
+    assert torch.equal(static.gaussians, moving.gaussians)
+    assert static.tokens.shape[1] == moving.tokens.shape[1] - motion_features.CUES
+
+
 def test_gradients_and_extreme_maps_are_finite() -> None:
-    *rest, sight = inputs(5, (32, 32))
+    *rest, video = inputs(5, (32, 32))
     network = randomised(Ldrm(CONFIG))
-    maps = network(*rest, sight)
+    maps = network(*rest, video)
     extreme = replace(maps, gaussians=maps.gaussians * 0 + 1e4)
     for some in (maps, extreme):
-        found = canonical_gaussians(some, sight, CONFIG.activation).gaussians
+        found = gaussians(some, video)
         assert bool(found.means.isfinite().all()) and bool(found.scales.isfinite().all())
-    found = canonical_gaussians(maps, sight, CONFIG.activation).gaussians
+    found = gaussians(maps, video)
     (found.means.sum() + found.scales.sum()).backward()
     assert all(bool(p.grad.isfinite().all()) for p in network.parameters() if p.grad is not None)
 
 
-def test_a_missing_sight_is_refused() -> None:
+def test_a_missing_video_is_refused() -> None:
     latent, rays, _ = inputs(1, (32, 32))
-    with pytest.raises(ShapeError, match="expected decoded pictures with their cameras"):
+    with pytest.raises(ShapeError, match="expected decoded frames with their cameras"):
         Ldrm(CONFIG)(latent, rays)

@@ -26,25 +26,27 @@ def inputs() -> tuple[Tensor, Tensor]:
 def test_a_fresh_one_adds_nothing() -> None:
     torch.manual_seed(0)
     plain = MotionUNet(8, 2, TEXT, frequency_width=16)
-    outlined = MotionUNet(8, 2, TEXT, frequency_width=16, outline_width=4)
+    outlined = MotionUNet(8, 2, TEXT, frequency_width=16, mask_refiner_width=4)
     outlined.load_state_dict(plain.state_dict(), strict=False)
     for network in (plain, outlined):
-        torch.nn.init.constant_(network.moves.weight, 0.1)
+        torch.nn.init.constant_(network.mask_head.weight, 0.1)
     given = torch.rand(1, 3, 32, 16), torch.randn(1, 3, 2, 8, 4), torch.rand(1)
-    for before, after in zip(plain.answers(*given), outlined.answers(*given), strict=True):
+    for before, after in zip(
+        plain.predict_motion_and_mask(*given), outlined.predict_motion_and_mask(*given), strict=True
+    ):
         assert torch.equal(before, after)
     assert not outline(awake=False)(*inputs()).any()
 
 
 def test_it_is_added_to_what_cells_say() -> None:
     torch.manual_seed(0)
-    network = randomised(MotionUNet(8, 2, TEXT, frequency_width=16, outline_width=4))
+    network = randomised(MotionUNet(8, 2, TEXT, frequency_width=16, mask_refiner_width=4))
     given = torch.rand(2, 3, 32, 16), torch.randn(2, 3, 2, 8, 4), torch.rand(2)
     features = network.features(*given, None, None).unflatten(0, (2, 2)).mean(1)
-    added = network.outline(given[0], features)
-    both = network.answers(*given)[1]
-    network.outline = None
-    torch.testing.assert_close(both, network.answers(*given)[1] + added)
+    added = network.mask_refiner(given[0], features)
+    both = network.predict_motion_and_mask(*given)[1]
+    network.mask_refiner = None
+    torch.testing.assert_close(both, network.predict_motion_and_mask(*given)[1] + added)
 
 
 def test_every_pixel_and_every_feature_matters() -> None:
@@ -82,6 +84,6 @@ def test_every_weight_has_a_gradient() -> None:
 def test_pixels_reach_the_answer_past_the_cells() -> None:
     network, (picture, told) = outline(), inputs()
     with torch.no_grad():
-        network.grow.weight.zero_()
+        network.up.weight.zero_()
     assert bool((network(1 - picture, told) != network(picture, told)).all())
     assert torch.equal(network(picture, told + 1), network(picture, told))

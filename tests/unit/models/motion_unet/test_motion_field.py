@@ -1,67 +1,36 @@
-"""Motion beside latents: cells, channels and offsets of pixels."""
+"""The displacement field of cells, and offsets of pixels."""
 
 import torch
 
-from diff4splat.models.motion_unet.motion_field import (
-    UNIT,
-    append_zero_motion,
-    decode_offsets,
-    masked_offsets,
-    pack_motion,
-    unpack_motion,
-    upsample_to_pixels,
-)
+from diff4splat.models.motion_unet.motion_field import UNIT, masked_offsets, upsample_to_pixels
 
 
-def test_cells_become_channels_and_come_back() -> None:
-    cells = torch.randn(2, 3, 3, 8, 6)
-    packed = pack_motion(cells, 8)
-    assert packed.shape == (2, 12, 3, 4, 3)
-    torch.testing.assert_close(unpack_motion(packed), cells)
-    torch.testing.assert_close(unpack_motion(pack_motion(cells, 4)), cells)
+def test_a_field_is_smooth_at_pixels() -> None:
+    field = torch.arange(4.0).expand(3, 2, 4, 4)
+    rows = upsample_to_pixels(field)
+    assert rows.shape == (2, 3, 16, 16)
+    # Bilinear with half-pixel centres: a ramp stays one up to half a cell from the border.
+    want = (torch.arange(2, 14) + 0.5) / 4 - 0.5
+    torch.testing.assert_close(rows[0, 0, 5, 2:14], want)
 
 
-def test_a_still_motion_adds_zeros() -> None:
-    latent = torch.randn(1, 4, 2, 3, 3)
-    found = append_zero_motion(latent, 12)
-    torch.testing.assert_close(found[:, :4], latent)
-    assert found.shape[1] == 16 and not bool(found[:, 4:].any())
-    assert append_zero_motion(latent, 0) is latent
-
-
-def test_offsets_grow_with_depth() -> None:
-    cells = torch.zeros(1, 3, 2, 4, 4)
-    cells[:, 0, 1] = 2.0
-    depth = torch.rand(16, 16) + 1
-    found = decode_offsets(pack_motion(cells, 8), torch.full((16, 16, 3), 0.5), depth)
-    assert found.shape == (2, 16, 16, 3)
-    assert not bool(found[0].any())
-    torch.testing.assert_close(found[1, ..., 0], 2 * UNIT * depth)
-    assert not bool(found[1, ..., 1:].any())
-
-
-def test_motion_ends_where_the_colour_does() -> None:
-    rgb = torch.zeros(16, 16, 3)
-    rgb[:, :8, 0] = 1.0
-    cells = torch.zeros(1, 3, 2, 4, 4)
-    cells[:, 1, :, :, :2] = 1.0
-    found = decode_offsets(pack_motion(cells, 8), rgb, torch.ones(16, 16))[1, ..., 1] / UNIT
-    assert bool((found[:, :8] > 0.99).all()) and bool((found[:, 8:] < 0.01).all())
-
-
-def test_there_is_a_gradient_to_the_motion() -> None:
-    motion = torch.zeros(1, 12, 2, 2, 2, requires_grad=True)
-    decode_offsets(motion, torch.rand(16, 16, 3), torch.ones(16, 16)).sum().backward()
-    torch.testing.assert_close(motion.grad.sum(), torch.tensor(2 * 256 * 3 * UNIT))
-
-
-def test_only_what_moves_goes_as_the_field_says() -> None:
+def test_only_pixels_of_the_mask_move_and_offsets_grow_with_depth() -> None:
     field = torch.zeros(3, 2, 4, 4)
     field[1, 1] = 2.0
-    moves = torch.zeros(16, 16, dtype=torch.bool)
-    moves[3:6, 2:9] = True
+    mask = torch.zeros(16, 16, dtype=torch.bool)
+    mask[3:6, 2:9] = True
     depth = torch.rand(16, 16) + 1
-    found = masked_offsets(upsample_to_pixels(field), moves, depth)
-    assert found.shape == (2, 16, 16, 3)
-    torch.testing.assert_close(found[1, ..., 1], 2 * UNIT * depth * moves)
-    assert not found[0].any() and not found[1, ..., 0].any()
+    offsets = masked_offsets(upsample_to_pixels(field), mask, depth)
+    assert offsets.shape == (2, 16, 16, 3)
+    torch.testing.assert_close(offsets[1, ..., 1], 2 * UNIT * depth * mask)
+    assert not offsets[0].any() and not offsets[1, ..., 0].any()
+
+
+def test_there_is_a_gradient_to_field_and_mask() -> None:
+    field = torch.randn(3, 2, 4, 4, dtype=torch.float64, requires_grad=True)
+    mask = torch.rand(16, 16, dtype=torch.float64, requires_grad=True)
+
+    def offsets(field: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+        return masked_offsets(upsample_to_pixels(field), mask, torch.ones(16, 16).double())
+
+    assert torch.autograd.gradcheck(offsets, (field, mask), fast_mode=True)

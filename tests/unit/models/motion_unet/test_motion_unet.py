@@ -59,7 +59,7 @@ def test_a_fresh_branch_answers_zero_at_any_size(
 
 def test_conditions_and_words_act_on_nothing_at_first() -> None:
     network = branch(awake=False)
-    torch.nn.init.normal_(network.head.weight)
+    torch.nn.init.normal_(network.motion_head.weight)
     picture, noisy, level = inputs()
     plain = network(picture, noisy, level)
     assert difference(plain, network(picture, noisy, 1 - level, some_text())) == 0
@@ -87,7 +87,7 @@ def test_a_block_is_scaled_and_shifted_between_its_convolutions() -> None:
 def test_every_parameter_has_a_gradient() -> None:
     network = branch()
     mask = torch.tensor([[True] * TOKENS, [False] * TOKENS])
-    motion, moves = network.answers(*inputs(), some_text(), mask)
+    motion, moves = network.predict_motion_and_mask(*inputs(), some_text(), mask)
     (motion.square().sum() + moves.square().sum()).backward()
     still = [
         name
@@ -100,7 +100,7 @@ def test_every_parameter_has_a_gradient() -> None:
 
 def test_the_motion_is_the_same_with_and_without_the_other_answer() -> None:
     network = branch()
-    motion, moves = network.answers(*inputs(), some_text())
+    motion, moves = network.predict_motion_and_mask(*inputs(), some_text())
     assert torch.equal(motion, network(*inputs(), some_text()))
     assert moves.shape == inputs()[0][:, 0].shape
 
@@ -149,7 +149,7 @@ def test_what_is_learnt_for_no_text_is_used_for_no_text_alone() -> None:
     network, given_inputs, text = branch(), inputs(), some_text()
     told, alone = network(*given_inputs, text), network(*given_inputs)
     with torch.no_grad():
-        network.untold.add_(1)
+        network.null_text_embedding.add_(1)
     assert difference(network(*given_inputs, text), told) == 0
     assert difference(network(*given_inputs), alone) > 1e-3
 
@@ -197,7 +197,7 @@ def test_places_matter(channel: int) -> None:
     network, given_inputs = branch(), inputs()
     plain = network(*given_inputs)
     with torch.no_grad():
-        network.enter_picture.weight[:, channel] = 0
+        network.input_image.weight[:, channel] = 0
     assert difference(plain, network(*given_inputs)) > 1e-3
 
 

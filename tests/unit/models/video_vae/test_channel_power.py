@@ -7,7 +7,7 @@ import torch
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
 
-CONFIG = replace(tiny_size().vae, linear_code=True)
+CONFIG = replace(tiny_size().vae, pca_shortcut=True)
 
 
 def test_energy_is_what_a_step_along_the_channel_changes() -> None:

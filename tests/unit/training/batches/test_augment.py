@@ -10,7 +10,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import project
 from diff4splat.training.batches.augment import cropped, led_by, mirrored, reversed_in_time
-from diff4splat.training.batches.targets import seen_cells
+from diff4splat.training.batches.targets import visible_cells
 
 
 def windowed(clip: Clip) -> Clip:
@@ -31,7 +31,7 @@ def test_tracks_project_to_where_they_are_seen(change: Callable[[Clip], Clip]) -
         assert bool(((column >= 0) & (column < width) & (row >= 0) & (row < height)).all())
     first = clip.views[0].cameras.world_from_camera[0]
     torch.testing.assert_close(first, torch.eye(4, dtype=first.dtype))
-    frame, row, column = seen_cells(clip)[:, 1:].unbind(-1)
+    frame, row, column = visible_cells(clip)[:, 1:].unbind(-1)
     assert bool((clip.views[0].instances[frame, row, column] > 0).all())
 
 

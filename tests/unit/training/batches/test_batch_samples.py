@@ -12,13 +12,15 @@ from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, project
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
+from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.batches.scale import normalized
-from diff4splat.training.batches.targets import LEAST_MOTION, draw_targets, draw_tracks
-from diff4splat.training.batches.window import _frames, cut, held
-from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
+from diff4splat.training.batches.targets import MIN_MOTION, draw_targets, draw_tracks
+from diff4splat.training.batches.temporal_crop import _frames, crop, repeat_keyframes
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
+from diff4splat.training.recipe.losses import ReconstructionLosses
+from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
 DATA = DataSettings(size_px=(24, 32), frames=5, views=2, target_frames=4, tracks=8)
@@ -112,7 +114,7 @@ def test_clips_without_tracks_make_samples_without_valid_points() -> None:
 
 def test_longer_clips_are_cut_and_start_at_the_identity() -> None:
     clip = make_clip(frames=9, tracks=16)
-    part = cut(clip, 5, torch.Generator().manual_seed(3))
+    part = crop(clip, 5, torch.Generator().manual_seed(3))
     assert part.frames == 5
     first = part.views[0].cameras.world_from_camera[0]
     torch.testing.assert_close(first, torch.eye(4, dtype=first.dtype))
@@ -128,10 +130,12 @@ def test_clips_that_are_too_short_say_so() -> None:
         sample(make_clip(frames=3))
 
 
-def test_moments_tell_a_branch_what_whole_clips_do() -> None:
+def test_keyframes_give_the_motion_network_the_same_as_full_clips() -> None:
     whole = make_clip(frames=17, static=False, tracks=20)
     data = replace(DATA, input_stride=2)
-    moments = sample(_frames(whole, slice(None, None, 8)), replace(data, frames=9, moments=True))
+    moments = sample(
+        _frames(whole, slice(None, None, 8)), replace(data, frames=9, keyframes_only=True)
+    )
     wanted = sample(whole, replace(data, frames=9))
     assert bool(wanted.moving.any())
     for name in ("field", "moving", "motion"):
@@ -141,15 +145,15 @@ def test_moments_tell_a_branch_what_whole_clips_do() -> None:
 
 
 def test_a_moment_stands_for_the_frames_up_to_it() -> None:
-    clip = held(make_clip(frames=3), 4)
+    clip = repeat_keyframes(make_clip(frames=3), 4)
     times_s = make_clip(frames=3).times_s
     wanted = [0, 1, 1, 1, 1, 2, 2, 2, 2]
     torch.testing.assert_close(clip.times_s, times_s[wanted])
 
 
-def test_whole_clips_are_not_taken_for_moments() -> None:
-    data = replace(DATA, frames=9, input_stride=2, moments=True)
-    with pytest.raises(InputError, match="expected 3 moments, got 17 frames"):
+def test_full_clips_are_refused_where_keyframes_are_expected() -> None:
+    data = replace(DATA, frames=9, input_stride=2, keyframes_only=True)
+    with pytest.raises(InputError, match="expected 3 keyframes, got 17 frames"):
         sample(make_clip(frames=17), data)
 
 
@@ -203,7 +207,14 @@ def test_sources_are_drawn_by_weight_and_named_in_the_sample() -> None:
     sources = (SourceSettings(weight=1.0), SourceSettings(weight=3.0))
     data = replace(DATA, sources=sources)
     recipe = StageRecipe(
-        name="s", kind="static", steps=1, global_batch=1, micro_batch=1, trained=(), data=data
+        name="s",
+        kind="static",
+        steps=1,
+        global_batch=1,
+        micro_batch=1,
+        trained=(),
+        data=data,
+        losses=ReconstructionLosses(),
     )
     samples = ClipSamples(recipe, 0, [Named(1), Named(2)])
     drawn = [int(samples[index].source[0][0]) for index in range(60)]
@@ -222,12 +233,12 @@ def test_half_of_the_points_move_where_enough_do() -> None:
     settings = replace(DATA, tracks=8)
     frames = torch.arange(clip.frames)
     tracks = draw_tracks(clip, frames, settings, torch.Generator().manual_seed(0))
-    moving = tracks.offset[:, tracks.valid].norm(dim=-1).amax(0) > LEAST_MOTION / 2
+    moving = tracks.offset[:, tracks.valid].norm(dim=-1).amax(0) > MIN_MOTION / 2
     assert tracks.valid.all() and 3 <= int(moving.sum()) <= 5
 
 
 def test_only_input_frames_that_carry_gaussians_are_followed_from() -> None:
-    settings = replace(DATA, frames=5, input_stride=2, track_stride=2, tracks=16)
+    settings = replace(DATA, frames=5, input_stride=2, keyframe_stride=2, tracks=16)
     one = sample(make_clip(frames=9, tracks=40), settings)
     assert one.video.shape[1] == 5 and one.depth.shape[1] == 3
     assert set(one.track_cell[0, one.track_valid[0], 0].tolist()) <= {0, 2, 4}

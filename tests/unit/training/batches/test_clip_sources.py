@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError, InputError
-from diff4splat.training.batches.places import KEPT_BACK
+from diff4splat.training.batches.epoch_shuffle import VALIDATION_EVERY
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.batches.sources import (
     EndlessClips,
@@ -25,9 +25,11 @@ from diff4splat.training.batches.sources import (
     open_source,
     world_clips,
 )
-from diff4splat.training.recipe import DataSettings, SourceSettings, StageRecipe
-from diff4splat.training.trainer.loader import load_batch
-from diff4splat.training.trainer.samples import EVALUATION_START
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
+from diff4splat.training.recipe.losses import ReconstructionLosses
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.trainer.loading.loader import load_batch
+from diff4splat.training.trainer.loading.samples import EVALUATION_START
 
 STILL, MOVING = 5, 18
 DATA = DataSettings(size_px=SIZE_PX, frames=FRAMES, views=2, target_frames=2, tracks=8, workers=0)
@@ -55,6 +57,7 @@ def recipe(*sources: SourceSettings, data: DataSettings = DATA) -> StageRecipe:
         global_batch=1,
         micro_batch=1,
         trained=("ldrm",),
+        losses=ReconstructionLosses(),
         data=replace(data, sources=sources),
     )
 
@@ -72,7 +75,7 @@ def test_the_share_of_still_clips_is_the_asked_one(folder: Path) -> None:
 def test_every_epoch_shows_every_clip_once_in_another_order(
     folder: Path, still_share: float, count: int
 ) -> None:
-    trained = count - -(-count // KEPT_BACK)
+    trained = count - -(-count // VALIDATION_EVERY)
     clips = source(folder, still_share)
     epochs = [names(clips, range(trained * e, trained * (e + 1))) for e in range(4)]
     for epoch in epochs:
@@ -144,7 +147,7 @@ def test_other_processes_draw_the_same_clips(folder: Path) -> None:
     # Opened already: what was read so far must not hinder sending it.
     assert names(pickle.loads(pickle.dumps(clips)), range(3)) == here
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        found = list(pool.map(process_and_name, [clips] * 3, range(3), timeout=60))
+        found = list(pool.map(process_and_name, [clips] * 3, range(3), timeout=300))
     assert [name for _, name in found] == here
     assert os.getpid() not in {process for process, _ in found}
 
@@ -234,9 +237,9 @@ def test_every_index_is_one_world(worlds: EndlessClips, index: int) -> None:
 
 
 def test_moments_are_drawn_as_far_apart_as_the_video_is_long() -> None:
-    data = DataSettings(frames=9, input_stride=2, moments=True)
+    data = DataSettings(frames=9, input_stride=2, keyframes_only=True)
     moments = world_clips(SourceSettings(), data, 0).recipe
-    whole = world_clips(SourceSettings(), replace(data, moments=False), 0).recipe
+    whole = world_clips(SourceSettings(), replace(data, keyframes_only=False), 0).recipe
     assert (moments.frames, moments.fps) == (3, 1.0)
     assert (whole.frames, whole.fps) == (17, 8.0)
 

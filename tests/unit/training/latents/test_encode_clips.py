@@ -16,16 +16,16 @@ from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.latents import encode
 from diff4splat.training.latents.encode import EncodingJob, encode_clips
+from diff4splat.training.latents.latent_shards import LatentPack, read_packs
 from diff4splat.training.latents.samples import LatentSamples
-from diff4splat.training.latents.stored import LatentPack, read_packs
 from diff4splat.training.stage import SampleKey
 
-RECIPE = recipe_by_name("test").stage("generator")
+RECIPE = recipe_by_name("test").stage("video_diffusion")
 LEFT = "a red ball rolls to the left, the camera circles right"
 RIGHT = "a red ball rolls to the right, the camera circles left"
 WORDS = ("someone turns left.", "someone turns right.")
@@ -34,7 +34,7 @@ WORDS = ("someone turns left.", "someone turns right.")
 def tiny_model(draft: bool = False) -> Model:
     config: ModelConfig = recipe_by_name("test").model
     config = replace(config, dit=replace(config.dit, draft=draft))
-    networks = create_networks(config, with_text=False)
+    networks = create_networks(config)
     return Model(config=config, networks=networks, weights_sha256="weights")
 
 
@@ -103,11 +103,11 @@ def as_sample(place: int) -> Clip:
 def test_the_video_model_sees_what_it_would_see_of_the_clip(encoded: Path, place: int) -> None:
     pack = read_packs(encoded)
     stage = make_stage(RECIPE, model=tiny_model(draft=True).config)
-    origin = Origin(key=SampleKey(0, "generator", 0, "sample"), source="made")
+    origin = Origin(key=SampleKey(0, "video_diffusion", 0, "sample"), source="made")
     seen = stage.encoded(make_sample(as_sample(place), RECIPE.data, origin))
     own = slice(2 * place, 2 * place + 1)
     torch.testing.assert_close(pack.latent[own], seen.latent)
-    torch.testing.assert_close(pack.draft[own], seen.draft)
+    torch.testing.assert_close(pack.render_condition[own], seen.render_condition)
     for name in ("focal_px", "center_px", "world_from_camera"):
         torch.testing.assert_close(getattr(pack.cameras[own], name), getattr(seen.cameras, name))
     assert pack.captions[2 * place] == seen.captions[0]
@@ -115,15 +115,15 @@ def test_the_video_model_sees_what_it_would_see_of_the_clip(encoded: Path, place
 
 def test_drafts_begin_with_the_true_picture_and_go_on_otherwise(encoded: Path) -> None:
     pack = read_packs(encoded)
-    assert pack.draft.shape == pack.latent.shape
-    torch.testing.assert_close(pack.draft[:, :, 0], pack.latent[:, :, 0])
-    assert not torch.allclose(pack.draft[:, :, 1:], pack.latent[:, :, 1:])
-    assert not torch.allclose(pack.draft[::2], pack.draft[1::2])
+    assert pack.render_condition.shape == pack.latent.shape
+    torch.testing.assert_close(pack.render_condition[:, :, 0], pack.latent[:, :, 0])
+    assert not torch.allclose(pack.render_condition[:, :, 1:], pack.latent[:, :, 1:])
+    assert not torch.allclose(pack.render_condition[::2], pack.render_condition[1::2])
 
 
 def test_models_without_drafts_get_none(shards: Path, tmp_path: Path) -> None:
     encode_clips(job(shards, tmp_path), Phases())
-    assert read_packs(tmp_path).draft is None
+    assert read_packs(tmp_path).render_condition is None
 
 
 def test_a_second_run_writes_nothing(shards: Path, encoded: Path) -> None:

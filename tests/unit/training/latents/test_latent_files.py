@@ -9,8 +9,13 @@ import torch
 from latent_folders import latent_folder, make_pack
 
 from diff4splat.errors import FileFormatError, InputError
-from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
-from diff4splat.training.latents.stored import (
+from diff4splat.io.scene_files.tensor_file import (
+    TensorFile,
+    read_metadata,
+    read_tensors,
+    write_tensors,
+)
+from diff4splat.training.latents.latent_shards import (
     LatentPack,
     has_pack,
     join_packs,
@@ -25,9 +30,9 @@ def assert_same(one: LatentPack, other: LatentPack) -> None:
     pairs = [(one.latent, other.latent), (one.is_static, other.is_static)]
     for name in ("focal_px", "center_px", "world_from_camera"):
         pairs.append((getattr(one.cameras, name), getattr(other.cameras, name)))
-    assert (one.draft is None) == (other.draft is None)
-    if one.draft is not None and other.draft is not None:
-        pairs.append((one.draft, other.draft))
+    assert (one.render_condition is None) == (other.render_condition is None)
+    if one.render_condition is not None and other.render_condition is not None:
+        pairs.append((one.render_condition, other.render_condition))
     for left, right in pairs:
         torch.testing.assert_close(left, right, rtol=0, atol=0)
     assert one.cameras.size_px == other.cameras.size_px
@@ -46,10 +51,11 @@ def test_what_is_written_is_read_back(tmp_path: Path, draft: bool) -> None:
 
 def test_half_precision_is_stored_in_single(tmp_path: Path) -> None:
     pack = make_pack([True])
-    half = replace(pack, latent=pack.latent.bfloat16(), draft=pack.draft.bfloat16())
+    condition = pack.render_condition.bfloat16()
+    half = replace(pack, latent=pack.latent.bfloat16(), render_condition=condition)
     found = read_packs(latent_folder(tmp_path, half))
-    assert found.latent.dtype == found.draft.dtype == torch.float32
-    torch.testing.assert_close(found.draft, pack.draft)
+    assert found.latent.dtype == found.render_condition.dtype == torch.float32
+    torch.testing.assert_close(found.render_condition, pack.render_condition)
 
 
 def test_equal_packs_give_equal_bytes(tmp_path: Path) -> None:

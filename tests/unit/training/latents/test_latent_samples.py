@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from latent_folders import FRAMES, latent_folder, latents_of, learning_from, make_pack
 
 from diff4splat.errors import ConfigError, FileFormatError, InputError
-from diff4splat.training.batches.places import ShuffledPlaces, split_places
+from diff4splat.training.batches.epoch_shuffle import ShuffledIndices, split_by_motion
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latents.latent_batch import LatentBatch, collate_latents
 from diff4splat.training.latents.samples import LatentSamples, open_samples
-from diff4splat.training.recipe import SourceSettings
-from diff4splat.training.trainer.loader import load_batch
-from diff4splat.training.trainer.samples import EVALUATION_START
+from diff4splat.training.recipe.data import SourceSettings
+from diff4splat.training.trainer.loading.loader import load_batch
+from diff4splat.training.trainer.loading.samples import EVALUATION_START
 
 PAIRS = [[False] * 2, [True] * 2] * 8
 KINDS = [static for pair in PAIRS for static in pair]
@@ -42,7 +42,9 @@ def test_everything_of_a_sample_belongs_to_one_clip(folder: Path) -> None:
     sample = LatentSamples(learning_from(latents_of(folder)), 0)[3]
     number = float(sample.latent.mean())
     assert len(sample) == 1 and sample.sample_index.tolist() == [3]
-    assert bool((sample.latent == number).all()) and bool((sample.draft == number + 0.5).all())
+    assert bool((sample.latent == number).all()) and bool(
+        (sample.render_condition == number + 0.5).all()
+    )
     assert sample.captions == (f"clip {number:.0f}, “said”",)
     assert sample.source == (str(folder),)
     assert sample.cameras.batch_shape == (1, FRAMES)
@@ -78,7 +80,7 @@ def test_still_clips_come_in_the_asked_share(folder: Path) -> None:
 )
 def test_places_keep_all_versions_of_a_clip_on_one_side(kinds: list[bool], versions: int) -> None:
     is_static = [static for static in kinds for _ in range(versions)]
-    places = split_places(is_static, versions)
+    places = split_by_motion(is_static, versions)
     for kind, wanted in (("still", True), ("moving", False)):
         own = [place for place, static in enumerate(is_static) if static is wanted]
         learnt, kept = places[kind, False], places[kind, True]
@@ -92,8 +94,8 @@ def test_places_keep_all_versions_of_a_clip_on_one_side(kinds: list[bool], versi
 
 
 def test_every_epoch_shows_every_place_once() -> None:
-    places = split_places([False] * 40, versions=2)
-    order = ShuffledPlaces(0.0, 0)
+    places = split_by_motion([False] * 40, versions=2)
+    order = ShuffledIndices(0.0, 0)
     count = len(places["moving", False])
     epochs = [[order.place(epoch * count + k, places) for k in range(count)] for epoch in range(3)]
     assert all(sorted(epoch) == places["moving", False] for epoch in epochs)
@@ -143,15 +145,15 @@ def test_batches_are_samples_one_after_the_other(tmp_path: Path, draft: bool) ->
     assert both.captions == tuple(text for one in alone for text in one.captions)
     assert both.cameras.batch_shape == (3, FRAMES) and len(both.source) == 3
     if draft:
-        torch.testing.assert_close(both.draft, both.latent + 0.5)
+        torch.testing.assert_close(both.render_condition, both.latent + 0.5)
     else:
-        assert both.draft is None
+        assert both.render_condition is None
 
 
 def test_batches_move_whole(folder: Path) -> None:
     batch = LatentSamples(learning_from(latents_of(folder)), 0)[0]
     moved = batch.to(torch.device("meta"))
-    tensors = (moved.sample_index, moved.latent, moved.draft, moved.cameras.focal_px)
+    tensors = (moved.sample_index, moved.latent, moved.render_condition, moved.cameras.focal_px)
     assert all(tensor.is_meta for tensor in tensors)
     assert moved.captions == batch.captions
 
@@ -166,7 +168,7 @@ def test_sources_are_all_latents_or_all_clips(tmp_path: Path, folder: Path) -> N
     shards = write_shards(tmp_path, still=1, moving=1)
     clips = SourceSettings(kind="shards", folder=str(shards), still_share=0.5)
     for sources in ((latents_of(folder), clips), (SourceSettings(), latents_of(folder))):
-        with pytest.raises(ConfigError, match=r"generator: expected .* all latents or all clips"):
+        with pytest.raises(ConfigError, match=r"expected .* all latents or all clips"):
             open_samples(learning_from(*sources), 0)
     assert isinstance(open_samples(learning_from(clips), 0), ClipSamples)
     assert isinstance(open_samples(learning_from(latents_of(folder)), 0), LatentSamples)

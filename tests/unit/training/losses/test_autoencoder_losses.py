@@ -11,7 +11,7 @@ from diff4splat.models.video_vae.vae import LOG_VARIANCE_RANGE
 from diff4splat.training.losses.autoencoder import (
     CHARBONNIER_WIDTH,
     charbonnier,
-    posterior_divergence,
+    kl_divergence,
 )
 
 F64 = torch.float64
@@ -21,13 +21,13 @@ F64 = torch.float64
 @given(mean=st.floats(-3, 3), std=st.floats(0.1, 3))
 def test_divergence_against_quadrature(mean: float, std: float) -> None:
     means = torch.full((1, 2, 1, 1, 1), mean, dtype=F64)
-    loss = posterior_divergence(means, torch.full_like(means, 2 * math.log(std)))
+    loss = kl_divergence(means, torch.full_like(means, 2 * math.log(std)))
     assert float(loss) == pytest.approx(oracle.normal_divergence(mean, std), rel=1e-6, abs=1e-8)
 
 
 def test_the_standard_normal_costs_nothing() -> None:
     zeros = torch.zeros(2, 1, 1, 2, 2, requires_grad=True)
-    loss = posterior_divergence(zeros, zeros)
+    loss = kl_divergence(zeros, zeros)
     loss.sum().backward()
     assert loss.tolist() == [0, 0]
     assert not zeros.grad.any()
@@ -35,14 +35,14 @@ def test_the_standard_normal_costs_nothing() -> None:
 
 def test_divergence_is_a_mean_per_element() -> None:
     mean, log_variance = torch.randn(2, 3, 2, 2, 2, 2, dtype=F64)
-    loss = posterior_divergence(mean, log_variance)
+    loss = kl_divergence(mean, log_variance)
     each = 0.5 * (mean**2 + log_variance.exp() - 1 - log_variance)
     torch.testing.assert_close(loss, torch.stack([each[b].mean() for b in range(3)]))
 
 
 def test_near_the_standard_normal_no_digits_are_lost() -> None:
     small = torch.full((1, 1, 1, 1, 1), 1e-2)
-    loss = posterior_divergence(torch.zeros_like(small), small)
+    loss = kl_divergence(torch.zeros_like(small), small)
     assert float(loss) == pytest.approx(0.5 * (math.expm1(1e-2) - 1e-2), rel=1e-4)
 
 
@@ -51,7 +51,7 @@ def test_the_whole_range_of_the_encoder_is_finite(dtype: torch.dtype) -> None:
     log_variance = torch.tensor(LOG_VARIANCE_RANGE, dtype=dtype).reshape(2, 1, 1, 1, 1)
     log_variance.requires_grad_()
     mean = torch.full_like(log_variance, 6e4).detach().requires_grad_()
-    loss = posterior_divergence(mean, log_variance)
+    loss = kl_divergence(mean, log_variance)
     loss.sum().backward()
     assert loss.dtype == torch.float32
     assert loss.isfinite().all()
@@ -95,7 +95,7 @@ def test_extreme_errors_stay_finite(size: float) -> None:
 
 def test_gradients() -> None:
     mean, log_variance = (torch.randn(2, 1, 1, 2, 1, dtype=F64).requires_grad_() for _ in "ab")
-    assert torch.autograd.gradcheck(posterior_divergence, (mean, log_variance))
+    assert torch.autograd.gradcheck(kl_divergence, (mean, log_variance))
     assert torch.autograd.gradcheck(charbonnier, (mean, log_variance))
 
 
@@ -103,6 +103,6 @@ def test_gradients() -> None:
 def test_shapes_must_agree() -> None:
     one, two = torch.zeros(1, 1, 1, 1, 1), torch.zeros(2, 1, 1, 1, 1)
     with pytest.raises(ShapeError, match=r"log_variance: expected \(1, 1.*, got \(2, 1"):
-        posterior_divergence(one, two)
+        kl_divergence(one, two)
     with pytest.raises(ShapeError, match=r"video: expected \(2, 1.*, got \(1, 1"):
         charbonnier(one, two)

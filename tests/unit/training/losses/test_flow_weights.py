@@ -10,7 +10,7 @@ from stage_fixtures import make_batch, make_stage, stage_recipe
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.flow.path import add_noise, velocity, velocity_from_clean
 from diff4splat.training.losses.flow_matching import flow_matching
-from diff4splat.training.losses.level_draws import level_weights
+from diff4splat.training.losses.timestep_sampling import min_level_weights
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.model_stage import ModelStage
 
@@ -55,13 +55,13 @@ def test_channels_and_samples_are_weighted_together() -> None:
 
 
 def test_levels_are_all_alike_where_none_is_named() -> None:
-    assert level_weights(torch.tensor([0.0, 0.3]), 0.0) is None
+    assert min_level_weights(torch.tensor([0.0, 0.3]), 0.0) is None
 
 
 def test_smaller_levels_count_less() -> None:
     level = torch.tensor([0.0, 0.1, 0.2, 0.4, 0.7, 1.0])
     wanted = torch.tensor([0.0, 1 / 16, 0.25, 1.0, 1.0, 1.0])
-    torch.testing.assert_close(level_weights(level, 0.4), wanted)
+    torch.testing.assert_close(min_level_weights(level, 0.4), wanted)
 
 
 @settings(max_examples=25, deadline=None)
@@ -75,17 +75,17 @@ def test_the_same_error_of_the_clean_latent_costs_the_same_at_all_levels_below(
         noisy, levels = add_noise(clean, noise, at), torch.full((2,), at, dtype=F64)
         wrong = velocity_from_clean(noisy, clean + error, levels[:, None, None, None, None])
         torch.testing.assert_close(wrong, velocity(clean, noise) - error / at)
-        return flow_matching(wrong, clean, noise, weights=level_weights(levels, least))
+        return flow_matching(wrong, clean, noise, weights=min_level_weights(levels, least))
 
     torch.testing.assert_close(cost(min(level, least)), cost(least))
 
 
-def test_the_generator_weighs_its_levels() -> None:
-    recipe = stage_recipe("generator")
+def test_video_diffusion_weighs_its_levels() -> None:
+    recipe = stage_recipe("video_diffusion")
     batch = make_batch(recipe, (0, 1, 2))
     plain = make_stage(recipe)
-    levels = plain.noisy(plain.encoded(batch)).level
-    weighted = make_stage(stage_recipe("generator", flow_level=0.9))(batch)
+    levels = plain.flow.noisy(plain.encoded(batch)).level
+    weighted = make_stage(stage_recipe("video_diffusion", min_level_weighting=0.9))(batch)
     wanted = plain(batch)["flow"] * (levels / 0.9).clamp_max(1).square()
     assert bool((levels < 0.9).any())
     torch.testing.assert_close(weighted["flow"], wanted)
@@ -93,60 +93,60 @@ def test_the_generator_weighs_its_levels() -> None:
 
 
 def test_measures_weigh_no_levels() -> None:
-    recipe = stage_recipe("generator")
+    recipe = stage_recipe("video_diffusion")
     batch = make_batch(recipe)
     plain, weighted = (
-        make_stage(stage_recipe("generator", flow_level=least)).measure(batch)["flow_error"]
+        make_stage(stage_recipe("video_diffusion", min_level_weighting=least)).measure(batch)
         for least in (0.0, 0.9)
     )
-    torch.testing.assert_close(plain, weighted, rtol=0, atol=0)
+    torch.testing.assert_close(plain["flow_error"], weighted["flow_error"], rtol=0, atol=0)
 
 
 def coded(power: float) -> ModelStage:
-    """The generator over an autoencoder with a linear code."""
+    """Video diffusion over an autoencoder with a linear code."""
     model = recipe_by_name("test").model
-    model = replace(model, vae=replace(model.vae, linear_code=True))
-    return make_stage(stage_recipe("generator", flow_energy=power), model=model)
+    model = replace(model, vae=replace(model.vae, pca_shortcut=True))
+    return make_stage(stage_recipe("video_diffusion", channel_power_exponent=power), model=model)
 
 
 def test_channels_count_by_their_share_in_pictures() -> None:
     stage = coded(0.5)
-    share = stage.vae.code.to_block.weight.detach().norm(dim=0)
-    torch.testing.assert_close(stage._channels, share / share.mean())
+    share = stage.vae.pca_shortcut.to_block.weight.detach().norm(dim=0)
+    torch.testing.assert_close(stage.flow._channels, share / share.mean())
     stage.vae.set_statistics(torch.zeros(4), torch.tensor([1.0, 2.0, 3.0, 4.0]))
     share = share * torch.tensor([1.0, 2.0, 3.0, 4.0])
     again = coded(0.5)
     again.vae.load_state_dict(stage.vae.state_dict())
-    torch.testing.assert_close(again._channels, share / share.mean())
+    torch.testing.assert_close(again.flow._channels, share / share.mean())
 
 
 def test_a_power_of_zero_or_no_code_counts_all_channels_alike() -> None:
     alike = torch.ones(4)
-    torch.testing.assert_close(coded(0.0)._channels, alike)
-    without_code = make_stage(stage_recipe("generator", flow_energy=0.5))
-    torch.testing.assert_close(without_code._channels, alike)
+    torch.testing.assert_close(coded(0.0).flow._channels, alike)
+    without_code = make_stage(stage_recipe("video_diffusion", channel_power_exponent=0.5))
+    torch.testing.assert_close(without_code.flow._channels, alike)
 
 
 def test_channels_of_motion_count_as_much_as_the_recipe_says() -> None:
     model = recipe_by_name("test").model
     model = replace(model, dit=replace(model.dit, motion=True))
-    stage = make_stage(stage_recipe("generator", flow_motion=7.0), model=model)
-    torch.testing.assert_close(stage._channels, torch.tensor([1.0] * 4 + [7.0] * 12))
-    batch = make_batch(stage_recipe("generator"))
-    assert stage.clean(stage.encoded(batch)).shape[1] == 16
+    stage = make_stage(stage_recipe("video_diffusion", motion_channel_weight=7.0), model=model)
+    torch.testing.assert_close(stage.flow._channels, torch.tensor([1.0] * 4 + [7.0] * 12))
+    batch = make_batch(stage_recipe("video_diffusion"))
+    assert stage.flow.noisy(stage.encoded(batch)).clean.shape[1] == 16
 
 
-def test_the_generator_weighs_its_channels() -> None:
-    batch = make_batch(stage_recipe("generator"))
+def test_video_diffusion_weighs_its_channels() -> None:
+    batch = make_batch(stage_recipe("video_diffusion"))
     stage = coded(1.0)
     batch = stage.encoded(batch)
-    video = stage.noisy(batch)
+    video = stage.flow.noisy(batch)
     wanted = flow_matching(
-        stage.velocity(batch, video),
+        stage.flow.velocity(batch, video, stage.training),
         video.clean,
         video.noise,
         first_frame_is_clean=True,
-        channels=stage._channels,
+        channels=stage.flow._channels,
     )
     torch.testing.assert_close(stage(batch)["flow"], wanted)
     assert not torch.equal(coded(0.0)(batch)["flow"], wanted)

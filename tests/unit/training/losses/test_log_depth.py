@@ -8,7 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from diff4splat.training.losses.log_depth import LEAST_PIXELS, SCALES, edge_error, own_scale
+from diff4splat.training.losses.log_depth import (
+    LEAST_PIXELS,
+    SCALES,
+    gradient_error,
+    rescale_median,
+)
 
 
 def edge_oracle(difference: Tensor, known: Tensor) -> float:
@@ -33,15 +38,17 @@ def test_edges_agree_with_the_formula(seed: int, height: int, width: int) -> Non
     difference = torch.randn(2, height, width, generator=generator, dtype=torch.float64)
     known = torch.rand(2, height, width, generator=generator) < 0.7
     wanted = [edge_oracle(*pair) for pair in zip(difference, known, strict=True)]
-    found = edge_error(difference, known)
+    found = gradient_error(difference, known)
     torch.testing.assert_close(found, found.new_tensor(wanted), atol=1e-10, rtol=1e-10)
 
 
 def test_edges_do_not_ask_for_a_scale() -> None:
     difference = torch.randn(1, 8, 8, dtype=torch.float64)
     known = torch.ones(1, 8, 8, dtype=torch.bool)
-    torch.testing.assert_close(edge_error(difference + 3, known), edge_error(difference, known))
-    assert float(edge_error(torch.full_like(difference, 5.0), known)) == 0
+    torch.testing.assert_close(
+        gradient_error(difference + 3, known), gradient_error(difference, known)
+    )
+    assert float(gradient_error(torch.full_like(difference, 5.0), known)) == 0
 
 
 def test_gradients_are_right_and_nothing_comes_from_hidden_pixels() -> None:
@@ -50,18 +57,18 @@ def test_gradients_are_right_and_nothing_comes_from_hidden_pixels() -> None:
     known = torch.rand(1, 6, 5, generator=generator) < 0.6
     difference[~known] = torch.nan
     difference.requires_grad_()
-    edge_error(difference, known).sum().backward()
+    gradient_error(difference, known).sum().backward()
     assert bool((difference.grad[~known] == 0).all()) and bool(difference.grad.isfinite().all())
     whole = torch.ones_like(known)
     smooth = torch.randn(1, 6, 5, generator=generator, dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(lambda d: edge_error(d, whole), smooth)
+    assert torch.autograd.gradcheck(lambda d: gradient_error(d, whole), smooth)
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 def test_every_picture_has_its_median_where_asked(unit: float) -> None:
     depth = unit * (1 + torch.rand(3, 8, 8, dtype=torch.float64))
     depth[1, :3] = 0
-    scaled, known = own_scale(depth, 4.0)
+    scaled, known = rescale_median(depth, 4.0)
     for picture, mask in zip(scaled, known, strict=True):
         assert float(picture[mask].median()) == pytest.approx(4.0)
     assert not known[1, :3].any() and bool((scaled[1, :3] == 1).all())
@@ -71,6 +78,6 @@ def test_a_picture_with_next_to_no_depth_says_nothing() -> None:
     depth = torch.zeros(2, 8, 8)
     depth[0].view(-1)[: LEAST_PIXELS - 1] = 2.0
     depth[1, 0, 0] = torch.inf
-    scaled, known = own_scale(depth, 4.0)
+    scaled, known = rescale_median(depth, 4.0)
     assert not known.any() and bool((scaled == 1).all())
-    assert bool((edge_error(scaled.log(), known) == 0).all())
+    assert bool((gradient_error(scaled.log(), known) == 0).all())

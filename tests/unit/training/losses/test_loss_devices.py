@@ -6,12 +6,12 @@ import pytest
 import torch
 
 from diff4splat.metrics.features.load import load_features
-from diff4splat.training.losses.autoencoder import charbonnier, posterior_divergence
+from diff4splat.training.losses.autoencoder import charbonnier, kl_divergence
 from diff4splat.training.losses.depth import depth_correlation, depth_smoothness
 from diff4splat.training.losses.flow_matching import flow_matching
-from diff4splat.training.losses.level_draws import LevelDraw, draw_levels
 from diff4splat.training.losses.motion import track_motion
 from diff4splat.training.losses.photometric import perceptual_error, squared_error
+from diff4splat.training.losses.timestep_sampling import LevelDistribution, sample_levels
 
 LOSSES: dict[str, Callable[[torch.Tensor, torch.Tensor], torch.Tensor]] = {
     "flow": lambda own, true: flow_matching(own, true, true, first_frame_is_clean=True),
@@ -20,7 +20,7 @@ LOSSES: dict[str, Callable[[torch.Tensor, torch.Tensor], torch.Tensor]] = {
     "depth": lambda own, true: depth_correlation(own[..., 0], true[..., 0]),
     "smoothness": lambda own, true: depth_smoothness(own[..., 0]),
     "motion": track_motion,
-    "divergence": posterior_divergence,
+    "divergence": kl_divergence,
     "charbonnier": charbonnier,
 }
 
@@ -37,5 +37,5 @@ def test_losses_stay_on_their_device(name: str) -> None:
 
 def test_levels_stay_on_their_device() -> None:
     uniform = torch.empty(3, device="meta")
-    levels = draw_levels(uniform, LevelDraw(kind="logit_normal", shift=3.0))
+    levels = sample_levels(uniform, LevelDistribution(kind="logit_normal", shift=3.0))
     assert levels.device.type == "meta"

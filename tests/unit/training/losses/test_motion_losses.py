@@ -17,7 +17,7 @@ F64 = torch.float64
 def test_motion_against_loops(weights: tuple[float, float]) -> None:
     predicted, truth = torch.randn(2, 2, 3, 4, 3, dtype=F64)
     valid = torch.rand(2, 3, 4) < 0.7
-    loss = track_motion(predicted, truth, valid, distance_weight=weights[0], size_weight=weights[1])
+    loss = track_motion(predicted, truth, valid, distance_weight=weights[0], l1_weight=weights[1])
     expected = [
         oracle.motion(predicted[b].numpy(), truth[b].numpy(), valid[b].numpy(), *weights)
         for b in range(2)
@@ -50,9 +50,9 @@ def test_standing_still_as_it_should_has_no_gradient() -> None:
 
 def test_the_size_term_pulls_to_standstill_and_can_be_switched_off() -> None:
     truth = torch.tensor([[[1.0, 0.0, 0.0]]])
-    for size_weight, expected in ((1.0, [1.0, 0.0, 0.0]), (0.0, [0.0, 0.0, 0.0])):
+    for l1_weight, expected in ((1.0, [1.0, 0.0, 0.0]), (0.0, [0.0, 0.0, 0.0])):
         predicted = truth.clone().requires_grad_()
-        track_motion(predicted, truth, size_weight=size_weight).sum().backward()
+        track_motion(predicted, truth, l1_weight=l1_weight).sum().backward()
         assert predicted.grad[0, 0].tolist() == expected
 
 
@@ -98,14 +98,14 @@ def test_a_width_rounds_the_distance_off_near_zero() -> None:
     truth = torch.zeros(1, 3, 3, dtype=torch.float64)
     predicted = torch.tensor([[[0.0, 0, 0], [0.3, 0.4, 0], [30.0, 40, 0]]], dtype=torch.float64)
     want = sum(math.hypot(d, 1.2) - 1.2 for d in (0.0, 0.5, 50.0)) / 3
-    loss = track_motion(predicted, truth, distance_weight=1.0, size_weight=0.0, width=1.2)
+    loss = track_motion(predicted, truth, distance_weight=1.0, l1_weight=0.0, huber_delta=1.2)
     torch.testing.assert_close(loss, torch.tensor([want], dtype=torch.float64))
 
 
 def test_a_width_has_the_right_gradient_and_none_where_both_agree() -> None:
     truth = torch.rand(1, 4, 3, dtype=torch.float64)
     predicted = (truth + 0.3).requires_grad_()
-    assert torch.autograd.gradcheck(lambda p: track_motion(p, truth, width=0.2), predicted)
+    assert torch.autograd.gradcheck(lambda p: track_motion(p, truth, huber_delta=0.2), predicted)
     same = truth.clone().requires_grad_()
-    track_motion(same, truth, size_weight=0.0, width=0.2).sum().backward()
+    track_motion(same, truth, l1_weight=0.0, huber_delta=0.2).sum().backward()
     assert not same.grad.any()

@@ -7,17 +7,22 @@ import torch
 from stage_fixtures import STAGES, make_batch, make_stage, shake_heads, stage_recipe
 
 from diff4splat.errors import ConfigError
+from diff4splat.training.recipe.losses import (
+    DynamicLosses,
+    MotionLosses,
+    ReconstructionLosses,
+)
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.panels import motion_rows
-from diff4splat.training.trainer.parallel import StageModule
-from diff4splat.training.trainer.samples import replacement
+from diff4splat.training.stages.previews import motion_rows
+from diff4splat.training.trainer.distributed.parallel import StageModule
+from diff4splat.training.trainer.loading.samples import replacement
 
 EXPECTED_TERMS = {
-    "vae": {"pixels", "perceptual", "divergence"},
+    "vae": {"photometric", "perceptual", "kl"},
     "static-low": {"photometric", "perceptual", "depth", "smoothness"},
     "static-high": {"photometric", "perceptual", "depth", "smoothness"},
     "dynamic": {"photometric", "perceptual", "depth", "smoothness", "motion"},
-    "generator": {"flow"},
+    "video_diffusion": {"flow"},
     "joint": {"flow", "photometric", "perceptual", "depth", "smoothness", "motion"},
 }
 
@@ -45,7 +50,7 @@ def test_gradients_are_finite_and_reach_exactly_the_trained_parts(name: str) -> 
         assert all(bool(torch.isfinite(gradient).all()) for gradient in present), part
 
 
-@pytest.mark.parametrize("name", ["dynamic", "joint", "generator"])
+@pytest.mark.parametrize("name", ["dynamic", "joint", "video_diffusion"])
 def test_samples_do_not_know_of_their_neighbours_in_a_batch(name: str) -> None:
     recipe = stage_recipe(name)
     stage = make_stage(recipe)
@@ -55,7 +60,7 @@ def test_samples_do_not_know_of_their_neighbours_in_a_batch(name: str) -> None:
     torch.testing.assert_close(both, alone, rtol=1e-4, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["vae", "generator", "joint"])
+@pytest.mark.parametrize("name", ["vae", "video_diffusion", "joint"])
 def test_draws_depend_on_the_sample_and_the_seed_alone(name: str) -> None:
     recipe = stage_recipe(name)
     batch = make_batch(recipe)
@@ -82,7 +87,12 @@ def test_frozen_parts_stay_in_eval() -> None:
     [("perceptual", "perceptual"), ("depth", "depth"), ("motion", "motion")],
 )
 def test_a_weight_of_zero_leaves_the_term_out(weight: str, term: str) -> None:
-    recipe = stage_recipe("dynamic", **{weight: 0.0})
+    losses = DynamicLosses()
+    if weight == "motion":
+        losses = replace(losses, motion=MotionLosses(weight=0.0))
+    else:
+        losses = replace(losses, reconstruction=ReconstructionLosses(**{weight: 0.0}))
+    recipe = replace(stage_recipe("dynamic"), losses=losses)
     stage = make_stage(recipe)
     assert term not in stage(make_batch(recipe))
     if term == "perceptual":
@@ -90,9 +100,8 @@ def test_a_weight_of_zero_leaves_the_term_out(weight: str, term: str) -> None:
 
 
 def test_the_total_is_the_weighted_sum() -> None:
-    recipe = stage_recipe(
-        "dynamic", photometric=0.7, perceptual=0.3, depth=0.2, smoothness=5.0, motion=1.5
-    )
+    weights = ReconstructionLosses(photometric=0.7, perceptual=0.3, depth=0.2, smoothness=5.0)
+    recipe = stage_recipe("dynamic", reconstruction=weights, motion=MotionLosses(weight=1.5))
     stage = make_stage(recipe)
     shake_heads(stage)
     terms = stage(make_batch(recipe))
@@ -109,11 +118,11 @@ def test_time_alone_moves_nothing_that_is_untrained() -> None:
     batch = make_batch(recipe, static=True)
     stage = make_stage(recipe)
     with torch.no_grad():
-        rendered = stage.render(batch, stage.encode(batch))
+        _, rendered = stage.predict(batch)
     assert float(rendered.offsets.abs().max()) == 0
     with torch.no_grad():
         early = replace(batch, target_time=batch.target_time * 0)
-        later = stage.render(early, stage.encode(early))
+        _, later = stage.predict(early)
     assert torch.equal(rendered.rgb, later.rgb)
 
 
@@ -164,7 +173,7 @@ def test_parts_that_a_stage_does_not_run_cannot_be_trained() -> None:
 
 
 def test_text_is_left_out_for_whole_steps_at_the_asked_rate() -> None:
-    recipe = replace(stage_recipe("generator"), text_dropout=0.5, global_batch=2)
+    recipe = replace(stage_recipe("video_diffusion"), text_dropout=0.5, global_batch=2)
     stage = make_stage(recipe)
     StageModule(stage, torch.device("cpu"), "float32").set_training(True)
     dropped = []
@@ -179,16 +188,16 @@ def test_text_is_left_out_for_whole_steps_at_the_asked_rate() -> None:
 
 
 def test_text_is_never_left_out_while_a_stage_is_judged() -> None:
-    stage = make_stage(replace(stage_recipe("generator"), text_dropout=1.0))
+    stage = make_stage(replace(stage_recipe("video_diffusion"), text_dropout=1.0))
     StageModule(stage, torch.device("cpu"), "float32").set_training(False)
     calls = []
     stage.text_encoder.register_forward_hook(lambda *_: calls.append(1))
-    stage(make_batch(stage_recipe("generator")))
+    stage(make_batch(stage_recipe("video_diffusion")))
     assert calls and not stage.dit.training
 
 
 def test_all_samples_of_a_step_leave_text_out_together_though_some_were_replaced() -> None:
-    stage = make_stage(replace(stage_recipe("generator"), global_batch=2))
+    stage = make_stage(replace(stage_recipe("video_diffusion"), global_batch=2))
     batch = make_batch(stage.plan.recipe)
     for step in range(4):
         same = [
@@ -196,12 +205,12 @@ def test_all_samples_of_a_step_leave_text_out_together_though_some_were_replaced
             for place in (0, 1)
             for attempt in (0, 1)
         ]
-        seeds = {stage.draw_for_step(one, "text").initial_seed() for one in same}
+        seeds = {stage.random.per_step(one, "text").initial_seed() for one in same}
         assert len(seeds) == 1
 
 
 def test_clips_without_a_caption_run_the_same_networks() -> None:
-    recipe = replace(stage_recipe("generator"), text_dropout=0.0)
+    recipe = replace(stage_recipe("video_diffusion"), text_dropout=0.0)
     stage, batch = make_stage(recipe), make_batch(recipe)
     calls = []
     stage.text_encoder.register_forward_hook(lambda *_: calls.append(1))

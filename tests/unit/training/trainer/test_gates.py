@@ -6,7 +6,7 @@ import pytest
 from toy_training import Toy
 
 from diff4splat.errors import ConfigError, FileFormatError
-from diff4splat.training.recipe import Gate
+from diff4splat.training.recipe.stage import Gate
 from diff4splat.training.trainer.gates import (
     StoredResult,
     read_result,

@@ -1,0 +1,1 @@
+"""Captures of synchronised camera rigs with LLFF poses, such as Neu3D."""

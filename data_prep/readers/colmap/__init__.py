@@ -1,0 +1,1 @@
+"""Captures in COLMAP models: text and binary files, rigs and videos."""

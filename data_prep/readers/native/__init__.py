@@ -1,0 +1,1 @@
+"""Captures in the formats of this library: clip folders and camera.json."""

@@ -1,0 +1,1 @@
+"""Captures in the layout of Nerfies and HyperNeRF."""

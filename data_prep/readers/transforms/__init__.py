@@ -1,0 +1,1 @@
+"""Captures in transforms.json files: nerfstudio and D-NeRF."""

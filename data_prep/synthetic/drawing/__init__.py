@@ -1,1 +1,0 @@
-"""Drawing procedural worlds: pictures with exact depth, masks, flow and tracks, on one core."""

@@ -1,0 +1,1 @@
+"""Renderer of procedural worlds: images, depth, instances, flow and tracks from triangles."""

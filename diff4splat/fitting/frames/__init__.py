@@ -1,0 +1,1 @@
+"""Frames of a capture: loading, scheduling, unprojection and rendering."""

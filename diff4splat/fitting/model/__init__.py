@@ -1,0 +1,1 @@
+"""The fitted scene: raw parameters, initialisation, density control and static detection."""

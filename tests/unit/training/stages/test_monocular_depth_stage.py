@@ -1,0 +1,118 @@
+"""The stage in which single pictures tell their depth."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from depth_stages import MODEL, depth_recipe, with_sky
+from stage_fixtures import make_batch, make_stage, shake_heads
+
+from diff4splat.errors import ConfigError
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.kinds.monocular_depth import SKY_DEPTH, depth_images
+
+
+def test_every_key_frame_and_target_is_a_picture() -> None:
+    recipe = depth_recipe()
+    batch = with_sky(make_batch(recipe, (0, 1)))
+    shown = depth_images(batch)
+    each = batch.depth.shape[1] + batch.target_rgb[0, :, :, 0, 0, 0].numel()
+    assert len(shown.rgb) == len(shown.depth) == 2 * each
+    assert not shown.known[:, :8].any() and bool((shown.depth[:, :8] == 1).all())
+    for depth, known in zip(shown.depth, shown.known, strict=True):
+        assert float(depth[known].median()) == pytest.approx(PLANE_DEPTH, rel=1e-5)
+    first = batch.video[1, 0].movedim(-1, 0) / 255
+    torch.testing.assert_close(shown.rgb[each], first.float())
+
+
+def test_terms_are_finite_and_only_the_pictures_depth_learns() -> None:
+    recipe = depth_recipe()
+    stage = make_stage(recipe, model=MODEL)
+    shake_heads(stage)
+    terms = stage(with_sky(make_batch(recipe, (0, 1))))
+    assert set(terms) == {"depth_log", "depth_gradient", "inverse_depth", "sky_margin", TOTAL}
+    assert all(term.shape == (2,) and bool(term.isfinite().all()) for term in terms.values())
+    terms[TOTAL].sum().backward()
+    learnt = {name for name, p in stage.named_parameters() if p.grad is not None}
+    assert learnt and all(name.startswith("ldrm.detail.picture_depth.") for name in learnt)
+
+
+def test_the_total_is_the_weighted_sum() -> None:
+    recipe = depth_recipe(depth_log=2.0, depth_gradient=3.0, inverse_depth=7.0, sky_margin=5.0)
+    terms = make_stage(recipe, model=MODEL)(with_sky(make_batch(recipe, (0,))))
+    wanted = 2 * terms["depth_log"] + 3 * terms["depth_gradient"] + 5 * terms["sky_margin"]
+    torch.testing.assert_close(terms[TOTAL], wanted + 7 * terms["inverse_depth"])
+
+
+def test_the_shift_is_that_of_inverse_depths_where_they_are_known() -> None:
+    recipe = depth_recipe()
+    batch = with_sky(make_batch(recipe, (0,)))
+    shown = depth_images(batch)
+    # A fresh network puts everything on the plane.
+    off = (1 - PLANE_DEPTH / shown.depth).abs()
+    wanted = torch.stack([one[known].mean() for one, known in zip(off, shown.known, strict=True)])
+    found = make_stage(recipe, model=MODEL)(batch)["inverse_depth"]
+    torch.testing.assert_close(found, wanted.mean()[None])
+
+
+def test_sky_that_is_far_enough_costs_nothing() -> None:
+    recipe = depth_recipe()
+    stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0,)))
+    near = float(stage(batch)["sky_margin"].detach())
+    assert near == pytest.approx(float(torch.tensor(SKY_DEPTH / PLANE_DEPTH).log()), rel=1e-4)
+    with torch.no_grad():
+        stage.ldrm.detail.picture_depth.head.bias += 10
+    assert float(stage(batch)["sky_margin"].detach()) == 0
+
+
+def test_without_any_depth_there_is_nothing_to_learn_but_sky() -> None:
+    recipe = depth_recipe()
+    batch = make_batch(recipe, (0,))
+    empty = replace(
+        batch,
+        depth=torch.zeros_like(batch.depth),
+        target_depth=torch.zeros_like(batch.target_depth),
+    )
+    stage = make_stage(recipe, model=MODEL)
+    terms = {name: float(term.detach()) for name, term in stage(empty).items()}
+    assert terms["depth_log"] == terms["depth_gradient"] == terms["inverse_depth"] == 0
+    assert terms["sky_margin"] > 0
+    measures = stage.eval().measure(empty)
+    assert bool(measures["depth_error"].isnan()) and bool(measures["depth_correlation"].isnan())
+
+
+def test_light_is_drawn_anew_for_every_picture_and_alike_every_time() -> None:
+    recipe = depth_recipe()
+    stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe, (0, 1))
+    count = len(depth_images(batch).rgb)
+    rgb = torch.rand(1, 3, 8, 8).expand(count, -1, -1, -1)
+    lit = stage._random_colors(rgb, batch)
+    assert torch.equal(lit, stage._random_colors(rgb, batch))
+    assert float(lit.min()) >= 0 and float(lit.max()) <= 1
+    assert len(lit.flatten(1).unique(dim=0)) == count
+
+
+def test_a_step_learns_and_a_panel_shows_it() -> None:
+    recipe = depth_recipe()
+    stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0, 1)))
+    optimizer = torch.optim.Adam(stage.ldrm.detail.picture_depth.parameters(), 1e-2)
+    losses = []
+    for _ in range(12):
+        optimizer.zero_grad()
+        loss = stage(batch)[TOTAL].mean()
+        loss.backward()
+        optimizer.step()
+        losses.append(float(loss.detach()))
+    assert losses[-1] < 0.9 * losses[0]
+    shown = stage.eval().panel(batch)
+    assert bool(shown.isfinite().all()) and shown.shape[-1] == 3
+    assert set(stage.measure(batch)) == {"depth_error", "depth_correlation"}
+
+
+@pytest.mark.parametrize("missing", ["width", "picture_width"])
+def test_a_recipe_without_the_network_is_refused(missing: str) -> None:
+    without = replace(MODEL, detail=replace(MODEL.detail, **{missing: 0}))
+    with pytest.raises(ConfigError, match="picture_width: expected a depth network for its kind"):
+        Recipe(name="test", seed=0, model=without, stages=(depth_recipe(),))

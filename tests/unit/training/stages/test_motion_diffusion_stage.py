@@ -1,0 +1,92 @@
+"""The stage that trains the motion network: what learns, the random flip, and what is measured."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
+
+from diff4splat.errors import ConfigError
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.recipe.losses import MotionDiffusionLosses
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.stage import TOTAL
+
+BASE = tiny_size()
+MODEL: ModelConfig = replace(BASE, dit=replace(BASE.dit, motion=True, motion_width=8))
+
+
+def motion_recipe() -> StageRecipe:
+    return replace(
+        stage_recipe("video_diffusion"),
+        name="motion_diffusion",
+        kind="motion_diffusion",
+        trained=("dit",),
+        losses=MotionDiffusionLosses(motion_mask=0.5),
+    )
+
+
+def moving_batch(recipe: StageRecipe, indices: tuple[int, ...] = (0, 1)) -> ClipBatch:
+    """Clips of which one half moves to the right."""
+    batch = make_batch(recipe, indices)
+    field, moving = torch.zeros_like(batch.field), torch.zeros_like(batch.moving)
+    field[:, 0, 1:] = 2.0
+    field[:, 1, 1:, :, : field.shape[-1] // 2] = 1.0
+    moving[:, :, : moving.shape[-1] // 2] = True
+    return replace(batch, field=field, moving=moving)
+
+
+def test_terms_and_gradients_are_finite_and_only_the_motion_network_learns() -> None:
+    recipe = motion_recipe()
+    stage = make_stage(recipe, model=MODEL)
+    shake_heads(stage)
+    terms = stage(moving_batch(recipe))
+    assert set(terms) == {"flow", "motion_mask", TOTAL}
+    terms[TOTAL].sum().backward()
+    gradients = {name: p.grad for name, p in stage.named_parameters() if p.grad is not None}
+    assert gradients and all(name.startswith("dit.motion_branch.") for name in gradients)
+    assert all(bool(gradient.isfinite().all()) for gradient in gradients.values())
+
+
+def test_a_flip_changes_pictures_motion_and_captions_together() -> None:
+    recipe = motion_recipe()
+    stage = make_stage(recipe, model=MODEL)
+    batch = moving_batch(recipe, tuple(range(8)))
+    batch = replace(batch, captions=("a red ball rolls to the left",) * 8)
+    seen = stage.randomly_flipped(batch)
+    turned = [caption.endswith("right") for caption in seen.captions]
+    assert 0 < sum(turned) < 8
+    for index, other in enumerate(turned):
+        video = batch.video[index].flip(-2) if other else batch.video[index]
+        assert torch.equal(seen.video[index], video)
+        sign = -1 if other else 1
+        assert float(seen.field[index, 0].sum()) == sign * float(batch.field[index, 0].sum())
+        columns = seen.field[index, 1].abs().sum((0, 1)) > 0
+        assert bool(columns[-1]) == bool(seen.moving[index, :, -1].all()) == other
+
+
+def test_an_untrained_network_predicts_no_motion() -> None:
+    recipe = motion_recipe()
+    stage = make_stage(recipe, model=MODEL).eval()
+    batch = moving_batch(recipe)
+    torch.testing.assert_close(stage.measure(batch)["motion_share"], torch.ones(2))
+    still = replace(batch, field=torch.zeros_like(batch.field))
+    assert bool(stage.measure(still)["motion_share"].isnan().all())
+
+
+def test_panels_and_measures() -> None:
+    recipe = motion_recipe()
+    stage = make_stage(recipe, model=MODEL).eval()
+    batch = moving_batch(recipe)
+    picture = stage.panel(batch)
+    assert picture.ndim == 3 and bool(picture.isfinite().all())
+    assert set(stage.measure(batch)) == {"flow_error", "motion_share"}
+
+
+def test_the_kind_needs_a_motion_network() -> None:
+    without = replace(MODEL, dit=replace(MODEL.dit, motion_width=0))
+    with pytest.raises(ConfigError, match="motion_width: expected a motion network"):
+        Recipe(name="x", seed=0, model=without, stages=(motion_recipe(),))

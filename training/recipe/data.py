@@ -1,0 +1,90 @@
+"""Which clips a stage reads, and what one sample looks like."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.training.recipe.checks import require
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceSettings:
+    """One source of clips in the mixture."""
+
+    kind: Literal["worlds", "shards", "latents"] = "worlds"
+    """Rendered during training, shards of clips, or encoded latents (video diffusion only)."""
+    folder: str = ""
+    """Folder of the shards or latents."""
+    split: Literal["training", "held_out"] = "training"
+    still_share: float = 0.25
+    """Share of clips in which nothing moves."""
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(0 <= self.still_share <= 1, "source.still_share", "0 to 1", self.still_share)
+        require(0 <= self.weight < math.inf, "source.weight", "at least 0", self.weight)
+        named = self.kind == "worlds" or self.folder != ""
+        require(named, "source.folder", "the folder of the shards or latents", "none")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataSettings:
+    """What one sample looks like."""
+
+    sources: tuple[SourceSettings, ...] = (SourceSettings(),)
+    size_px: tuple[int, int] = (128, 128)
+    frames: int = 17
+    """Frames of the input video."""
+    input_stride: int = 1
+    """Clip frames per input frame; frames between input frames are targets at unseen times."""
+    augment: bool = False
+    """Swapped input views, mirrored and time-reversed clips; only for stages without text."""
+    crop_px: tuple[int, int] = (0, 0)
+    """Random crop (height, width) of images of ``size_px``; 0 takes the whole image."""
+    views: int = 3
+    """Cameras per clip; the first is the input."""
+    target_frames: int = 4
+    """Supervised (view, time) pairs per sample and step."""
+    tracks: int = 512
+    """Tracked points per clip."""
+    supervise_motion: bool = True
+    """False takes all targets of moving clips from their first frame, for static stages."""
+    keyframes_only: bool = False
+    """Clips hold only the first frame and the last frame of each latent frame, which render
+    faster; the motion network needs no other."""
+    keyframe_stride: int = 1
+    """Input frames from one keyframe to the next; tracked points start at keyframes."""
+    workers: int = 1
+    """Worker processes; 0 prepares samples in the training process."""
+    in_memory: bool = False
+    """Decode each clip of a shard once and keep it in memory, in every worker process."""
+    min_valid_depth: float = 0.01
+    """Least share of pixels with depth in the input view; other clips are skipped and counted
+    (MoVieS)."""
+
+    def __post_init__(self) -> None:
+        weight = sum(source.weight for source in self.sources)
+        require(weight > 0, "data.sources", "some with a weight above 0", f"{len(self.sources)}")
+        for name in ("frames", "input_stride", "keyframe_stride", "views", "target_frames"):
+            value = getattr(self, name)
+            require(value >= 1, f"data.{name}", "at least 1", value)
+        for name in ("tracks", "workers"):
+            value = getattr(self, name)
+            require(value >= 0, f"data.{name}", "at least 0", value)
+        require(min(self.size_px) >= 8, "data.size_px", "sides of at least 8", self.size_px)
+        cuts = zip(self.crop_px, self.size_px, strict=True)
+        fits = max(self.crop_px) == 0 or all(0 < part <= whole for part, whole in cuts)
+        require(fits, "data.crop_px", "0, or sides that size_px has room for", self.crop_px)
+        share = self.min_valid_depth
+        require(0 <= share <= 1, "data.min_valid_depth", "0 to 1", share)
+
+    @property
+    def clip_frames(self) -> int:
+        """Frames of a clip from the first input frame to the last."""
+        return 1 + (self.frames - 1) * self.input_stride // self.keyframe_spacing
+
+    @property
+    def keyframe_spacing(self) -> int:
+        """Frames of the full clip between two frames that samples hold."""
+        return TIME_STRIDE * self.input_stride if self.keyframes_only else 1

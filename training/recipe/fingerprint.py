@@ -1,0 +1,51 @@
+"""The fingerprint of a stage: what decides its weights, as twelve hexadecimal digits."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_to_dict
+
+
+def fingerprint(recipe: Recipe, stage: str, features: str = "") -> str:
+    """Fingerprint of one stage; ``features`` names the perceptual features.
+
+    How a run is carried out (``trainer``, micro batches, worker processes, folders of shards) does
+    not count, and other stages do not count either.
+
+    Raises:
+        ConfigError: the recipe has no such stage.
+    """
+    recipe.stage(stage)
+    return fingerprint_of(recipe_to_dict(recipe), stage, features)
+
+
+def fingerprint_of(recipe: Mapping[str, Any], stage: str, features: str) -> str:
+    """The same of a recipe as plain values, of any version."""
+    (found,) = (one for one in recipe["stages"] if one["name"] == stage)
+    facts = {"seed": recipe["seed"], "model": recipe["model"], "stage": decisive(found)}
+    if _uses_features(found["losses"]):
+        facts["features"] = features
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def decisive(stage: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a stage's recipe that decide its weights."""
+    data = {key: value for key, value in stage["data"].items() if key not in _NOT_DECISIVE}
+    data["sources"] = [
+        {key: value for key, value in source.items() if key != "folder"}
+        for source in data["sources"]
+    ]
+    kept = {key: value for key, value in stage.items() if key != "micro_batch"}
+    return kept | {"data": data}
+
+
+_NOT_DECISIVE = ("workers", "in_memory")
+
+
+def _uses_features(losses: Mapping[str, Any]) -> bool:
+    """Whether a perceptual term counts, at any depth."""
+    nested = [value for value in losses.values() if isinstance(value, Mapping)]
+    return bool(losses.get("perceptual")) or any(map(_uses_features, nested))

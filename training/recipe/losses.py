@@ -1,0 +1,140 @@
+"""Weights of the loss terms, one class per kind of stage; 0 leaves a term's computation out.
+
+"paper" is Diff4Splat (arXiv 2511.00503) §3 and appendix; "MoVieS" is its sibling's public code;
+"ours" is a choice made here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from diff4splat.training.recipe.kinds import StageKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutoencoderLosses:
+    """Of the video autoencoder."""
+
+    photometric: float = 1.0
+    """Charbonnier error of the decoded video."""
+    perceptual: float = 0.5
+    """LPIPS of the decoded frames."""
+    kl: float = 1e-4
+    """KL divergence of the posterior from N(0, 1) (ours; latent diffusion uses 1e-6 on sums)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReconstructionLosses:
+    """Of rendered images and depth."""
+
+    photometric: float = 1.0
+    """λ_photo (paper)."""
+    perceptual: float = 0.5
+    """λ_p, LPIPS beside the squared error, inside the photometric loss (paper)."""
+    depth: float = 0.5
+    """λ_geo, 1 − Pearson on rendered depth (paper)."""
+    depth_log: float = 0.0
+    """|log depth − log truth| of the Gaussians at their input pixels (after MoVieS)."""
+    smoothness: float = 0.1
+    """Total variation of rendered depth, inside L_geo; its weight is not in the paper (ours)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionLosses:
+    """Of the displacement of tracked points."""
+
+    weight: float = 2.0
+    """λ_motion (paper)."""
+    distance: float = 2.0
+    """λ_m: distance between predicted and true displacement (paper)."""
+    displacement_l1: float = 1.0
+    """L1 norm of the predicted displacement (paper; pulls every point towards zero motion)."""
+    huber_delta: float = 0.0
+    """Distance, in model units, below which the loss is quadratic (ours); 0 is the paper."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DynamicLosses:
+    """Of rendered images at any time, and of displacements."""
+
+    reconstruction: ReconstructionLosses = field(default_factory=ReconstructionLosses)
+    motion: MotionLosses = field(default_factory=MotionLosses)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthLosses:
+    """Of the depth of single images."""
+
+    depth_log: float = 1.0
+    """|log depth − log truth|."""
+    depth_gradient: float = 0.5
+    """|∇ (log depth − log truth)| at several scales (after MiDaS)."""
+    inverse_depth: float = 1.0
+    """|1 / depth − 1 / truth| in units of one over the plane's depth (ours): how far a pixel is
+    from its true position after the camera translates."""
+    sky_margin: float = 0.2
+    """How much nearer than the sky the depth is at pixels without truth (ours): for data in which
+    only the sky has no depth."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowLosses:
+    """Of the velocity of the video diffusion model."""
+
+    flow: float = 1.0
+    """Flow matching (paper)."""
+    min_level_weighting: float = 0.0
+    """Velocity errors at levels below count as if they were made at this level (ours); 0 is the
+    paper. A network that predicts clean latents would otherwise learn small levels alone."""
+    hidden_weight: float = 1.0
+    """Weight of a latent cell that the first frame hides, where a shown one has 1 (ours)."""
+    channel_power_exponent: float = 0.0
+    """Weight of a latent channel: its share of image power to this exponent (ours); 0 is the
+    paper."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionDiffusionLosses:
+    """Of the velocity and the mask of the motion network."""
+
+    flow: float = 1.0
+    """Flow matching."""
+    min_level_weighting: float = 0.0
+    """As in ``FlowLosses``."""
+    motion_mask: float = 0.0
+    """Cross-entropy of the motion mask (ours): most pixels are static, so a squared error alone
+    learns the moving ones slowly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLosses:
+    """Of the video diffusion model and the reconstruction together."""
+
+    flow: FlowLosses = field(default_factory=FlowLosses)
+    reconstruction: ReconstructionLosses = field(default_factory=ReconstructionLosses)
+    motion: MotionLosses = field(default_factory=MotionLosses)
+
+
+Losses = (
+    AutoencoderLosses
+    | ReconstructionLosses
+    | MotionLosses
+    | DynamicLosses
+    | DepthLosses
+    | FlowLosses
+    | MotionDiffusionLosses
+    | JointLosses
+)
+LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
+    {
+        "vae": AutoencoderLosses,
+        "posed_video_pretrain": ReconstructionLosses,
+        "static": ReconstructionLosses,
+        "motion": MotionLosses,
+        "dynamic": DynamicLosses,
+        "monocular_depth": DepthLosses,
+        "motion_diffusion": MotionDiffusionLosses,
+        "video_diffusion": FlowLosses,
+        "joint": JointLosses,
+    }
+)

@@ -1,0 +1,46 @@
+"""What a stage requires of the model that it trains, and of its data.
+
+All that recipes ask of a model configuration is here.
+"""
+
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.training.recipe.checks import require
+from diff4splat.training.recipe.kinds import CAPTION_KINDS, RECONSTRUCTION_KINDS
+from diff4splat.training.recipe.stage import StageRecipe
+
+
+def require_fit(stage: StageRecipe, model: ModelConfig) -> None:
+    """Refuse a stage that the model or its own data do not allow.
+
+    Raises:
+        ConfigError: with the key to correct.
+    """
+    _require_networks(stage, model)
+    _require_data(stage, model)
+
+
+def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
+    what, refines = f"stage {stage.name}", model.refinement.used
+    fits = stage.kind != "posed_video_pretrain" or (refines and stage.use_ground_truth_frames)
+    expected = "a refinement decoder (model.refinement) and use_ground_truth_frames for its kind"
+    require(fits, what, expected, "one or neither")
+    fits = stage.kind != "motion_diffusion" or model.motion_unet.used
+    require(fits, f"{what}: model.motion_unet.width", "a motion network for its kind", 0)
+    fits = stage.kind != "monocular_depth" or model.monocular_depth.used
+    require(fits, f"{what}: model.monocular_depth.channels", "a depth network for its kind", 0)
+
+
+def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
+    what, data = f"stage {stage.name}: data", stage.data
+    encoded = any(source.kind == "latents" for source in data.sources)
+    fits = not encoded or stage.kind == "video_diffusion"
+    require(fits, f"{what}.sources", "latents for a video_diffusion stage alone", stage.kind)
+    fits = not (data.augment and stage.kind in CAPTION_KINDS)
+    require(fits, f"{what}.augment", "false where captions are read", "true")
+    fits = not data.keyframes_only or stage.kind == "motion_diffusion"
+    require(fits, f"{what}.keyframes_only", "false but for a motion_diffusion stage", "true")
+    keyframed = model.refinement.used and stage.kind in RECONSTRUCTION_KINDS
+    fits, stride = not keyframed or data.keyframe_stride == TIME_STRIDE, data.keyframe_stride
+    expected = f"{TIME_STRIDE} with a refinement decoder"
+    require(fits, f"{what}.keyframe_stride", expected, stride)

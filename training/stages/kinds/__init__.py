@@ -1,0 +1,1 @@
+"""One module per kind of stage, named as the kind is."""

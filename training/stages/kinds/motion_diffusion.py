@@ -1,0 +1,139 @@
+"""The motion network: flow matching on the true motion of a first image.
+
+    first image ───────────────────────────────────┐
+    captions ─ text encoder (frozen) ──────────────┤
+    motion ─ (1 − level) clean + level noise ─ motion network ─ clean motion ─ velocity ─ loss
+
+No other network of the video model runs or learns.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from diff4splat.flow.path import add_noise, velocity_from_clean
+from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.factory import Networks
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.batches.random_flip import flip_samples
+from diff4splat.training.losses.flow_matching import flow_matching
+from diff4splat.training.losses.timestep_sampling import (
+    LevelDistribution,
+    min_level_weights,
+    sample_levels,
+)
+from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
+from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
+from diff4splat.training.stages.previews import motion_preview
+from diff4splat.training.stages.text_conditioning import TextConditioning
+from diff4splat.training.stages.video_flow import EVAL_LEVELS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoisyMotion:
+    """A point on the path between a true motion, without its first frame, and noise."""
+
+    clean: Float[Tensor, "b 3 t1 hc wc"]
+    noise: Float[Tensor, "b 3 t1 hc wc"]
+    level: Float[Tensor, " b"]
+
+    @property
+    def motion(self) -> Float[Tensor, "b 3 t1 hc wc"]:
+        """Input of the network."""
+        return add_noise(self.clean, self.noise, self.level)
+
+    def error(
+        self, clean: Float[Tensor, "b 3 t1 hc wc"], weights: Float[Tensor, " b"] | None = None
+    ) -> Float[Tensor, " b"]:
+        """Mean squared error of the velocity that a predicted clean motion implies."""
+        level = self.level[:, None, None, None, None]
+        velocity = velocity_from_clean(self.motion, clean, level)
+        return flow_matching(velocity, self.clean, self.noise, weights=weights)
+
+
+class MotionDiffusionStage(ModelStage):
+    """The motion network alone."""
+
+    parts = ("text_encoder", "motion_unet")
+
+    def __init__(self, networks: Networks, plan: StagePlan) -> None:
+        super().__init__(networks, plan)
+        self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
+
+    def forward(self, batch: ClipBatch) -> Terms:
+        """The terms ``flow`` and ``motion_mask``."""
+        batch, losses = self.randomly_flipped(batch), self.plan.recipe.losses
+        uniform = self.random.uniform(batch, "level")
+        level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
+        noisy = self._noisy(batch, level.to(batch.field), "noise")
+        clean, logits = self.motion_unet.predict_motion_and_mask(*self._inputs(batch, noisy))
+        weights = min_level_weights(noisy.level, losses.min_level_weighting)
+        return weighted_sum(
+            [
+                LossTerm(
+                    name="flow", weight=losses.flow, compute=lambda: noisy.error(clean, weights)
+                ),
+                LossTerm(
+                    name="motion_mask",
+                    weight=losses.motion_mask,
+                    compute=lambda: _mask_error(logits, batch.moving),
+                ),
+            ]
+        )
+
+    def randomly_flipped(self, batch: ClipBatch) -> ClipBatch:
+        """Half of the samples mirrored."""
+        draws = self.random.per_sample(batch, "mirror")
+        return flip_samples(batch, [bool(torch.rand((), generator=own) < 0.5) for own in draws])
+
+    @torch.no_grad()
+    def measure(self, batch: ClipBatch) -> Terms:
+        """``flow_error`` over fixed levels, and ``motion_share``.
+
+        ``motion_share`` is the squared error of the motion predicted from noise alone, over that of
+        no motion; NaN where nothing moves.
+        """
+        level = batch.field.new_ones(len(batch))
+        noisy = [self._noisy(batch, fixed * level, "judged") for fixed in EVAL_LEVELS]
+        errors = [one.error(self._clean(batch, one)) for one in noisy]
+        clean, predicted = batch.field[:, :, 1:], self._from_noise(batch)
+        static = clean.square().flatten(1).mean(1)
+        share = (predicted - clean).square().flatten(1).mean(1) / static
+        return {
+            "flow_error": torch.stack(errors).mean(0),
+            "motion_share": torch.where(static > 0, share, torch.nan),
+        }
+
+    @torch.no_grad()
+    def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
+        """First images, true motion, and the motion predicted from noise alone."""
+        return motion_preview(batch.field[:, :, 1:], self._from_noise(batch), batch)
+
+    def _noisy(self, batch: ClipBatch, level: Float[Tensor, " b"], purpose: str) -> NoisyMotion:
+        clean = batch.field[:, :, 1:]
+        noise = self.random.normal(batch, clean, purpose)
+        return NoisyMotion(clean=clean, noise=noise, level=level)
+
+    def _inputs(self, batch: ClipBatch, noisy: NoisyMotion) -> tuple[Tensor | None, ...]:
+        text, mask = self._text.encode_or_drop(batch, self.training)
+        rgb = unit_rgb(batch.video[:, 0]).movedim(-1, 1)
+        return rgb, noisy.motion, noisy.level, text, mask
+
+    def _clean(self, batch: ClipBatch, noisy: NoisyMotion) -> Float[Tensor, "b 3 t1 hc wc"]:
+        return self.motion_unet(*self._inputs(batch, noisy))
+
+    def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
+        """Clean motion in one step from noise."""
+        return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), "judged"))
+
+
+def _mask_error(
+    logits: Float[Tensor, "b h w"], moving: Bool[Tensor, "b h w"]
+) -> Float[Tensor, " b"]:
+    """Cross-entropy of the motion mask."""
+    error = torch.nn.functional.binary_cross_entropy_with_logits(
+        logits, moving.to(logits), reduction="none"
+    )
+    return error.flatten(1).mean(1)

@@ -1,0 +1,59 @@
+"""Captions for stages that read text: unchanged, paraphrased, or dropped.
+
+Text is dropped for whole steps, so that guidance has its unconditional branch and every process
+runs the same networks: processes with text would otherwise wait for those without.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from diff4splat.captions.paraphrase import paraphrase
+from diff4splat.models.text_encoder.encoder import tokenize
+from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.latents.latent_batch import LatentBatch
+from diff4splat.training.stages.model_stage import StagePlan
+
+DEFAULT_CAPTION = "a scene"
+"""Replaces missing captions, so that every process runs the text encoder."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextConditioning:
+    """Encoded captions of one stage."""
+
+    encoder: nn.Module
+    plan: StagePlan
+
+    def encode(
+        self, batch: ClipBatch | LatentBatch, training: bool
+    ) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
+        """States of the captions, and the mask of real tokens."""
+        captions = [caption or DEFAULT_CAPTION for caption in self._captions(batch, training)]
+        tokens, mask = tokenize(captions, self.plan.model.text.max_bytes)
+        device = batch.cameras.focal_px.device
+        tokens, mask = tokens.to(device), mask.to(device)
+        return self.encoder(tokens, mask), mask
+
+    def encode_or_drop(
+        self, batch: ClipBatch | LatentBatch, training: bool
+    ) -> tuple[Float[Tensor, "b s d"] | None, Bool[Tensor, "b s"] | None]:
+        """The same; None in steps without text."""
+        return (None, None) if self.drop_text(batch, training) else self.encode(batch, training)
+
+    def drop_text(self, batch: ClipBatch | LatentBatch, training: bool) -> bool:
+        """Whether this step trains without text."""
+        draw = torch.rand((), generator=self.plan.random.per_step(batch, "text"))
+        return training and bool(draw < self.plan.recipe.text_dropout)
+
+    def _captions(self, batch: ClipBatch | LatentBatch, training: bool) -> list[str]:
+        if not (training and self.plan.recipe.augment_captions):
+            return list(batch.captions)
+        paraphrased = []
+        generators = self.plan.random.per_sample(batch, "words")
+        for caption, own in zip(batch.captions, generators, strict=True):
+            draw, variant = torch.rand((), generator=own), torch.randint(12, (), generator=own)
+            paraphrased.append(paraphrase(caption, float(draw), int(variant)))
+        return paraphrased

@@ -1,0 +1,176 @@
+"""Flow matching on latents: noisy videos, predicted velocities, and their error.
+
+    clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
+             first latent frame: clean, level 0, no loss
+
+Axes: ``b`` batch, ``c t h w`` latents with their motion channels.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from diff4splat.flow.path import add_noise
+from diff4splat.models.blocks.patches import fill_first_pack
+from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.models.factory import Networks
+from diff4splat.training.latents.latent_batch import LatentBatch
+from diff4splat.training.latents.video_latents import camera_rays
+from diff4splat.training.losses.flow_matching import flow_matching
+from diff4splat.training.losses.timestep_sampling import (
+    LevelDistribution,
+    min_level_weights,
+    sample_levels,
+)
+from diff4splat.training.recipe.losses import FlowLosses
+from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
+from diff4splat.training.stages.model_stage import StagePlan, Terms
+from diff4splat.training.stages.text_conditioning import TextConditioning
+
+EVAL_LEVELS = (0.25, 0.5, 0.75)
+"""Noise levels at which evaluation measures the velocity."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoisyVideo:
+    """A point on the path between a clean latent and noise."""
+
+    clean: Float[Tensor, "b c t h w"]
+    noise: Float[Tensor, "b c t h w"]
+    level: Float[Tensor, " b"]
+
+    @property
+    def latent(self) -> Float[Tensor, "b c t h w"]:
+        """With the first frame clean: it is the image that the video starts from."""
+        noisy = add_noise(self.clean, self.noise, self.level)
+        return torch.cat([self.clean[:, :, :1], noisy[:, :, 1:]], 2)
+
+    @property
+    def levels(self) -> Float[Tensor, "b t"]:
+        """One per latent frame; 0 for the first."""
+        frames = self.clean.shape[2]
+        return self.level[:, None] * (torch.arange(frames, device=self.level.device) > 0)
+
+
+class VideoFlow:
+    """The video diffusion model of a stage, its loss and its measure."""
+
+    def __init__(self, networks: Networks, plan: StagePlan, losses: FlowLosses) -> None:
+        self._networks, self._plan, self._losses = networks, plan, losses
+        self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
+
+    def terms(self, batch: LatentBatch, training: bool) -> Terms:
+        """The term ``flow`` at one level per sample."""
+        video, losses = self.noisy(batch), self._losses
+        condition = self._text.encode_or_drop(batch, training)
+        velocity = self._velocity(batch, video.latent, video.levels, condition)
+        weights = min_level_weights(video.level, losses.min_level_weighting)
+        return weighted_sum(
+            [
+                LossTerm(
+                    name="flow",
+                    weight=losses.flow,
+                    compute=lambda: self._error(velocity, video, weights, self._cells(batch)),
+                )
+            ]
+        )
+
+    def measures(self, batch: LatentBatch, training: bool) -> Terms:
+        """``flow_error``: mean squared error of the velocity over fixed levels.
+
+        ``hidden_error`` is the same, weighted by how much of a latent cell the first frame hides.
+        """
+        videos = [self.at_level(batch, level) for level in EVAL_LEVELS]
+        predicted = [self.velocity(batch, one, training) for one in videos]
+        hidden = hidden_share(batch)
+        measured = {"flow_error": None} | ({} if hidden is None else {"hidden_error": hidden})
+        return {
+            name: torch.stack(
+                [self._error(*pair, cells=cells) for pair in zip(predicted, videos, strict=True)]
+            ).mean(0)
+            for name, cells in measured.items()
+        }
+
+    def noisy(self, batch: LatentBatch) -> NoisyVideo:
+        """Noise and level of every sample."""
+        uniform = self._plan.random.uniform(batch, "level")
+        level = sample_levels(uniform, LevelDistribution(shift=self._plan.recipe.timestep_shift))
+        return self.with_noise(batch, level, "noise")
+
+    def at_level(self, batch: LatentBatch, level: float) -> NoisyVideo:
+        """All samples at one level, with the noise of evaluation."""
+        return self.with_noise(batch, batch.latent.new_full((len(batch),), level), "judged")
+
+    def with_noise(
+        self, batch: LatentBatch, level: Float[Tensor, " b"], purpose: str
+    ) -> NoisyVideo:
+        """The latents of a batch, with noise drawn for a purpose."""
+        noise = self._plan.random.normal(batch, batch.latent, purpose)
+        return NoisyVideo(clean=batch.latent, noise=noise, level=level.to(batch.latent))
+
+    def velocity(
+        self, batch: LatentBatch, video: NoisyVideo, training: bool
+    ) -> Float[Tensor, "b c t h w"]:
+        """Predicted velocity with text."""
+        return self.velocity_at(batch, video.latent, video.levels, training)
+
+    def velocity_at(
+        self,
+        batch: LatentBatch,
+        latent: Float[Tensor, "b c t h w"],
+        levels: Float[Tensor, "b t"],
+        training: bool,
+    ) -> Float[Tensor, "b c t h w"]:
+        """The same for any latent."""
+        return self._velocity(batch, latent, levels, self._text.encode(batch, training))
+
+    def _velocity(
+        self, batch: LatentBatch, latent: Tensor, levels: Tensor, text: tuple[Tensor | None, ...]
+    ) -> Float[Tensor, "b c t h w"]:
+        rays = camera_rays(batch.cameras)
+        return self._networks.dit(latent, levels, rays, *text, batch.render_condition)
+
+    def _error(
+        self,
+        velocity: Tensor,
+        video: NoisyVideo,
+        weights: Float[Tensor, " b"] | None = None,
+        cells: Float[Tensor, "b t h w"] | None = None,
+    ) -> Float[Tensor, " b"]:
+        return flow_matching(
+            velocity,
+            video.clean,
+            video.noise,
+            first_frame_is_clean=True,
+            weights=weights,
+            channels=self._channels,
+            cells=cells,
+        )
+
+    def _cells(self, batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:
+        """Weight of each latent cell: hidden ones count more."""
+        share, weight = hidden_share(batch), self._losses.hidden_weight
+        return None if share is None or weight == 1 else 1 + (weight - 1) * share
+
+    @cached_property
+    def _channels(self) -> Float[Tensor, " c"]:
+        """Weight of each channel; latent channels have 1 on average."""
+        losses, vae = self._losses, self._networks.vae
+        share = torch.ones_like(vae.latent_std)
+        if vae.pca_shortcut is not None:
+            power = vae.pca_shortcut.energy() * vae.latent_std.square()
+            share = power.pow(losses.channel_power_exponent)
+        return share / share.mean()
+
+
+def hidden_share(batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:
+    """How much of each latent cell the first frame hides; None without a render condition."""
+    if batch.validity is None:
+        return None
+    side_px = batch.validity.shape[-1] // batch.latent.shape[-1]
+    hidden = torch.nn.functional.avg_pool3d(1 - batch.validity, (1, side_px, side_px))
+    # The first frame fills its pack of four.
+    return fill_first_pack(hidden).unflatten(2, (-1, TIME_STRIDE)).mean(3)[:, 0]

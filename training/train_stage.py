@@ -1,0 +1,148 @@
+"""One stage of a recipe in the folder of its run: check, build, train, hand over.
+
+prerequisites ─ networks ─ stage + samples ─ trainer ─ statistics of latents ─ model folder
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from diff4splat.io.atomic import write_text
+from diff4splat.metrics.features.load import load_features
+from diff4splat.models.factory import model_parts
+from diff4splat.models.hub.model import Model, save_model
+from diff4splat.progress.phases import Phases
+from diff4splat.training.batches.samples import ClipSamples
+from diff4splat.training.earlier_release import earlier_fingerprint
+from diff4splat.training.latent_statistics import CLIPS, measure_statistics, write_statistics
+from diff4splat.training.latents.samples import LatentSamples, open_samples
+from diff4splat.training.pca_init import init_from_principal_components
+from diff4splat.training.prerequisites import (
+    continued_stage,
+    last_checkpoint,
+    require_prerequisites,
+    stages_before,
+    starting_networks,
+    trained_networks,
+)
+from diff4splat.training.recipe.fingerprint import fingerprint
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_to_json
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.stages.factory import create_stage
+from diff4splat.training.stages.model_stage import StagePlan
+from diff4splat.training.trainer.checkpoints.export import load_parts
+from diff4splat.training.trainer.gates import read_result
+from diff4splat.training.trainer.loop.fit import fit_stage
+from diff4splat.training.trainer.settings import RunSettings, StageResult, silent
+
+MODEL_FOLDER, RECIPE_FILE = "model", "recipe.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageRequest:
+    """One call of ``train_stage``."""
+
+    recipe: Recipe
+    stage: str
+    folder: Path
+    """Of the whole run; each stage has a folder in it."""
+    features: str | None = None
+    """Weights of the perceptual distance; None is the stand-in."""
+    ignore_gates: bool = False
+    start: Model | None = None
+    """Has the parts that no stage of this run has trained."""
+    stop_after_steps: int | None = None
+    stop_after_s: float | None = None
+    device: str | None = None
+    phases: Phases = field(default_factory=Phases)
+    note: Callable[[str], None] = silent
+
+
+def train_stage(request: StageRequest) -> StageResult:
+    """Train until the stage is over or something says stop; call again to go on.
+
+    Raises:
+        ConfigError: the stage may not start yet, or settings do not fit together.
+        CheckpointError: the folder belongs to another configuration.
+        InputError, FileFormatError, OutputError: clips cannot be read, or nothing be written.
+    """
+    recipe, stage_recipe = request.recipe, request.recipe.stage(request.stage)
+    sources = stages_before(recipe, stage_recipe, request.folder, request.start)
+    require_prerequisites(recipe, sources, request.folder, request.ignore_gates)
+    if recipe.removed_stages and is_main_process():
+        removed = ", ".join(recipe.removed_stages)
+        request.note(f"stages {removed} are left out: their kinds no longer exist")
+    samples = open_samples(stage_recipe, recipe.seed)
+    networks = starting_networks(recipe, stage_recipe, request.folder, request.start)
+    plan = StagePlan(
+        model=recipe.model,
+        recipe=stage_recipe,
+        seed=recipe.seed,
+        features=load_features(request.features),
+    )
+    if "vae" in stage_recipe.trained and networks.vae.pca_shortcut is not None:
+        init_from_principal_components(networks.vae, samples, request.phases)
+    stage = create_stage(networks, plan)
+    result = fit_stage(stage, samples, stage_recipe, _settings(request, plan))
+    if is_main_process():
+        _hand_over(request, stage_recipe, samples)
+    return result
+
+
+def _settings(request: StageRequest, plan: StagePlan) -> RunSettings:
+    recipe, folder = request.recipe, request.folder / request.stage
+    sources = stages_before(recipe, plan.recipe, request.folder, request.start)
+    before = continued_stage(recipe, plan.recipe, sources)
+    # Gates ignored, the stage before may be unfinished: its averages are all there is to take.
+    over = before is not None and read_result(request.folder / before.name).finished
+    file, features = folder / RECIPE_FILE, plan.features.name
+    earlier = earlier_fingerprint(recipe, request.stage, file, features)
+    return RunSettings(
+        folder=folder,
+        seed=recipe.seed,
+        fingerprint=fingerprint(recipe, request.stage, features),
+        earlier_fingerprint=earlier,
+        trainer=recipe.trainer,
+        start_from=request.folder / before.name if over else None,
+        stop_after_steps=request.stop_after_steps,
+        stop_after_s=request.stop_after_s,
+        device=request.device,
+        phases=request.phases,
+        note=request.note,
+        begin=lambda: _write_recipe(recipe, file, keep=earlier is not None),
+    )
+
+
+def _write_recipe(recipe: Recipe, file: Path, keep: bool) -> None:
+    """An earlier release's file of the same recipe is kept: its checkpoints need it."""
+    if not keep:
+        write_text(file, recipe_to_json(recipe))
+
+
+def _hand_over(
+    request: StageRequest, stage: StageRecipe, samples: ClipSamples | LatentSamples
+) -> None:
+    """Statistics of the latents if the autoencoder learns here, and a folder for pipelines."""
+    if isinstance(samples, ClipSamples) and "vae" in stage.trained:
+        _measure_latents(request, stage, samples)
+    networks, trained = trained_networks(request.recipe, request.folder, request.start)
+    model = Model(config=request.recipe.model, networks=networks, trained=trained)
+    save_model(model, request.folder / MODEL_FOLDER)
+    missing = ", ".join(part for part in model_parts(request.recipe.model) if part not in trained)
+    state = f"not trained to the end: {missing}" if missing else "every part is trained"
+    request.note(f"wrote {request.folder / MODEL_FOLDER}; {state}")
+
+
+def _measure_latents(request: StageRequest, stage: StageRecipe, samples: ClipSamples) -> None:
+    folder = request.folder / stage.name
+    vae = starting_networks(request.recipe, stage, request.folder, request.start).vae
+    vae.load_state_dict(load_parts(last_checkpoint(folder))["vae"])
+    with request.phases.phase("measure latents", CLIPS) as advance:
+        write_statistics(measure_statistics(vae, samples, advance), folder)
+
+
+def is_main_process() -> bool:
+    """The one that writes: torchrun numbers its processes; alone, there is no number."""
+    return os.environ.get("RANK", "0") == "0"

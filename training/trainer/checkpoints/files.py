@@ -1,0 +1,133 @@
+"""CheckpointStore on disk: how folders are named, described, found and judged.
+
+    checkpoints/latest                       the name of the newest one; replaced last
+    checkpoints/window-000-step-00000500/    state.json and shard-*.safetensors
+
+A checkpoint counts once ``latest`` names it. ``state.json`` holds the SHA-256 of every other file,
+so that truncated or damaged files are recognised; its version 1 holds a recipe of the first
+release. Chronological order is (window, step): the
+window number grows with every roll-back. Nothing here is pickle.
+"""
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from diff4splat.errors import FileFormatError
+from diff4splat.training.recipe.legacy import upgraded_stage
+from diff4splat.training.trainer.distributed.processes import Processes
+from diff4splat.training.trainer.loop.progress import Progress
+
+STATE_FILE, LATEST_FILE = "state.json", "latest"
+FORMAT, VERSION = "diff4splat-training", 2
+_NAME = re.compile(r"window-(\d{3,})-step-(\d{8,})")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checkpoint:
+    """A checkpoint that was found whole."""
+
+    folder: Path
+    stage: str
+    fingerprint: str
+    recipe: Mapping[str, Any]
+    """The stage's recipe as plain values, to say what differs."""
+    progress: Progress
+
+    @property
+    def finished(self) -> bool:
+        """Whether the stage was over."""
+        return self.progress.step >= self.recipe.get("steps", 0)
+
+
+def checkpoint_name(progress: Progress) -> str:
+    """Folder name of a checkpoint."""
+    return f"window-{progress.rollbacks:03d}-step-{progress.step:08d}"
+
+
+def order(name: str) -> tuple[int, int]:
+    """Sorts names by when they were written."""
+    window, step = _NAME.fullmatch(name).groups()
+    return int(window), int(step)
+
+
+def candidates(folder: Path) -> list[str]:
+    """Names to try: what ``latest`` says, then the others from new to old."""
+    if not folder.is_dir():
+        return []
+    present = [path.name for path in folder.iterdir() if _NAME.fullmatch(path.name)]
+    present.sort(key=order, reverse=True)
+    pointer = folder / LATEST_FILE
+    latest = pointer.read_text(encoding="utf-8").strip() if pointer.is_file() else ""
+    return [name for name in present if name == latest] + [n for n in present if n != latest]
+
+
+def digests(folder: Path, processes: Processes) -> dict[str, str]:
+    """SHA-256 of every tensor file; processes share the reading."""
+
+    def mine() -> dict[str, str]:
+        names = sorted(path.name for path in folder.glob("*.safetensors"))
+        return {name: _sha256(folder / name) for name in names[processes.rank :: processes.count]}
+
+    return dict(pair for found in processes.all_do(mine) for pair in sorted(found.items()))
+
+
+def write_state(folder: Path, description: Mapping[str, Any]) -> None:
+    """Write ``state.json`` through to the disk: it says that the rest is there."""
+    with (folder / STATE_FILE).open("w", encoding="utf-8") as file:
+        json.dump({"format": FORMAT, "version": VERSION} | dict(description), file, indent=2)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def read_checkpoint(folder: Path, processes: Processes) -> Checkpoint:
+    """A whole checkpoint, every byte compared with its digest.
+
+    Raises:
+        FileFormatError: it is half written, damaged or from a newer version; at all processes.
+    """
+    description = processes.first_does(lambda: _read_state(folder))
+    if digests(folder, processes) != description["files"]:
+        raise FileFormatError(f"{folder}: expected the files that were written, got other bytes")
+    try:
+        progress = Progress.from_json(description["progress"])
+    except FileFormatError as error:
+        raise FileFormatError(f"{folder / STATE_FILE}, {error}") from error
+    recipe = description["recipe"]
+    return Checkpoint(
+        folder=folder,
+        stage=description["stage"],
+        fingerprint=description["fingerprint"],
+        recipe=upgraded_stage(recipe) if description["version"] == 1 else recipe,
+        progress=progress,
+    )
+
+
+def _read_state(folder: Path) -> dict[str, Any]:
+    file = folder / STATE_FILE
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        wanted = {"stage": str, "fingerprint": str, "recipe": dict, "progress": dict, "files": dict}
+        usable = found["format"] == FORMAT and all(
+            isinstance(found[key], kind) for key, kind in wanted.items()
+        )
+        version = int(found["version"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FileFormatError(
+            f"{file}: expected the state of a training run, got none or a damaged one"
+        ) from error
+    if not usable or version > VERSION:
+        raise FileFormatError(
+            f"{file}: expected {FORMAT} up to version {VERSION}, got {found['format']} {version}"
+        )
+    return found
+
+
+def _sha256(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

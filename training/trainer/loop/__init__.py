@@ -1,0 +1,1 @@
+"""The training loop: steps, schedules, averages, evaluation, and what ends a run."""
