@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from stage_fixtures import stage_recipe
 
-from diff4splat.models.config.model import RefinementConfig, ModelConfig
+from diff4splat.models.config.model import ModelConfig, RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe.losses import DepthLosses
