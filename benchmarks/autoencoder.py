@@ -15,13 +15,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
 from diff4splat.generation.input_image import choose_focal, prepare_image
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.image import psnr
-from diff4splat.models.hub.pretrained import Model, load_model
+from diff4splat.models.hub.model import Model, load_model
 
 PROTOCOL = "held_out_v2"
 PHOTOGRAPHS = ("astronaut", "coffee", "chelsea", "rocket")

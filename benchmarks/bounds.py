@@ -18,13 +18,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.evaluation.baselines import BEST_PLANE, make_baseline
-from diff4splat.evaluation.covisibility import covisible
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.predictions import Answer
-from diff4splat.evaluation.protocol import Pair
-from diff4splat.evaluation.protocol_json import load_protocol
-from diff4splat.evaluation.sample import Case, make_case
+from diff4splat.evaluation.measures.covisibility import covisible_masks
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol import Pair
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.sample import EvalSample, make_sample
+from diff4splat.evaluation.systems.baselines import BEST_PLANE, make_baseline
+from diff4splat.evaluation.systems.predictions import Prediction
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.image import psnr
@@ -38,7 +38,9 @@ SKY_DEPTH = 400.0
 ROWS = ("best plane (oracle)", "true depth and colours, plane behind")
 
 
-def true_picture(case: Case, pair: Pair, behind: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
+def true_picture(
+    case: EvalSample, pair: Pair, behind: Float[Tensor, "h w 3"]
+) -> Float[Tensor, "h w 3"]:
     """The judged camera's view of the nearest given frame at its true depth."""
     frame = case.nearest_input(pair[1])
     cameras = case.input_view.cameras[slice(frame, frame + 1)].to(torch.float32)
@@ -74,20 +76,20 @@ def main() -> None:
     found: dict[str, list[tuple[float, float]]] = {row: [] for row in ROWS}
     for item in range(options.items):
         clip = clips.clip(protocol.source.first + item)
-        case = make_case(clip, protocol, options.task)
+        case = make_sample(clip, protocol, options.task)
         for row, pictures in both(case, make_baseline(BEST_PLANE, case, protocol.planes)).items():
             found[row].append(pictures)
         print(f"item {item}: { ({row: rows[-1] for row, rows in found.items()}) }", flush=True)
     write_text(options.out, table(found))
 
 
-def both(case: Case, plane: Answer) -> dict[str, tuple[float, float]]:
+def both(case: EvalSample, plane: Prediction) -> dict[str, tuple[float, float]]:
     """Mean PSNR over the judged pictures: whole, and where the input shows something."""
     scores: dict[str, list[tuple[float, float]]] = {row: [] for row in ROWS}
-    masks = covisible(case)
-    for pair, mask in zip(case.judged.pairs, masks, strict=True):
+    masks = covisible_masks(case)
+    for pair, mask in zip(case.targets.pairs, masks, strict=True):
         truth = case.true_rgb(pair)
-        flat = plane.look(case.camera(pair), case.time_s(pair[1]), pair[1]).rgb.float()
+        flat = plane.render(case.camera(pair), case.time_s(pair[1]), pair[1]).rgb.float()
         for row, picture in zip(ROWS, (flat, true_picture(case, pair, flat)), strict=True):
             scores[row].append(scored(picture.clamp(0, 1), truth, mask))
     return {

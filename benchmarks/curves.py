@@ -10,7 +10,7 @@ import statistics
 from pathlib import Path
 
 from diff4splat.io.atomic import atomic_path
-from diff4splat.io.figures import require_matplotlib
+from diff4splat.io.figures.plots import require_matplotlib
 
 TERMS = ("pixels", "photometric", "depth", "depth_log", "motion")
 MEASURES = {"psnr": "PSNR [dB]", "depth_correlation": "depth r", "track_share": "EPE / still"}

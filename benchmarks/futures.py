@@ -20,12 +20,12 @@ from pathlib import Path
 
 import torch
 
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.predictions import scene_flow
-from diff4splat.evaluation.protocol_json import load_protocol
-from diff4splat.evaluation.sample import make_case
-from diff4splat.evaluation.systems import Generator
-from diff4splat.evaluation.text_measures import TextCase, text_case
+from diff4splat.evaluation.measures.text import TextSample, text_sample
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.sample import make_sample
+from diff4splat.evaluation.systems.evaluated_system import Generator
+from diff4splat.evaluation.systems.predictions import scene_flow
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.io.atomic import write_text
@@ -38,16 +38,16 @@ EQUAL_DB = 100.0
 """Stands for infinitely many."""
 
 
-def futures(subject: Generator, found: TextCase, prompt: str | None, seeds: int) -> list[Scene]:
+def futures(subject: Generator, found: TextSample, prompt: str | None, seeds: int) -> list[Scene]:
     """One scene per seed."""
-    return [subject.generate(found.case, prompt, seed) for seed in range(seeds)]
+    return [subject.generate(found.sample, prompt, seed) for seed in range(seeds)]
 
 
-def judged(found: TextCase, scenes: list[Scene]) -> tuple[float, float, float]:
+def judged(found: TextSample, scenes: list[Scene]) -> tuple[float, float, float]:
     """Way, spread and PSNR between the futures of one picture."""
-    camera = found.case.input_view.cameras[0]
-    last_s = float(found.case.clip.times_s[-1])
-    flows = [scene_flow(scene, camera, 0.0, (last_s,))[0][found.shown] for scene in scenes]
+    camera = found.sample.input_view.cameras[0]
+    last_s = float(found.sample.clip.times_s[-1])
+    flows = [scene_flow(scene, camera, 0.0, (last_s,))[0][found.mask] for scene in scenes]
     rightward = [float(flow[:, 0].mean()) for flow in flows]
     way = statistics.fmean(float(flow.norm(dim=-1).mean()) for flow in flows)
     seen = [render(scene, camera.to(torch.float32), last_s).rgb.clamp(0, 1) for scene in scenes]
@@ -78,8 +78,8 @@ def main() -> None:
     clips, protocol = open_clips(loaded), loaded.protocol
     rows: dict[tuple[str, int], list[tuple[float, float, float]]] = {}
     for item in range(options.items):
-        case = make_case(clips.clip(protocol.source.first + item), protocol, "text")
-        found = text_case(case)
+        case = make_sample(clips.clip(protocol.source.first + item), protocol, "text")
+        found = text_sample(case)
         if found is None:
             continue
         prompts = (("own caption", case.clip.note.caption), ("no text", None))

@@ -1,4 +1,4 @@
-"""The stage that ``parallel.py`` measures unless told otherwise."""
+"""The stage that ``parallel.py`` measures by default."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -26,17 +26,17 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.generation.image_size import find_image_size
 from diff4splat.generation.input_cameras import path_frame
 from diff4splat.generation.input_image import InputImage, choose_focal, prepare_image
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.geometry.rays import pixel_centers
-from diff4splat.io.images import write_png
-from diff4splat.io.ply import read_ply, write_ply
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.ply.ply_file import read_ply, write_ply
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
-from diff4splat.models.hub.pretrained import find_multiple_px
 from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings
 from diff4splat.progress.phases import peak_memory_bytes
@@ -112,7 +112,7 @@ def load(name: str) -> InputImage:
 
     rgb = torch.from_numpy(getattr(skimage.data, name)()).float() / 255
     focal = choose_focal((rgb.shape[0], rgb.shape[1]), None, None)
-    return prepare_image(rgb, focal, SIDE_PX, find_multiple_px("small", SIDE_PX))
+    return prepare_image(rgb, focal, *find_image_size("small", SIDE_PX))
 
 
 def around(scene: Scene, picture: InputImage) -> tuple[float, bool, Float[Tensor, "h w 3"]]:

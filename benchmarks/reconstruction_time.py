@@ -13,8 +13,8 @@ from pathlib import Path
 import torch
 
 from diff4splat.error_time.tables import this_machine
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
 from diff4splat.generation.video_to_scene import scene_from_video
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import torch
 
-from diff4splat.data.agreement import (
-    EXACT,
-    MEASURED,
-    Agreement,
-    Tolerances,
-    require_agreement,
-)
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.data.comparing.spread import Share
+from diff4splat.data.consistency.statistics import TrueFraction
+from diff4splat.data.consistency_check import (
+    EXACT,
+    MEASURED,
+    Consistency,
+    Tolerances,
+    require_consistency,
+)
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.progress.phases import Phases
 
@@ -40,7 +40,7 @@ def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
     with phases.phase("check clips", len(places)) as advance:
         for place in places:
             clip = clips.clip(place)
-            found.append(require_agreement(clip, tolerances_for(clip)))
+            found.append(require_consistency(clip, tolerances_for(clip)))
             advance()
     return _table(found)
 
@@ -57,11 +57,11 @@ def tolerances_for(clip: Clip) -> Tolerances:
     return replace(EXACT, visible_share=1 - THIN_SHARE * coarser)
 
 
-def _table(found: list[Agreement]) -> str:
+def _table(found: list[Consistency]) -> str:
     lines = ["| compared | worst of all clips | median clip | comparisons |", "|---|---|---|---|"]
     lines += [
         _row(field.name, [figure for one in found if (figure := getattr(one, field.name))])
-        for field in fields(Agreement)
+        for field in fields(Consistency)
     ]
     return "\n".join(lines)
 
@@ -70,7 +70,7 @@ def _row(name: str, figures: list) -> str:
     if not figures:
         return f"| {name} | – | – | 0 |"
     count = sum(figure.count for figure in figures)
-    if isinstance(figures[0], Share):
+    if isinstance(figures[0], TrueFraction):
         shares = torch.tensor([figure.share for figure in figures])
         return f"| {name} | {shares.min():.4f} agree | {shares.median():.4f} agree | {count:,} |"
     worst = torch.tensor([figure.max for figure in figures])

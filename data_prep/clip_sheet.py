@@ -12,7 +12,7 @@ from torch import Tensor
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.io.pixels import unit_rgb
 
 COLUMNS, GAP_PX = 8, 4

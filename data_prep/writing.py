@@ -13,16 +13,17 @@ from pathlib import Path
 
 import torch
 
+from diff4splat.data.codecs.encode import EncodedClip, encode_clip
 from diff4splat.data.manifest import read_manifest
-from diff4splat.data.members.encode import EncodedClip, encode_clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.synthetic.captioning import SOURCE
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.jit import GROUP as DRAWING
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
-from diff4splat.data_prep.synthetic.renderer.warm import prepare_drawing
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.errors import ConfigError
 from diff4splat.progress.phases import Phases
+from diff4splat.progress.precompile import ensure_precompiled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +67,7 @@ def write_worlds(job: WorldJob, phases: Phases, append: bool = False) -> int:
         indices = [index for index, name in names.items() if name not in writer.identifiers]
         try:
             if indices:
-                prepare_drawing(phases)
+                ensure_precompiled(DRAWING, phases)
             with phases.phase("draw clips", len(indices)) as advance:
                 for clip in _drawn(job, indices):
                     writer.write(clip)

@@ -15,8 +15,8 @@ _PUBLIC = {
     "KeyframeMotion": "diff4splat.scene.motion.keyframes",
     "Scene": "diff4splat.scene.scene",
     "StaticMotion": "diff4splat.scene.motion.static",
-    "load_scene": "diff4splat.io.scene_file",
-    "save_scene": "diff4splat.io.scene_file",
+    "load_scene": "diff4splat.io.scene_files.scene_file",
+    "save_scene": "diff4splat.io.scene_files.scene_file",
 }
 
 __all__ = ["__version__", *sorted(_PUBLIC)]  # noqa: PLE0604 (the names are strings)

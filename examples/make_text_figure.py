@@ -9,9 +9,9 @@ from pathlib import Path
 import torch
 
 from diff4splat import Diff4SplatPipeline
+from diff4splat.generation.image_size import find_image_size
 from diff4splat.generation.input_image import load_image
-from diff4splat.io.images import write_png
-from diff4splat.models.hub.pretrained import find_multiple_px, find_side_px
+from diff4splat.io.photos.images import write_png
 from diff4splat.render.api import render
 
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -27,8 +27,7 @@ def main() -> None:
     parser.add_argument("--model", default="small")
     options = parser.parse_args()
     pipeline = Diff4SplatPipeline.from_pretrained(options.model)
-    side_px = find_side_px(options.model)
-    multiple_px = find_multiple_px(options.model, side_px)
+    side_px, multiple_px = find_image_size(options.model)
     picture = load_image(options.picture, side_px, multiple_px=multiple_px)
     rows = []
     for prompt in (

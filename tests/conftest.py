@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 # As the command line does, and before torch is loaded: waiting threads sleep.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -10,6 +11,11 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import jaxtyping
 import pytest
 import torch
+from hypothesis import HealthCheck, settings
+
+# A busy machine is slow, which is no failure.
+settings.register_profile("any_load", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any_load")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # Shells start background jobs deaf to interrupts; tests of interrupts would wait for ever.
@@ -21,9 +27,23 @@ def _seeded() -> None:
     torch.manual_seed(0)
 
 
-@pytest.fixture
-def as_shipped() -> Iterator[None]:
+@contextmanager
+def unchecked() -> Iterator[None]:
     """Annotations off, as users run it: what remains is the validation we wrote ourselves."""
     jaxtyping.config.update("jaxtyping_disable", True)
     yield
     jaxtyping.config.update("jaxtyping_disable", False)
+
+
+@pytest.fixture
+def as_shipped() -> Iterator[None]:
+    """Annotations off for one test."""
+    with unchecked():
+        yield
+
+
+@pytest.fixture(scope="module")
+def module_as_shipped() -> Iterator[None]:
+    """Annotations off for all tests of a file and what they share: for hundreds of steps."""
+    with unchecked():
+        yield

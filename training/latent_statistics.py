@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError, FileFormatError
-from diff4splat.io.tensor_file import TensorFile, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import TensorFile, read_tensors, write_tensors
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.progress.phases import Advance
 from diff4splat.training.batches.samples import ClipSamples

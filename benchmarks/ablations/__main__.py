@@ -20,12 +20,11 @@ from ablations.results import Row, store, stored_rows
 from ablations.tables import to_json, to_markdown
 from ablations.variants import STATIC, Variant, chosen_variants, recipe_of, reduced
 from diff4splat.cli.console import ConsolePhases
-from diff4splat.cli.installation import speck
-from diff4splat.cli.renderer import prepare_renderer
-from diff4splat.cli.worlds import prepare_sources
+from diff4splat.cli.installation import single_gaussian
+from diff4splat.cli.precompile import precompile_renderer, precompile_sources
 from diff4splat.errors import Diff4SplatError
 from diff4splat.io.atomic import write_text
-from diff4splat.io.figures import require_matplotlib
+from diff4splat.io.figures.plots import require_matplotlib
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -53,9 +52,9 @@ def run(options: Options) -> None:
     judged = held_out(base.stage(STATIC).data.size_px, options.items)
     autoencoder = require_autoencoder(options.run)
     phases = ConsolePhases()
-    prepare_renderer(speck("cpu"), phases)
+    precompile_renderer(single_gaussian("cpu"), phases)
     drawn = [source for stage in base.stages for source in stage.data.sources]
-    prepare_sources([judged.protocol.source, *drawn], phases)
+    precompile_sources([judged.protocol.source, *drawn], phases)
     lab = Lab(base=base, autoencoder=autoencoder, out=options.out, note=note)
     for variant in variants:
         train_and_judge(variant, lab, judged)

@@ -9,9 +9,9 @@ from typing import Any
 
 from ablations.results import Row, difference
 from diff4splat.evaluation.columns import column_of
-from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.io.atomic import atomic_path
-from diff4splat.io.figures import DPI
+from diff4splat.io.figures.plots import DPI
 
 SHOWN = ("covisible_psnr", "track_error")
 BETTER, WORSE, INTERVAL = "#56b4e9", "#d55e00", "#222222"

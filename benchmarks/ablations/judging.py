@@ -14,16 +14,20 @@ from torch import Tensor
 from ablations.variants import Variant
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.measuring import Setup
-from diff4splat.evaluation.protocol import Protocol
-from diff4splat.evaluation.protocol_json import LoadedProtocol, load_protocol
-from diff4splat.evaluation.result_store import NAME, ItemStore, run_key
-from diff4splat.evaluation.runner import Outcome, require_some, run_items
-from diff4splat.evaluation.sources import ClipSource
-from diff4splat.evaluation.systems import Reconstructor, model_identity, reconstruct_clip
-from diff4splat.generation.pipeline import Diff4SplatPipeline
-from diff4splat.models.hub.pretrained import Model, load_model
+from diff4splat.evaluation.measure_item import Setup
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol, load_protocol
+from diff4splat.evaluation.protocols.sources import ClipSource
+from diff4splat.evaluation.report.result_store import NAME, ItemStore, run_key
+from diff4splat.evaluation.runner import Outcome, require_results, run_items
+from diff4splat.evaluation.systems.evaluated_system import (
+    Reconstructor,
+    model_identity,
+    reconstruct_clip,
+)
+from diff4splat.generation.plan import RECONSTRUCTION_PARTS
+from diff4splat.models.hub.model import Model, load_model
 from diff4splat.models.video_vae.vae import LatentDistribution, VideoVae
 from diff4splat.progress.phases import Phases
 from diff4splat.training.train_stage import MODEL_FOLDER
@@ -112,14 +116,14 @@ def judge(variant: Variant, folder: Path, held_out: HeldOut, phases: Phases) -> 
     """
     model = load_model(folder / MODEL_FOLDER)
     pictures = "true pictures" if variant.use_ground_truth_frames else "decoded pictures"
-    identity = model_identity(Diff4SplatPipeline(model), f"reconstruction, {pictures}")
+    identity = model_identity(model, RECONSTRUCTION_PARTS, f"reconstruction, {pictures}")
     subject = Reconstructor(
         reconstruct=partial(reconstruct_clip, _seeing(model, variant)),
         identity=replace(identity, name=variant.name, untrained=False),
     )
-    setup = Setup(protocol=held_out.protocol, task="reconstruction", subject=subject)
+    setup = Setup(protocol=held_out.protocol, task="reconstruction", system=subject)
     store = ItemStore(folder / NAME, run_key(setup))
-    return require_some(run_items(held_out.clips, setup, store, held_out.items, phases))
+    return require_results(run_items(held_out.clips, setup, store, held_out.items, phases))
 
 
 def _seeing(model: Model, variant: Variant) -> Model:

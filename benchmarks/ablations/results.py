@@ -12,11 +12,11 @@ from typing import Any
 from ablations.course import StageCost
 from ablations.judging import HeldOut
 from ablations.variants import VARIANTS
-from diff4splat.evaluation.baselines import BASELINES
 from diff4splat.evaluation.columns import SYSTEM, Column, column_of
-from diff4splat.evaluation.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.evaluation.records import ItemResult, read_item
-from diff4splat.evaluation.summary import Mean, interval
+from diff4splat.evaluation.report.summary import Mean, interval
+from diff4splat.evaluation.systems.baselines import BASELINES
 from diff4splat.io.atomic import write_text
 
 FILE = "ablation.json"

@@ -9,9 +9,9 @@ from ablations.results import COLUMNS, KEYS, Row, difference, mean
 from ablations.variants import FULL, VARIANTS
 from diff4splat import __version__
 from diff4splat.error_time.tables import this_machine
-from diff4splat.evaluation.protocol import Protocol
-from diff4splat.evaluation.report_writer import ARROWS, number
-from diff4splat.evaluation.summary import Mean
+from diff4splat.evaluation.protocols.protocol import Protocol
+from diff4splat.evaluation.report.report_writer import DIRECTION_ARROWS, number
+from diff4splat.evaluation.report.summary import Mean
 from diff4splat.training.recipe.recipe import Recipe
 
 FORMAT = "diff4splat-ablations 1"
@@ -75,7 +75,7 @@ def _head(rows: Sequence[Row], base: Recipe, protocol: Protocol) -> list[str]:
 
 
 def _means(rows: Sequence[Row], protocol: Protocol) -> list[str]:
-    titles = [f"{column.title} {ARROWS[column.better]}" for column in COLUMNS]
+    titles = [f"{column.title} {DIRECTION_ARROWS[column.better]}" for column in COLUMNS]
     lines = [
         f"Means over clips with {protocol.bootstrap.coverage:.0%} bootstrap intervals.",
         "",
@@ -103,7 +103,7 @@ def _differences(rows: Sequence[Row], protocol: Protocol) -> list[str]:
         "",
         "Variant minus full, clip by clip, over the clips that have both values.",
         "",
-        _line(["", *(f"{column.title} {ARROWS[column.better]}" for column in COLUMNS)]),
+        _line(["", *(f"{column.title} {DIRECTION_ARROWS[column.better]}" for column in COLUMNS)]),
         _line(["---", *["---:"] * len(COLUMNS)]),
     ]
     for row in others:

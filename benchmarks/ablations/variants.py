@@ -84,12 +84,12 @@ VARIANTS = (
     Variant(
         name="no-comparison",
         title="no comparison of frames",
-        changes=("model.detail.depths=0",),
+        changes=("model.refinement.cost_volume_depths=0",),
     ),
     Variant(
         name="no-surroundings",
         title="no surroundings",
-        changes=("model.detail.surroundings=0",),
+        changes=("model.refinement.border_cells=0",),
     ),
 )
 

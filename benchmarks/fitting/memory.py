@@ -102,7 +102,7 @@ def fit_once(motion: str, times: int) -> dict[str, float | str]:
 
 def scene_bytes(result, capture, folder: Path) -> int:
     """Of the scene file, without the camera path."""
-    from diff4splat.io.scene_file import save_scene
+    from diff4splat.io.scene_files.scene_file import save_scene
     from diff4splat.paths.camera_path import CameraPath
     from diff4splat.scene.scene import Provenance, Scene
 

@@ -33,7 +33,7 @@ from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.geometry.lenses.build import fisheye_camera
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
 
 Row = dict[str, str | float]

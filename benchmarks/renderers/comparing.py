@@ -23,7 +23,7 @@ from tables import OURS, Results, to_markdown
 
 from diff4splat.errors import ConfigError
 from diff4splat.io.atomic import write_text
-from diff4splat.io.figures import require_matplotlib
+from diff4splat.io.figures.plots import require_matplotlib
 
 FORMAT = "diff4splat renderers 1"
 Advance = Callable[[], None]

@@ -14,7 +14,7 @@ from slope import Point
 from tables import OURS
 
 from diff4splat.io.atomic import atomic_path
-from diff4splat.io.figures import DPI, require_matplotlib
+from diff4splat.io.figures.plots import DPI, require_matplotlib
 
 Series = dict[str, list[Cell]]
 _TITLES: dict[Kind, str] = {"forward": "forward", "both": "forward + backward"}

@@ -25,7 +25,7 @@ from diff4splat.flow.guidance import UNGUIDED, Guidance
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.atomic import write_text
-from diff4splat.models.hub.pretrained import load_model, with_text_encoder
+from diff4splat.models.hub.model import load_model
 
 SOLVERS = tuple(
     GenerationSettings(steps=steps, sampler=sampler, shift=shift, guidance=UNGUIDED)
@@ -37,7 +37,7 @@ MOTIONS = tuple(
     for steps, shift in ((1, 16.0), (2, 16.0), (4, 16.0), (8, 16.0), (8, 1.0), (16, 16.0))
 )
 ASKED = tuple(
-    MotionSettings(steps=steps, guidance=Guidance(weight=weight, low=0.2), moves_above=above)
+    MotionSettings(steps=steps, guidance=Guidance(weight=weight, low=0.2), threshold=above)
     for steps, weight, above in (
         (1, 1.0, 0.5),
         (1, 1.0, 0.3),
@@ -57,9 +57,9 @@ def main() -> None:
     parser.add_argument("--video", action="store_true", help="also the sampled video")
     parser.add_argument("--out", type=Path, required=True, help="markdown file")
     options = parser.parse_args()
-    model, protocol = with_text_encoder(load_model(options.model)), kept_back(options.clips)
+    model, protocol = load_model(options.model), kept_back(options.clips)
     tables = []
-    if model.branches_motion:
+    if model.config.motion_unet.used:
         tables.append(motion_table(model, protocol, MOTIONS))
     if options.video or not tables:
         tables.append(video_table(model, protocol, SOLVERS))

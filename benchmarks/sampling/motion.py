@@ -11,15 +11,15 @@ from pathlib import Path
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol import Protocol
-from diff4splat.evaluation.protocol_json import LoadedProtocol
-from diff4splat.evaluation.systems import input_picture
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol
+from diff4splat.evaluation.systems.evaluated_system import input_image
 from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
 from diff4splat.training.batches.motion_targets import (
     extend_to_all_cells,
     moving_mask,
@@ -46,7 +46,7 @@ class Told:
         asked = GenerationSettings(motion=settings)
         wish = MotionRequest(text=self.text, seed=seed, settings=asked)
         frames = self.truth.shape[1]
-        made = sample_motion(model.networks.dit.motion_branch, self.picture, frames, wish)
+        made = sample_motion(model.networks.motion_unet, self.picture, frames, wish)
         return made.field, made.calls.conditional + made.calls.unconditional
 
 
@@ -59,7 +59,7 @@ def prepared(model: Model, protocol: Protocol) -> list[Told]:
         view, motion = clip.views[0], pixel_motion(clip, INPUT_STRIDE)
         found.append(
             Told(
-                picture=input_picture(unit_rgb(view.rgb[0]), view.cameras[0]),
+                picture=input_image(unit_rgb(view.rgb[0]), view.cameras[0]),
                 text=model.networks.text_encoder.encode_prompt(clip.note.caption),
                 truth=extend_to_all_cells(motion, moving_mask(motion)),
             )

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from diff4splat.evaluation.captions import grammar_caption
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol import Protocol
-from diff4splat.evaluation.protocol_json import LoadedProtocol, load_protocol
+from diff4splat.evaluation.measures.captions import grammar_caption
+from diff4splat.evaluation.measures.text import text_entries
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol, load_protocol
+from diff4splat.evaluation.protocols.sample import EvalSample, make_sample
 from diff4splat.evaluation.records import Score
-from diff4splat.evaluation.sample import Case, make_case
-from diff4splat.evaluation.systems import Generator
-from diff4splat.evaluation.text_measures import text_entries
+from diff4splat.evaluation.systems.evaluated_system import Generator
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.metrics.image import psnr
@@ -50,25 +50,25 @@ def _row(subject: Generator, protocol: Protocol) -> str:
     pictures = []
     for index in range(protocol.source.count):
         clip = clips.clip(index)
-        case = make_case(clip, protocol, "text")
+        case = make_sample(clip, protocol, "text")
         for entry in text_entries("", case, subject, grammar_caption, protocol):
             if isinstance(entry, Score):
                 scores.setdefault(entry.key, []).append(entry.value)
-        pictures.append(_along_the_path(subject, make_case(clip, protocol, "generation")))
+        pictures.append(_along_the_path(subject, make_sample(clip, protocol, "generation")))
     right, both, still = (
         statistics.fmean(scores[key]) for key in ("text_right", "text_both", "text_still")
     )
     quality = statistics.fmean(pictures)
     asked = subject.settings.motion
-    how = f"{asked.steps} | {asked.guidance.weight:g} | {asked.moves_above:g}"
+    how = f"{asked.steps} | {asked.guidance.weight:g} | {asked.threshold:g}"
     return f"| {how} | {right:.2f} | {both:.2f} | {still:.3f} | {quality:.2f} |"
 
 
-def _along_the_path(subject: Generator, case: Case) -> float:
+def _along_the_path(subject: Generator, case: EvalSample) -> float:
     """Mean PSNR over the judged pictures, with the clip's own caption."""
-    scene = subject.answer(case, seed=0)
+    scene = subject.predict(case, seed=0)
     found = []
-    for pair in case.judged.pairs:
+    for pair in case.targets.pairs:
         camera = case.camera(pair).to(scene.gaussians.means.dtype)
         seen = render(scene, camera, case.time_s(pair[1])).rgb.clamp(0, 1)
         found.append(float(psnr(seen, case.true_rgb(pair))))

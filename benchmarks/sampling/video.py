@@ -12,18 +12,19 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.configs.small import small_recipe
-from diff4splat.evaluation.datasets import open_clips
-from diff4splat.evaluation.protocol import Protocol
-from diff4splat.evaluation.protocol_json import LoadedProtocol
+from diff4splat.evaluation.protocols.datasets import open_clips
+from diff4splat.evaluation.protocols.protocol import Protocol
+from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol
 from diff4splat.flow.guidance import Guidance
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_sampling import Conditions, sample_video
 from diff4splat.metrics.image import psnr
-from diff4splat.models.hub.pretrained import Model
+from diff4splat.models.hub.model import Model
+from diff4splat.models.video_dit.render_condition import RenderCondition
 from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.temporal_crop import from_first_camera
 from diff4splat.training.latents.encode import encode_clip
-from diff4splat.training.stages.model_stage import camera_rays, shown_video
+from diff4splat.training.latents.video_latents import camera_rays, image_video
 
 REFERENCE = GenerationSettings(steps=64, guidance=Guidance(weight=1.0))
 UNGUIDED = Guidance(weight=1.0)
@@ -40,7 +41,7 @@ class Prepared:
 def prepared(model: Model, protocol: Protocol) -> list[Prepared]:
     """Every clip of the protocol as the video model sees it."""
     clips = open_clips(LoadedProtocol(protocol=protocol, folder=Path()))
-    data = small_recipe().stage("generator").data
+    data = small_recipe().stage("video_diffusion").data
     found = []
     for index in range(protocol.source.count):
         clip = normalized(from_first_camera(clips.clip(index)))
@@ -49,7 +50,7 @@ def prepared(model: Model, protocol: Protocol) -> list[Prepared]:
             image_latent=pack.latent[:, :, :1],
             plucker=camera_rays(pack.cameras),
             text=model.networks.text_encoder.encode_prompt(pack.captions[0]),
-            draft=pack.draft,
+            render=RenderCondition(latent=pack.render_latent, validity=pack.validity),
         )
         video = clip.views[0].rgb[: data.clip_frames : data.input_stride]
         found.append(Prepared(conditions=conditions, truth=video[None].float() / 255))
@@ -65,7 +66,7 @@ def solver_row(
         video = sample_video(model.networks.dit, clip.conditions, settings, seed=index)
         later = (video.latent - reference)[:, :, 1:]
         errors.append(float(later.square().mean().sqrt()))
-        shown = shown_video(model.networks.vae.decode(video.latent)).clamp(0, 1)
+        shown = image_video(model.networks.vae.decode(video.latent)).clamp(0, 1)
         quality.append(float(psnr(shown[:, 1:], clip.truth[:, 1:]).mean()))
         calls = video.calls.conditional + video.calls.unconditional
     error, mean_psnr = statistics.fmean(errors), statistics.fmean(quality)

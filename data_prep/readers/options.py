@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from diff4splat.errors import ConfigError
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 FormatName = Literal["dnerf", "neu3d", "hypernerf", "colmap", "transforms", "clips", "cameras"]
 

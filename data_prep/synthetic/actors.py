@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.captions.vocabulary import OPPOSITE
+from diff4splat.captions.vocabulary import OPPOSITE
 from diff4splat.data_prep.synthetic.layout.floor_plan import FloorPlan, PlacedObject
 from diff4splat.data_prep.synthetic.layout.props import shape_of_size
 from diff4splat.data_prep.synthetic.motions.context import MotionContext, PartPositions

@@ -2,17 +2,16 @@
 
 import numpy as np
 
-from diff4splat.data.clip import ClipMetadata, ObjectNote
-from diff4splat.data_prep.synthetic.actors import camera_direction
-from diff4splat.data_prep.synthetic.assembly import AssembledObject
-from diff4splat.data_prep.synthetic.captions.colors import color_name
-from diff4splat.data_prep.synthetic.captions.grammar import (
+from diff4splat.captions.colors import color_name
+from diff4splat.captions.grammar import (
     CaptionFacts,
     Event,
-    Thing,
     describe,
     motion_text,
 )
+from diff4splat.data.clip import ClipMetadata, ObjectNote
+from diff4splat.data_prep.synthetic.actors import camera_direction
+from diff4splat.data_prep.synthetic.assembly import AssembledObject
 from diff4splat.data_prep.synthetic.materials import dominant_color
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
 from diff4splat.data_prep.synthetic.rng import Rng
@@ -37,13 +36,15 @@ def caption_facts(
     return CaptionFacts(
         place=scene if rng.bernoulli(0.7) else "",
         events=events,
-        standing=standing,
+        static_objects=standing,
         camera=tuple((s.name, int(np.sign(s.amplitude))) for s in parse_path(path)),
     )
 
 
-def _thing(one: AssembledObject) -> Thing:
-    return Thing(color_name(dominant_color(one.textures[0])), FAMILIES[one.placed.family].noun)
+def _thing(one: AssembledObject) -> NamedObject:
+    return NamedObject(
+        color_name(dominant_color(one.textures[0])), FAMILIES[one.placed.family].noun
+    )
 
 
 def _event(one: AssembledObject, props: list[AssembledObject], camera: Camera, rng: Rng) -> Event:
@@ -53,7 +54,7 @@ def _event(one: AssembledObject, props: list[AssembledObject], camera: Camera, r
     if props and rng.bernoulli(0.4):
         near = min(props, key=lambda other: float(np.linalg.norm(_center(other) - _center(one))))
         beside = _thing(near)
-    return Event(thing=_thing(one), motion=one.placed.motion, direction=direction, beside=beside)
+    return Event(subject=_thing(one), motion=one.placed.motion, direction=direction, beside=beside)
 
 
 def _center(one: AssembledObject) -> np.ndarray:

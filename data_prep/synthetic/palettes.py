@@ -11,6 +11,8 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float64
 
+from diff4splat.captions.srgb import linear_from_hex
+
 Color = Float64[np.ndarray, "3"]
 
 
@@ -40,12 +42,6 @@ class Palette:
 @cache
 def _linear(words: str) -> tuple[Color, ...]:
     return tuple(linear_from_hex(word) for word in words.split())
-
-
-def linear_from_hex(word: str) -> Color:
-    """Linear light of ``rrggbb`` (IEC 61966-2-1)."""
-    value = np.array([int(word[k : k + 2], 16) / 255 for k in (0, 2, 4)])
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 PALETTES: dict[str, Palette] = {

@@ -1,4 +1,4 @@
-"""``diff4splat bake``: any motion as key frames, with the error against it."""
+"""``diff4splat bake``: convert any motion to keyframes, and report the error."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Bake:
-    """Turn a scene's motion into key frames, which every viewer and exporter knows."""
+    """Convert the motion of a scene to keyframes, which every viewer can read."""
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """A scene file, such as one that was fitted."""
+    """A scene file, such as the result of `diff4splat fit`."""
     out: Path
-    """The scene file with key frames."""
+    """Scene file to write."""
     tolerance_px: float = 0.1
-    """No Gaussian may be further off than this, in the cameras that the scene suggests."""
+    """Largest position error of any Gaussian, in pixels of the scene's cameras."""
     keys: int | None = None
-    """So many evenly spaced key times in place of a tolerance."""
+    """Number of evenly spaced keyframes, instead of a tolerance."""
 
     def run(self) -> None:
-        """Load, bake, say how far off it is, write."""
+        """Load, bake, report the error, write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.io.scene_file import load_scene, save_scene
+        from diff4splat.io.scene_files.scene_file import load_scene, save_scene
         from diff4splat.scene.motion.bake import bake, bake_within
 
         require_inputs_kept((self.scene,), (self.out,))
         if not self.tolerance_px > 0:
             raise ConfigError(f"--tolerance-px: expected more than 0, got {self.tolerance_px:g}")
         scene = load_scene(self.scene)
-        cameras = distinct(scene.path.cameras)
+        cameras = unique_views(scene.path.cameras)
         with ConsolePhases().phase("bake"):
             if self.keys is None:
                 baked, error = bake_within(
@@ -57,8 +57,8 @@ class Bake:
         note(f"wrote {self.out}")
 
 
-def distinct(cameras: "Camera") -> "Camera":
-    """Each view once: a standing camera would be looked through once per frame."""
+def unique_views(cameras: "Camera") -> "Camera":
+    """Each view once: a static camera has the same view in every frame."""
     import torch
 
     views = torch.cat([cameras.world_from_camera.flatten(1), cameras.focal_px], 1)

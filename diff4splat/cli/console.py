@@ -1,4 +1,4 @@
-"""What a person sees: progress bars, notes and one-line errors, all on the error stream."""
+"""Progress bars, notes and one-line errors, all on standard error."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,13 +12,13 @@ CONSOLE = Console(stderr=True, highlight=False)
 
 
 class ConsolePhases(Phases):
-    """Phases that draw one progress bar each."""
+    """Phases with one progress bar each."""
 
     @contextmanager
     def bar(self, name: str, steps: int) -> Iterator[Advance]:
-        """One bar for one phase; it stays on screen when the phase is over.
+        """The progress bar of one phase; it stays on screen after the phase.
 
-        Phases that stop early keep their count; those that report no steps are then complete.
+        Phases that stop early keep their count; phases that report no steps end at 100 %.
         """
         columns = (
             TextColumn("{task.description:<14}"),
@@ -34,11 +34,11 @@ class ConsolePhases(Phases):
 
 
 def note(text: str) -> None:
-    """One line of information."""
+    """Print one line of information."""
     CONSOLE.print(text, markup=False, soft_wrap=True)
 
 
 def fail(error: Exception) -> None:
-    """One line that says what was expected and what to do."""
+    """Print an error in one line."""
     line = " ".join(str(error).split())
     CONSOLE.print(f"diff4splat: {line}", style="bold red", markup=False, soft_wrap=True)

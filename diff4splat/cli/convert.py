@@ -1,4 +1,4 @@
-"""``diff4splat convert``: a scene as INRIA PLY, at one time or as a numbered sequence."""
+"""``diff4splat convert``: scenes and checkpoints as INRIA PLY files or as a scene file."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,58 +15,79 @@ if TYPE_CHECKING:
 
 
 MAX_FILES = 10_000
+SCENE_SUFFIX = ".safetensors"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Convert:
-    """Write a scene as PLY: one file at one time, or a numbered sequence into a folder."""
+    """Convert a scene, or a checkpoint of another program, to PLY files or to a scene file."""
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """A scene file."""
+    """A scene file, a 4DGaussians model folder, or a checkpoint (.pth) of native 4D Gaussians."""
     out: Path
-    """A name ending in .ply for one time, or a folder for a sequence."""
+    """A .ply file for one time, a .safetensors scene file, or a folder for a PLY sequence."""
     time: float | None = None
-    """Seconds, for a single file; if left out, the first time of the motion."""
+    """Time in seconds of a single file. Default: the start of the motion."""
     fps: float = 24.0
     """Files per second of a sequence."""
+    time_range: tuple[float, float] | None = None
+    """Start and stop of a checkpoint's motion in seconds. Default: 0 1 for 4DGaussians, -0.5 0.5
+    for native 4D Gaussians."""
 
     def run(self) -> None:
-        """Read, convert, write; existing files are replaced only by whole ones."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.io.ply import write_ply, write_ply_sequence
-        from diff4splat.io.scene_file import load_scene
-        from diff4splat.scene.scene import DILATION_PX2
+        """Read, convert, write; existing files are replaced only by complete ones."""
+        from diff4splat.cli.console import note
+        from diff4splat.io.checkpoints.import_scene import import_scene
 
         require_inputs_kept((self.scene,), (self.out,))
-        scene = load_scene(self.scene)
-        if scene.dilation_px2 < DILATION_PX2:
-            note(
-                f"made for a dilation of {scene.dilation_px2:g} px², which a PLY cannot say: "
-                f"viewers add {DILATION_PX2:g} and show it softer"
-            )
+        suffix = self.out.suffix.lower()
+        if self.time is not None and suffix != ".ply":
+            kind = "a scene file" if suffix == SCENE_SUFFIX else "a folder"
+            raise ConfigError(f"--time: expected together with one .ply file; --out is {kind} here")
+        imported = import_scene(self.scene, self.time_range)
+        for line in imported.notes:
+            note(line)
+        if suffix == SCENE_SUFFIX:
+            self._write_scene(imported.scene)
+        elif suffix == ".ply":
+            self._write_ply(imported.scene)
+        else:
+            self._write_sequence(imported.scene)
+
+    def _write_scene(self, scene: "Scene") -> None:
+        from diff4splat.cli.console import note
+        from diff4splat.io.scene_files.scene_file import save_scene
+
+        save_scene(scene, self.out)
+        note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians)")
+
+    def _write_ply(self, scene: "Scene") -> None:
+        from diff4splat.cli.console import note
+        from diff4splat.io.ply.ply_file import write_ply
+
+        _note_dilation(scene)
         start_s, _ = scene.motion.time_range_s
-        if self.out.suffix.lower() == ".ply":
-            time_s = start_s if self.time is None else self.time
-            if not math.isfinite(time_s):
-                raise ConfigError(f"--time: expected seconds, got {time_s:g}")
-            write_ply(scene.state_at(time_s), self.out, comments=(f"time_s {time_s:g}",))
-            note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians at {time_s:g} s)")
-            return
-        if self.time is not None:
-            raise ConfigError(
-                "--time: expected together with one .ply file; --out is a folder here"
-            )
+        time_s = start_s if self.time is None else self.time
+        if not math.isfinite(time_s):
+            raise ConfigError(f"--time: expected seconds, got {time_s:g}")
+        write_ply(scene.state_at(time_s), self.out, comments=(f"time_s {time_s:g}",))
+        note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians at {time_s:g} s)")
+
+    def _write_sequence(self, scene: "Scene") -> None:
+        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.io.ply.ply_file import write_ply_sequence
+
+        _note_dilation(scene)
         if not 0 < self.fps < 1e4:
             raise ConfigError(f"--fps: expected a number above 0, got {self.fps:g}")
         times_s = file_times_s(scene, self.fps)
-        count = len(times_s)
-        with ConsolePhases().phase("write PLY", count) as advance:
+        with ConsolePhases().phase("write PLY", len(times_s)) as advance:
             write_ply_sequence(scene, self.out, times_s, advance=advance)
-        note(f"wrote {count} files to {self.out}")
+        note(f"wrote {len(times_s)} files to {self.out}")
 
 
 def file_times_s(scene: "Scene", fps: float) -> list[float]:
-    """When each file of a sequence shows the scene; one file for a scene that stands still."""
+    """Time of each file of a sequence; one file for a static scene."""
     start_s, stop_s = scene.motion.time_range_s
     if len(scene.motion.moving_index) == 0:
         return [start_s]
@@ -75,3 +96,14 @@ def file_times_s(scene: "Scene", fps: float) -> list[float]:
     if count > MAX_FILES:
         raise ConfigError(f"--fps: expected at most {MAX_FILES:,} files, got {count:,}; lower it")
     return [start_s + index / fps for index in range(count)]
+
+
+def _note_dilation(scene: "Scene") -> None:
+    from diff4splat.cli.console import note
+    from diff4splat.scene.scene import DILATION_PX2
+
+    if scene.dilation_px2 < DILATION_PX2:
+        note(
+            f"made for a dilation of {scene.dilation_px2:g} px², which a PLY cannot say: "
+            f"viewers add {DILATION_PX2:g} and show it softer"
+        )

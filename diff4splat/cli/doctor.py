@@ -1,46 +1,49 @@
-"""``diff4splat doctor``: what this installation has, whether it works, and what could be added.
+"""``diff4splat doctor``: versions, back ends and extras of this installation, and a self-test.
 
-The table goes to standard output line by line, so that it tells something however far it gets.
+The table is printed line by line, so that a crash still leaves the lines before it.
 """
 
 import os
 import platform
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from diff4splat.cli import fields, installation, worlds
+from diff4splat.cli import installation
+from diff4splat.cli.precompile import (
+    HEXPLANE,
+    RASTER,
+    RASTERIZER,
+    TRACER,
+    WORLDS,
+    kernel_group,
+    readiness,
+)
 from diff4splat.errors import Diff4SplatError
-
-if TYPE_CHECKING:
-    from diff4splat.progress.phases import Phases
 
 EXTRAS = (
     ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),
     ("gsplat", "pictures on a GPU", "pip install 'diff4splat[cuda]'"),
 )
-"""(package, what it is for, how to add it)."""
+"""(package, purpose, install command)."""
 _WIDTH = 20
-TRACER, FIELDS = "renderer trace", "hexplane fields"
 
 Rows = Iterable[tuple[str, str]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Doctor:
-    """Check the installation: versions, back ends, extras, and that a picture comes out right."""
+    """Check the installation: versions, back ends, extras, and a test render."""
 
     warm: bool = False
-    """Only compile, which otherwise happens before the first picture, rays, field and world."""
+    """Compile all kernels now instead of before their first use."""
 
     def run(self) -> None:
         """Print the table, or compile."""
         if self.warm:
-            warm_up()
+            precompile_all()
             return
         print_rows(machine_rows())
         installation.require_packages()
@@ -52,50 +55,41 @@ class Doctor:
         print_rows([("self-test", installation.self_test())])
 
 
-def warm_up() -> None:
-    """Compile all that has kernels, and say how long each took and where it lies.
+def precompile_all() -> None:
+    """Compile all kernels, and print how long each group took and where it is cached.
 
     Raises:
         Diff4SplatError: the renderer cannot run here.
     """
-    from diff4splat.cli.renderer import COMPILED, compile_ahead, compile_renderer
-    from diff4splat.data_prep.synthetic.renderer.compiled import KERNELS as DRAWING
-    from diff4splat.data_prep.synthetic.renderer.warm import compile_drawing
-    from diff4splat.render.raster.jit import KERNELS
-    from diff4splat.render.trace import warm as tracer
-    from diff4splat.render.trace.compiled import KERNELS as TRACING
-
-    warm_one("worlds", compile_drawing, DRAWING)
-    warm_one(FIELDS, partial(compile_ahead, fields), fields.kernels())
-    reason = installation.refusal(COMPILED, "cpu")
-    if reason is not None:
-        raise Diff4SplatError(f"renderer {COMPILED}: {reason}")
-    warm_one(f"renderer {COMPILED}", compile_renderer, KERNELS)
-    warm_one(TRACER, partial(compile_ahead, tracer), TRACING)
+    precompile_group(WORLDS)
+    precompile_group(HEXPLANE)
+    if (reason := installation.unsupported_reason(RASTER, "cpu")) is not None:
+        raise Diff4SplatError(f"renderer {RASTER}: {reason}")
+    precompile_group(RASTERIZER)
+    precompile_group(TRACER)
 
 
-def warm_one(
-    what: str, compile_all: "Callable[[Phases], tuple[str, ...]]", kernels: list[Any]
-) -> None:
-    """Compile one list of ``kernels`` with its own bar and line."""
+def precompile_group(name: str) -> None:
+    """Compile one group of kernels, with a bar and a line of its own."""
     from diff4splat.cli.console import ConsolePhases, note
+    from diff4splat.progress.precompile import precompile
 
-    phases = ConsolePhases()
-    compiled = compile_all(phases)
-    folder = kernels[0].stats.cache_path
-    place = f"kept in {folder}" if folder else "not kept, because no folder can be written to"
+    phases, group = ConsolePhases(), kernel_group(name)
+    compiled = precompile(group, phases)
+    folder = group.kernels[0].stats.cache_path
+    cached = f"kept in {folder}" if folder else "not kept, because no folder can be written to"
     did = f"compiled {len(compiled)} kernels" if compiled else "was already compiled; loaded"
-    note(f"{what}: {did} in {phases.seconds['compile']:.1f} s; {place}")
+    note(f"{name}: {did} in {phases.seconds['compile']:.1f} s; {cached}")
 
 
 def print_rows(rows: Rows) -> None:
-    """One aligned line each, as soon as it is known."""
+    """Print one aligned line each, as soon as it is available."""
     for name, value in rows:
         print(f"{name:<{_WIDTH}}{value}", flush=True)
 
 
 def machine_rows() -> Rows:
-    """What can be told without any library."""
+    """Rows that need no library."""
     from diff4splat import __version__
 
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
@@ -107,16 +101,16 @@ def machine_rows() -> Rows:
 
 
 def cpu_name() -> str:
-    """As people know it where the system tells, else the architecture."""
+    """The model name if the system has one, else the architecture."""
     try:
-        found = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+        match = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     except OSError:
-        found = None
-    return found[1] if found else platform.processor() or platform.machine()
+        match = None
+    return match[1] if match else platform.processor() or platform.machine()
 
 
 def torch_rows() -> Rows:
-    """PyTorch and what it computes on."""
+    """PyTorch and its devices."""
     import torch
 
     threads = torch.get_num_threads()
@@ -130,7 +124,7 @@ def torch_rows() -> Rows:
 
 
 def backend_rows() -> Rows:
-    """What every back end says to a picture on the CPU, and on the GPU if there is one."""
+    """State of every rendering back end on the CPU, and on the GPU if available."""
     import torch
 
     from diff4splat.render.backends import BACKENDS
@@ -138,19 +132,19 @@ def backend_rows() -> Rows:
     devices = ("cpu", "cuda") if torch.cuda.is_available() else ("cpu",)
     for name in BACKENDS:
         for device in devices:
-            reason = installation.refusal(name, device)
-            state = installation.readiness(name) if reason is None else f"refuses: {reason}"
+            reason = installation.unsupported_reason(name, device)
+            state = installation.backend_readiness(name) if reason is None else f"refuses: {reason}"
             yield f"renderer {name}", state if len(devices) == 1 else f"{device}: {state}"
 
 
 def compiled_rows() -> Rows:
-    """What else has kernels to compile."""
+    """State of the other compiled kernels."""
     yield TRACER, installation.tracer_readiness()
-    yield FIELDS, installation.compiled_or_not(fields.is_ready(), fields.COMPILE_S)
-    yield "worlds", worlds.readiness()
+    yield HEXPLANE, readiness(HEXPLANE)
+    yield WORLDS, readiness(WORLDS)
 
 
 def extra_rows() -> Rows:
-    """Optional packages: the version, or how to add one."""
+    """Optional packages: the version, or the install command."""
     for package, purpose, command in EXTRAS:
         yield package, installation.version(package) or f"not installed; for {purpose}: {command}"

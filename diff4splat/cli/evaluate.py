@@ -1,7 +1,7 @@
-"""``diff4splat eval``: how good a model is on clips that nobody trained on, beside trivial answers.
+"""``diff4splat eval``: measure a model on test clips, beside trivial baselines.
 
 --protocol ── load_protocol ── open_clips ─┐
---model ───── Diff4SplatPipeline ── subject ┴─ evaluate ─ results.json, results.md, items.png
+--model ───── Diff4SplatPipeline ─── system ┴─ evaluate ─ results.json, results.md, items.png
 """
 
 from dataclasses import dataclass
@@ -9,48 +9,47 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from diff4splat.evaluation.systems import Subject
+    from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
     from diff4splat.generation.settings import GenerationSettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate:
-    """Measure a model on held-out clips, with trivial baselines in the same table."""
+    """Measure a model on the test split, with trivial baselines in the same table."""
 
     model: str = "small"
-    """A model folder, or a size (test, small): its shipped weights, else random ones."""
+    """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
     protocol: str = "held_out_v2"
-    """Name of a protocol that ships, or a JSON file of your own."""
+    """Name of a bundled protocol, or a protocol JSON file."""
     size: int | None = None
-    """Picture side in pixels, such as the model's own; the protocol's if left out."""
+    """Image side in pixels. Default: as in the protocol."""
     task: Literal["generation", "reconstruction", "text"] = "generation"
-    """From the first picture; from the input video; or does the text decide what moves."""
+    """Generate from one image, reconstruct the input video, or test the effect of the text."""
     out: Path = Path("evaluation")
     """Folder for the results."""
     items: int | None = None
-    """Measure the first so many clips only; the table then says that it is a subset."""
+    """Measure only the first N clips; the table then says that it is a subset."""
     features: str | None = None
-    """LPIPS weights that you have, as `vgg:FILE` or `alex:TRUNK,HEADS`; if left out, a stand-in."""
+    """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
     steps: int | None = None
-    """Steps of the samplers of motion and video. If left out, 1 for motion, 8 for video."""
+    """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
     fill: Literal["none", "video"] | None = None
-    """What fills hidden regions, as in `generate`. If left out, the model decides."""
+    """What fills hidden regions, as in `generate`. Default: as the model says."""
     fresh: bool = False
-    """Measure again what an earlier run into the same folder has measured."""
+    """Ignore the results of an earlier run in the same folder."""
 
     def run(self) -> None:
         """Check everything cheap first, then measure, write, and print the table."""
         from dataclasses import replace
 
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
-        from diff4splat.cli.worlds import prepare_sources
-        from diff4splat.evaluation.captions import grammar_caption
-        from diff4splat.evaluation.datasets import open_clips
-        from diff4splat.evaluation.evaluate import OUTPUT_FILES, Extent, evaluate
-        from diff4splat.evaluation.measuring import Setup
-        from diff4splat.evaluation.protocol_json import load_protocol
+        from diff4splat.cli.installation import single_gaussian
+        from diff4splat.cli.precompile import precompile_renderer, precompile_sources
+        from diff4splat.evaluation.evaluate import OUTPUT_FILES, RunLimits, evaluate
+        from diff4splat.evaluation.measure_item import Setup
+        from diff4splat.evaluation.measures.captions import grammar_caption
+        from diff4splat.evaluation.protocols.datasets import open_clips
+        from diff4splat.evaluation.protocols.protocol_json import load_protocol
         from diff4splat.metrics.features.load import load_features
 
         loaded, phases = load_protocol(self.protocol), ConsolePhases()
@@ -58,33 +57,32 @@ class Evaluate:
             loaded = replace(loaded, protocol=loaded.protocol.at_size((self.size, self.size)))
         features, clips = load_features(self.features), open_clips(loaded)
         with phases.phase("load model"):
-            subject = self.subject()
+            system = self.system()
         protocol = loaded.protocol
         setup = Setup(
             protocol=protocol,
             task=self.task,
-            subject=subject,
+            system=system,
             features=features,
             captioner=grammar_caption,
         )
-        prepare_renderer(speck("cpu"), phases)
-        prepare_sources([protocol.source], phases)
-        extent = Extent(limit=self.items, fresh=self.fresh)
-        found = evaluate(clips, setup, self.out, extent, phases)
-        print(found.markdown)
-        if found.outcome.taken_up:
-            note(
-                f"{found.outcome.taken_up} items were measured before; --fresh measures them again"
-            )
-        for failure in found.outcome.failures:
+        precompile_renderer(single_gaussian("cpu"), phases)
+        precompile_sources([protocol.source], phases)
+        limits = RunLimits(limit=self.items, fresh=self.fresh)
+        evaluation = evaluate(clips, setup, self.out, limits, phases)
+        print(evaluation.markdown)
+        if evaluation.outcome.resumed:
+            resumed = evaluation.outcome.resumed
+            note(f"{resumed} items were measured before; --fresh measures them again")
+        for failure in evaluation.outcome.failures:
             note(f"failed: item {failure.item} ({failure.clip}): {failure.why}")
         note(f"wrote {', '.join(OUTPUT_FILES)} to {self.out}")
 
-    def subject(self) -> "Subject":
-        """The model in the role that the task asks for."""
+    def system(self) -> "EvaluatedSystem":
+        """The model as the system of the task."""
         from functools import partial
 
-        from diff4splat.evaluation.systems import (
+        from diff4splat.evaluation.systems.evaluated_system import (
             Generator,
             Reconstructor,
             model_identity,
@@ -104,7 +102,7 @@ class Evaluate:
         )
 
     def settings(self) -> "GenerationSettings":
-        """Steps and filling as asked for, the defaults elsewhere."""
+        """Steps and filling as requested, the defaults elsewhere."""
         from diff4splat.generation.settings import GenerationSettings, MotionSettings
 
         if self.steps is None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -76,15 +76,14 @@ class Fit:
     def run(self) -> None:
         """Check, read, fit, write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import compile_ahead, prepare_renderer
+        from diff4splat.cli.installation import single_gaussian
+        from diff4splat.cli.precompile import precompile_renderer, precompile_tracer
         from diff4splat.fitting.checkpoint import CHECKPOINT_FILE
         from diff4splat.fitting.fit import fit_scene
         from diff4splat.fitting.fit_types import FitRequest
         from diff4splat.fitting.frames.frame_renderer import FrameRenderer
         from diff4splat.fitting.results import RESULT_FILES, FitReport, write_results
         from diff4splat.progress.run_log import RunLog
-        from diff4splat.render.trace import warm as tracer
 
         settings = self.settings()
         outputs = [self.out / name for name in (*RESULT_FILES, CHECKPOINT_FILE)]
@@ -94,10 +93,10 @@ class Fit:
         for line in capture.notes:
             note(line)
         if self.renderer in ("auto", "raster"):
-            prepare_renderer(speck("cpu"), log.phases)
+            precompile_renderer(single_gaussian("cpu"), log.phases)
         renderer = FrameRenderer(capture=capture, backend=self.renderer, settings=settings.camera)
-        if renderer.traced and not tracer.is_ready():
-            compile_ahead(tracer, log.phases)
+        if renderer.traced:
+            precompile_tracer(log.phases)
         if self.restart:
             (self.out / CHECKPOINT_FILE).unlink(missing_ok=True)
         request = FitRequest(
@@ -151,7 +150,7 @@ class Fit:
 
     def initial_scene(self) -> "Scene | None":
         """The initial scene, if any."""
-        from diff4splat.io.scene_file import load_scene
+        from diff4splat.io.scene_files.scene_file import load_scene
 
         return None if self.init is None else load_scene(self.init)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.camera_choice import CameraOptions, choose_path
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.camera import CameraOptions, choose_path
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 
 if TYPE_CHECKING:
     from diff4splat.generation.settings import GenerationSettings
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Generate:
-    """Turn one photograph into a 4D scene: scene file, video, depth, contact sheet and card."""
+    """Generate a 4D scene from one photo: scene file, video, depth, contact sheet and metadata."""
 
     image: Annotated[Path, tyro.conf.Positional]
     """The photograph: an 8-bit RGB JPEG, PNG, WebP, AVIF, TIFF or BMP."""
     camera: str = "spiral"
-    """Presets chained with `+`, such as `spiral` or `orbit:0.25+up`, or a path file."""
+    """Camera presets joined by `+`, such as `spiral` or `orbit:0.25+up`, or a path file."""
     prompt: str | None = None
-    """What happens in the scene; if left out, no text, and no text encoder."""
+    """Text that describes the motion. Default: none; the text encoder is then not run."""
     out: Path = Path("out")
     """Folder for the results."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
     seed: int = 0
-    """One seed gives one scene, bit for bit on one machine."""
+    """Random seed. The same seed gives the same scene, bit for bit, on one machine."""
     model: str = "small"
-    """A model folder, or a size (test, small): its shipped weights, else random ones."""
+    """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
     resolution: int | None = None
-    """Side of a square with as many pixels as the picture will have; if left out, the model's."""
+    """Image size: the side of a square with the same area, in pixels. Default: the model's."""
     fov: float | None = None
     """Horizontal field of view in degrees; if left out, from EXIF, else a 30 mm lens."""
     fill: Literal["none", "video"] | None = None
@@ -48,22 +48,23 @@ class Generate:
     steps: int | None = None
     """Steps of the sampler. If left out, 1 for motion, 8 for video."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
-    """How the flow is integrated; `diff4splat report error-time` compares them."""
+    """ODE solver of the flow. `diff4splat report error-time` compares the solvers."""
     shift: float | None = None
     """Above 1 spends more steps on noisy levels. If left out, 16 for motion, 1 for video."""
     guidance: float | None = None
     """Classifier-free guidance weight, 1 is off. If left out, 1 for motion, 5 for video."""
     min_opacity: float = 0.005
-    """Fainter Gaussians are dropped."""
+    """Gaussians of lower opacity are removed."""
     skip_depth: bool = False
-    """Neither blend nor write depth."""
+    """Do not render and write depth."""
     convert: bool = False
-    """Accept grey, alpha, palette, CMYK, 16-bit and animated pictures and convert them."""
+    """Convert images that are grey, CMYK, 16-bit or animated, or have alpha or a palette."""
 
     def run(self) -> None:
         """Check everything cheap first, then generate, render and write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.renderer import left_out, prepare_renderer
+        from diff4splat.cli.precompile import precompile_renderer
+        from diff4splat.cli.skipped_gaussians import skipped_gaussians
         from diff4splat.generation.input_cameras import path_frame, reconcile_intrinsics
         from diff4splat.generation.pipeline import Diff4SplatPipeline
         from diff4splat.io.atomic import atomic_folder
@@ -85,9 +86,9 @@ class Generate:
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
             pipeline = Diff4SplatPipeline.from_pretrained(self.model)
             scene = pipeline(picture, path, self.prompt, seed=self.seed, settings=settings, log=log)
-            prepare_renderer(scene.gaussians, log.phases)
-            if dropped := left_out(scene, float(scene.path.times_s[0])):
-                note(dropped)
+            precompile_renderer(scene.gaussians, log.phases)
+            if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
+                note(skipped)
             frames = render_frames(scene, scene.path, log, with_depth=not self.skip_depth)
             result = Result.of(scene, picture.rgb, frames.rgb[0])
             facts = describe(result, self.camera, picture.focal_source)
@@ -124,7 +125,7 @@ class Generate:
             **given,
         )
 
-    def picture(self) -> "Picture":
+    def picture(self) -> "InputImage":
         """The photograph at the model's size."""
         from diff4splat.generation.image_size import find_image_size
         from diff4splat.generation.input_image import load_image
@@ -133,7 +134,7 @@ class Generate:
         return load_image(self.image, side_px, self.fov, self.convert, multiple_px)
 
     def inputs(
-        self, picture: "Picture", settings: "GenerationSettings", model_fingerprint: str
+        self, picture: "InputImage", settings: "GenerationSettings", model_fingerprint: str
     ) -> dict[str, object]:
         """Every setting as it was used, for the card."""
         given = {name: value for name, value in asdict(self).items() if name != "options"}

@@ -1,4 +1,4 @@
-"""``diff4splat inspect``: what a network size holds, what a model knows, what a scene contains."""
+"""``diff4splat inspect``: contents of a scene, a model, or a network size."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +16,9 @@ class Inspect:
     scene: Annotated[Path | None, tyro.conf.Positional] = None
     """A scene file."""
     config: str | None = None
-    """A network size: test, small or paper. Nothing is allocated, whatever the size."""
+    """Network size: test, small or paper. No memory is allocated."""
     model: str | None = None
-    """A model folder or the name of a size: which parts are trained, hash, licence and origin."""
+    """Model folder or size: trained parts, hash, licence and origin."""
 
     def run(self) -> None:
         """Print a table to standard output."""
@@ -49,14 +49,14 @@ def size_lines(name: str) -> list[str]:
 
 
 def model_lines(name: str) -> list[str]:
-    """Parts with their state, where the weights lie, their hash, licence and origin."""
+    """Parts with their state; folder, hash, licence and origin of the weights."""
     from diff4splat.models.factory import parameter_counts
     from diff4splat.models.hub.model_info import model_info
 
     facts = model_info(name)
     counts = parameter_counts(facts.config)
     rows = [f"{part:<16}{count:>16,}  {facts.states[part]}" for part, count in counts.items()]
-    told = {
+    properties = {
         "weights": facts.location,
         "weights_sha256": facts.weights_sha256,
         "license": facts.provenance.license,
@@ -65,7 +65,7 @@ def model_lines(name: str) -> list[str]:
     return [
         f"{'network':<16}{'parameters':>16}  state",
         *rows,
-        *(f"{key:<16}{value}" for key, value in told.items()),
+        *(f"{key:<16}{value}" for key, value in properties.items()),
     ]
 
 
@@ -73,7 +73,7 @@ def scene_lines(file: Path) -> list[str]:
     """Counts, times, cameras and provenance of a scene file."""
     from dataclasses import asdict
 
-    from diff4splat.io.scene_file import load_scene
+    from diff4splat.io.scene_files.scene_file import load_scene
     from diff4splat.scene.extent import depth_range
 
     scene = load_scene(file)

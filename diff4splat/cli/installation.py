@@ -1,4 +1,4 @@
-"""Whether this installation is whole: packages, libraries, back ends, and a picture."""
+"""Checks of the installation: packages, libraries, back ends, and a test render."""
 
 import re
 from importlib import import_module, metadata
@@ -9,26 +9,22 @@ from diff4splat.errors import Diff4SplatError
 if TYPE_CHECKING:
     from diff4splat.scene.gaussians import Gaussians
 
-COMPILE_S = 20
-"""Seconds that compiling the CPU renderer takes on a laptop."""
-COMPILE_TRACER_S = 40
-"""The same of the ray tracer."""
 LIBRARIES = (
     "diff4splat.generation.pipeline",
     "diff4splat.outputs.scene_folder",
-    "diff4splat.render.raster.warm",
-    "diff4splat.render.trace.warm",
+    "diff4splat.render.raster.warm_up",
+    "diff4splat.render.trace.warm_up",
 )
-"""Modules that load every library a command needs."""
+"""Modules whose import loads every library that commands need."""
 TOLERANCE = 1e-4
-"""How far RGB may be from that of the reference back end in float64."""
+"""Largest RGB error against the reference back end in float64."""
 
 
 def require_packages() -> None:
-    """Refuse an installation without a package that diff4splat needs.
+    """Require every package that diff4splat depends on.
 
     Raises:
-        Diff4SplatError: naming what is missing.
+        Diff4SplatError: with the missing packages.
     """
     if version("diff4splat") is None:
         raise Diff4SplatError(
@@ -44,7 +40,7 @@ def require_packages() -> None:
 
 
 def version(package: str) -> str | None:
-    """Of an installed package."""
+    """Version of an installed package, or None."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -52,10 +48,10 @@ def version(package: str) -> str | None:
 
 
 def load_libraries() -> None:
-    """Import what commands import.
+    """Import every library that commands need.
 
     Raises:
-        Diff4SplatError: a library is there but cannot be loaded.
+        Diff4SplatError: a library is installed but cannot be loaded.
     """
     try:
         for module in LIBRARIES:
@@ -66,57 +62,49 @@ def load_libraries() -> None:
         ) from error
 
 
-def refusal(backend: str, device: str) -> str | None:
+def unsupported_reason(backend: str, device: str) -> str | None:
     """Why a back end does not draw float32 on a device."""
-    from diff4splat.cli.renderer import picture_job
+    from diff4splat.cli.precompile import small_job
     from diff4splat.render.backends import BACKENDS
 
-    return import_module(BACKENDS[backend]).refusal(picture_job(speck(device)))
+    return import_module(BACKENDS[backend]).unsupported_reason(small_job(single_gaussian(device)))
 
 
-def readiness(backend: str) -> str:
-    """Whether a picture can be had at once."""
-    from diff4splat.cli.renderer import COMPILED, is_compiled
+def backend_readiness(backend: str) -> str:
+    """Whether a back end can render at once."""
+    from diff4splat.cli.precompile import RASTER, RASTERIZER, readiness
 
-    return compiled_or_not(backend != COMPILED or is_compiled(), COMPILE_S)
-
-
-def compiled_or_not(ready: bool, seconds: int) -> str:
-    """What is said of kernels that take so many seconds to compile."""
-    if ready:
-        return "ready"
-    return f"will compile on first use (about {seconds} s); now: diff4splat doctor --warm"
+    return readiness(RASTERIZER) if backend == RASTER else "ready"
 
 
 def tracer_readiness() -> str:
     """Whether rays can be traced at once, or at all."""
-    from diff4splat.render.trace.support import refusal as tracer_refusal
+    from diff4splat.cli.precompile import TRACER, readiness
+    from diff4splat.render.trace.support import unsupported_reason as tracer_reason
 
-    if (reason := tracer_refusal(speck("cpu"))) is not None:
+    if (reason := tracer_reason(single_gaussian("cpu"))) is not None:
         return f"refuses: {reason}"
-    from diff4splat.render.trace import warm
-
-    return compiled_or_not(warm.is_ready(), COMPILE_TRACER_S)
+    return readiness(TRACER)
 
 
 def self_test() -> str:
-    """Draw with the preferred back end, or with the reference while that one is not compiled.
+    """Render with the compiled back end if it is ready, else with the reference.
 
     Raises:
-        Diff4SplatError: the picture is not the one that float64 gives.
+        Diff4SplatError: the image differs from the float64 reference.
     """
     import torch
 
-    from diff4splat.cli.renderer import COMPILED, is_compiled, picture_job
+    from diff4splat.cli.precompile import RASTER, RASTERIZER, kernel_group, small_job
     from diff4splat.render.api import render
 
-    ready = refusal(COMPILED, "cpu") is None and is_compiled()
-    backend = COMPILED if ready else "reference"
-    scene = speck("cpu")
-    camera = picture_job(scene).camera
-    made = render(scene, camera, backend=backend).rgb
+    ready = unsupported_reason(RASTER, "cpu") is None and kernel_group(RASTERIZER).is_ready()
+    backend = RASTER if ready else "reference"
+    scene = single_gaussian("cpu")
+    camera = small_job(scene).camera
+    rgb = render(scene, camera, backend=backend).rgb
     exact = render(scene.to(torch.float64), camera, backend="reference").rgb
-    error = float((made - exact).abs().max())
+    error = float((rgb - exact).abs().max())
     if not error < TOLERANCE or not bool(exact.any()):
         raise Diff4SplatError(
             f"renderer {backend}: expected the picture of float64 within {TOLERANCE:g}, "
@@ -125,8 +113,8 @@ def self_test() -> str:
     return f"renderer {backend} agrees with float64 to {error:.0e}"
 
 
-def speck(device: str) -> "Gaussians":
-    """One Gaussian before the camera."""
+def single_gaussian(device: str) -> "Gaussians":
+    """One Gaussian in front of the camera, for test renders."""
     import torch
 
     from diff4splat.scene.gaussians import Gaussians

@@ -39,7 +39,7 @@ Command = (
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]
-    | Annotated[Prepare, subcommand("prepare", description="Clips to train on: make, check.")]
+    | Annotated[Prepare, subcommand("prepare", description="Training clips: make, encode, check.")]
     | Annotated[Train, subcommand("train")]
     | Annotated[Pack, subcommand("pack")]
     | Annotated[Evaluate, subcommand("eval")]
@@ -49,7 +49,7 @@ BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 2, 130, 141
 
 
 def main() -> NoReturn:
-    """Run the command line; errors a person can act on end in one line and exit code 2."""
+    """Run the command line; user errors end in one line and exit code 2."""
     # Threads that wait must sleep: with a core busy elsewhere, spinning ones make small parallel
     # loops up to fifty times slower. Read once, when torch is loaded.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -69,7 +69,7 @@ def main() -> NoReturn:
 
 
 def run(arguments: list[str]) -> int:
-    """The exit code of one command."""
+    """Run one command; returns the exit code."""
     command = tyro.cli(
         Command,
         prog="diff4splat",
@@ -77,7 +77,7 @@ def run(arguments: list[str]) -> int:
         args=arguments,
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
     )
-    # A polite kill or a closed terminal unwinds like Ctrl-C, so that staged files are removed.
+    # SIGTERM and SIGHUP unwind like Ctrl-C, so that staged files are removed.
     for stop in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, stop):
             signal.signal(getattr(signal, stop), signal.default_int_handler)
@@ -98,10 +98,10 @@ def run(arguments: list[str]) -> int:
 
 
 def require_readable(arguments: list[str]) -> None:
-    """Refuse names that are not text: image and video libraries crash on them.
+    """Reject arguments that are not UTF-8: image and video libraries crash on them.
 
     Raises:
-        InputError: an argument holds bytes that are not UTF-8.
+        InputError: an argument has bytes that are not UTF-8.
     """
     for argument in arguments:
         try:

@@ -1,4 +1,4 @@
-"""``diff4splat pack``: a trained model as a small folder that can be passed on or shipped."""
+"""``diff4splat pack``: export a trained model as a small folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 MEGABYTE = 1e6
@@ -17,18 +17,18 @@ class Pack:
     """Write the trained parts of a model in half precision, with provenance and checksums."""
 
     model: Annotated[Path, tyro.conf.Positional]
-    """A model folder, such as run/model."""
+    """Model folder, such as run/model."""
     out: Path
-    """Folder for the packed model; a CARD.md that lies there stays."""
+    """Folder for the exported model; an existing CARD.md is kept."""
     parts: tuple[str, ...] = ()
-    """Parts to pack, such as vae ldrm; if left out, those that are trained to their end."""
+    """Parts to export, such as vae ldrm. Default: all parts whose training is complete."""
     license: str = "not stated"
-    """Of the weights, as an SPDX name such as Apache-2.0."""
+    """Licence of the weights, as an SPDX name such as Apache-2.0."""
     origin: str = "not stated"
-    """One line on where the weights come from."""
+    """Origin of the weights, in one line."""
 
     def run(self) -> None:
-        """Check, write, and print what each part takes."""
+        """Check, write, and print the size of each part."""
         from diff4splat.cli.console import note
         from diff4splat.models.hub.export import export_model
         from diff4splat.models.hub.model import load_model
@@ -48,10 +48,10 @@ class Pack:
         note(f"wrote {self.out}")
 
     def _require_usable(self) -> None:
-        """Refuse what cannot be packed, before anything is read.
+        """Reject bad arguments before anything is read.
 
         Raises:
-            ConfigError: no model folder, a place that is the same, or words of several lines.
+            ConfigError: no model folder, output equal to input, or text of several lines.
         """
         if not self.model.is_dir():
             raise ConfigError(

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.camera_choice import CameraOptions, choose_path
-from diff4splat.cli.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.camera import CameraOptions, choose_path
+from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -22,17 +22,17 @@ class PreviewPath:
     """Check a camera path and draw it."""
 
     camera: Annotated[str, tyro.conf.Positional]
-    """Presets such as `spiral` or `orbit:0.25+up`, or a path file."""
+    """Camera presets such as `spiral` or `orbit:0.25+up`, or a path file."""
     out: Path = Path("path.png")
-    """Where to draw it."""
+    """Image file for the drawing."""
     fov: float = 62.0
     """Horizontal field of view in degrees, for presets and files without a lens."""
     near_depth: float = 1.0
-    """Distance of the nearest content, which sizes the presets."""
+    """Distance of the nearest content, which sets the size of presets."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
 
     def run(self) -> None:
-        """Print what the camera does, then write the drawing."""
+        """Print statistics of the path, then write the drawing."""
         from diff4splat.cli.console import note
         from diff4splat.geometry.camera import focal_from_fov, pinhole
         from diff4splat.outputs.path_plot import save_path_preview
@@ -55,7 +55,7 @@ class PreviewPath:
 
 
 def print_summary(summary: "PathSummary") -> None:
-    """What the camera does, in numbers, and what is odd about it."""
+    """Print statistics and warnings of a camera path."""
     low, high = summary.focal_range_px
     facts = {
         "frames": f"{summary.frames} in {summary.seconds:.3g} s",

@@ -1,4 +1,4 @@
-"""``diff4splat prepare``: clips to train on, and whether clips agree with themselves."""
+"""``diff4splat prepare``: make training clips, encode them, and check their consistency."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,45 +7,45 @@ from typing import Literal
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareSynthetic:
-    """Draw procedural worlds into a folder of shards; after a stop, --append goes on."""
+    """Render procedural clips into a folder of shards. --append continues after an interruption."""
 
     out: Path
     """Folder for the shards, the manifest and a contact sheet."""
     clips: int
-    """How many clips."""
+    """Number of clips."""
     seed: int = 0
-    """Worlds of another seed are other worlds."""
+    """Random seed of the worlds."""
     first: int = 0
     """Index of the first world, to continue a series in another folder."""
     split: Literal["training", "held_out"] = "training"
-    """Families, textures and motions to draw from."""
+    """Split whose object families, textures and motions are used."""
     still_share: float = 0.25
-    """Share of clips in which only the camera moves."""
+    """Fraction of clips in which only the camera moves."""
     against_share: float = 0.0
-    """Share of things that go against what their place and facing suggest: only text tells then."""
+    """Fraction of objects whose motion contradicts their pose: only the text determines it."""
     frozen_share: float = 0.0
-    """Share of the other clips in which what could move stands all the same."""
+    """Fraction of the other clips whose movable objects are static."""
     size: int = 128
-    """Picture side in pixels."""
+    """Image side in pixels."""
     frames: int = 17
     """Frames per clip, 1 + 4 k for training."""
     fps: float = 8.0
-    """Frames per second; 3 frames at 1 are the moments that a motion branch needs."""
+    """Frames per second; the motion network is trained on 3 frames at 1 fps."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     rig: bool = False
-    """Cameras stand all around, for per-scene fitting; the last two are good to hold out."""
+    """Place cameras all around the scene, for per-scene fitting; hold out the last two."""
     motions: tuple[str, ...] = ()
-    """Only worlds with these motions, such as slides or bends; if left out, any."""
+    """Only worlds with these motions, such as slides or bends. Default: all motions."""
     tracks: int = 512
     """Points followed through every clip."""
     workers: int = 1
-    """Processes that draw."""
+    """Number of rendering processes."""
     append: bool = False
-    """Add to a folder that has clips; those it has already are not drawn again."""
+    """Add to an existing folder; existing clips are kept."""
 
     def run(self) -> None:
-        """Draw, write, and show a contact sheet."""
+        """Render the clips, write them, and write a contact sheet."""
         from diff4splat.cli.console import ConsolePhases, note
         from diff4splat.data_prep.clip_sheet import write_clip_sheet
         from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
@@ -82,30 +82,30 @@ class PrepareSynthetic:
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareLatents:
-    """Encode clips and their drafts once, so that the video model need not read pictures."""
+    """Encode clips and their render conditions once, so that training reads no images."""
 
     clips: Path
     """Folder of shards."""
     out: Path
-    """Folder for the latents; files that are there already are left as they are."""
+    """Folder for the latents; existing files are kept."""
     model: str = "small"
-    """Model (folder or name) that encodes."""
+    """Model folder or name of the encoder."""
     config: str = "small"
     """Recipe whose video_diffusion stage sets the frames and their size."""
     mirror: bool = True
-    """Each clip also with left and right exchanged, in pictures and in words."""
+    """Also encode each clip mirrored left to right, in images and caption."""
 
     def run(self) -> None:
         """Encode and write."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.installation import single_gaussian
+        from diff4splat.cli.precompile import precompile_renderer
         from diff4splat.configs.recipes import find_recipe
         from diff4splat.models.hub.model import load_model
         from diff4splat.training.latents.encode import EncodingJob, encode_clips
 
         phases = ConsolePhases()
-        prepare_renderer(speck("cpu"), phases)
+        precompile_renderer(single_gaussian("cpu"), phases)
         job = EncodingJob(
             model=load_model(self.model),
             data=find_recipe(self.config).stage_of_kind("video_diffusion").data,
@@ -118,18 +118,18 @@ class PrepareLatents:
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareCheck:
-    """Whether depth, cameras, flow and tracks of every clip agree; any folder of shards."""
+    """Check that depth, cameras, flow and tracks of every clip are consistent."""
 
     folder: Path
     """Folder of shards."""
     most: int | None = None
-    """Look at so many clips, spread evenly; if left out, at all."""
+    """Check N evenly spread clips. Default: all clips."""
 
     def run(self) -> None:
-        """Print the worst disagreement of each kind.
+        """Print the largest inconsistency of each kind.
 
         Raises:
-            InputError: a clip disagrees by more than exact truth may.
+            InputError: a clip exceeds the tolerance of exact ground truth.
         """
         from diff4splat.cli.console import ConsolePhases
         from diff4splat.data_prep.checking import check_folder

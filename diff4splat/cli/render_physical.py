@@ -1,11 +1,11 @@
 """``diff4splat render`` with a physical camera: one file, or a data set of all effects."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diff4splat.cli.optics_options import OpticsOptions
+from diff4splat.cli.options.optics import OpticsOptions
+from diff4splat.cli.options.single_frame import select_physical_frame
 
 if TYPE_CHECKING:
     from diff4splat.paths.camera_path import CameraPath
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
 
 
-def film_file(
+def render_file(
     scene: "Scene",
     path: "CameraPath",
     options: OpticsOptions,
@@ -24,30 +24,30 @@ def film_file(
     frame: int,
     log: "RunLog",
 ) -> None:
-    """Look along ``path`` through the camera of ``options``, into one file.
+    """Render ``path`` with the camera of ``options`` into one file.
 
-    A single picture (.png) is ``frame`` of it.
+    A PNG holds only ``frame``.
     """
     from diff4splat.cli.console import note
-    from diff4splat.cli.optics_choice import choose_optics, photo_settings
+    from diff4splat.cli.options.physical_path import choose_optics, to_photo_settings
     from diff4splat.outputs.physical_view import require_view_suffix, write_physical_view
 
     suffix = require_view_suffix(out)
-    filmed, notes = choose_optics(scene, path, options)
+    physical_path, notes = choose_optics(scene, path, options)
     for line in notes:
         note(line)
     if suffix == ".png":
-        filmed = one_frame(filmed, frame)
-    settings = photo_settings(options)
-    prepare(scene, [filmed], settings, log.phases)
-    taken = write_physical_view(scene, filmed, out, settings, log)
+        physical_path = select_physical_frame(physical_path, frame)
+    settings = to_photo_settings(options)
+    precompile_renderers(scene, [physical_path], settings, log.phases)
+    taken = write_physical_view(scene, physical_path, out, settings, log)
     for line in taken.lines():
         note(line)
-    if suffix == ".exr" and _looks_behind(filmed):
+    if suffix == ".exr" and _is_wider_than_half_space(physical_path):
         note("the lens looks sideways or behind itself: distance along the ray, not z-depth")
 
 
-def film_dataset(
+def render_dataset(
     scene: "Scene",
     path: "CameraPath",
     options: OpticsOptions,
@@ -55,54 +55,46 @@ def film_dataset(
     time_s: float | None,
     log: "RunLog",
 ) -> None:
-    """Every effect alone and all together, as folders in ``out``."""
+    """Write each effect, and all effects combined, to folders in ``out``."""
     from diff4splat.cli.console import note
-    from diff4splat.cli.optics_choice import choose_effects, photo_settings
+    from diff4splat.cli.options.physical_path import choose_effects, to_photo_settings
     from diff4splat.outputs.camera_dataset.writer import (
         DatasetJob,
         require_empty,
         write_camera_dataset,
     )
-    from diff4splat.outputs.photographs import stopped
+    from diff4splat.outputs.photo_sequence import freeze_time
 
     require_empty(out)
-    sequences, notes = choose_effects(stopped(scene, time_s), path, options)
+    sequences, notes = choose_effects(freeze_time(scene, time_s), path, options)
     for line in notes:
         note(line)
-    settings = photo_settings(options)
-    prepare(scene, sequences.values(), settings, log.phases)
+    settings = to_photo_settings(options)
+    precompile_renderers(scene, sequences.values(), settings, log.phases)
     job = DatasetJob(scene=scene, sequences=sequences, settings=settings, time_s=time_s)
     taken = write_camera_dataset(job, out, log)
-    for name, own in taken.items():
-        note(f"{name}: {'; '.join(own.lines())}")
+    for name, stats in taken.items():
+        note(f"{name}: {'; '.join(stats.lines())}")
 
 
-def prepare(
+def precompile_renderers(
     scene: "Scene",
     sequences: "Iterable[PhysicalPath]",
     settings: "PhotoSettings",
     phases: "Phases",
 ) -> None:
     """Compile what will draw, with a progress bar, unless that is done."""
-    from diff4splat.cli.renderer import compile_ahead, prepare_renderer
-    from diff4splat.outputs.photographs import needs_rays
-    from diff4splat.render.trace import warm
+    from diff4splat.cli.precompile import precompile_renderer, precompile_tracer
+    from diff4splat.outputs.photo_sequence import needs_rays
 
     traced = [needs_rays(scene, filmed, settings) for filmed in sequences]
-    if any(traced) and not warm.is_ready():
-        compile_ahead(warm, phases)
+    if any(traced):
+        precompile_tracer(phases)
     if not all(traced):
-        prepare_renderer(scene.gaussians, phases)
+        precompile_renderer(scene.gaussians, phases)
 
 
-def one_frame(filmed: "PhysicalPath", frame: int) -> "PhysicalPath":
-    """The path that shows one of its frames; the camera comes from where it was and goes on."""
-    from diff4splat.cli.render import one_pose
+def _is_wider_than_half_space(physical_path: "PhysicalPath") -> bool:
+    from diff4splat.outputs.photo_sequence import geometry_kind
 
-    return replace(filmed, path=one_pose(filmed.path, frame))
-
-
-def _looks_behind(filmed: "PhysicalPath") -> bool:
-    from diff4splat.outputs.photographs import geometry_kind
-
-    return geometry_kind(filmed) == "distance"
+    return geometry_kind(physical_path) == "distance"

@@ -11,20 +11,20 @@ class ErrorTime:
     out: Path = Path("error-time")
     """Folder for the results."""
     knob: tuple[str, ...] = ()
-    """Names to sweep; if left out, all; see `diff4splat report knobs`."""
+    """Approximation settings to sweep, as listed by `diff4splat report knobs`. Default: all."""
     repeats: int = 3
-    """Timed runs per setting; the fastest counts."""
+    """Timed runs per setting; the fastest is reported."""
 
     def run(self) -> None:
         """Measure, write, and print the table."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
+        from diff4splat.cli.installation import single_gaussian
+        from diff4splat.cli.precompile import precompile_renderer
         from diff4splat.error_time import report as error_time
 
         phases = ConsolePhases()
         # Knobs of the renderer must not count its compilation.
-        prepare_renderer(speck("cpu"), phases)
+        precompile_renderer(single_gaussian("cpu"), phases)
         written = error_time.run(self.out, self.knob, self.repeats, phases)
         print(written.table)
         note(f"wrote {', '.join(file.name for file in written.files)} to {self.out}")
@@ -32,10 +32,10 @@ class ErrorTime:
 
 @dataclass(frozen=True, kw_only=True)
 class ListKnobs:
-    """List every approximation that can be swept, with its settings and default."""
+    """List every approximation setting with its values and default."""
 
     def run(self) -> None:
-        """Print one line per knob."""
+        """Print name, default and values of every setting."""
         from diff4splat.error_time.known_knobs import known_knobs
 
         for knob in known_knobs():

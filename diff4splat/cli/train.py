@@ -1,4 +1,4 @@
-"""``diff4splat train``: one stage of a recipe, from wherever its folder left off."""
+"""``diff4splat train``: train one stage of a recipe, or resume it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,40 +14,39 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
-    """Train one stage; the same command goes on after any stop. Also under torchrun."""
+    """Train one stage; the same command resumes it. Works under torchrun."""
 
     config: str
     """Recipe: test, small or paper; or a JSON file such as the recipe.json of a run."""
     stage: str
     """Name of the stage, as in the recipe: vae, static-low, dynamic, video_diffusion, joint."""
     out: Path = Path("training-run")
-    """Folder of the whole run; every stage has its own folder in it."""
+    """Folder of the run, with one subfolder per stage."""
     clips: Path | None = None
-    """Folder of shards to learn from; if left out, the worlds that the recipe names."""
+    """Folder of shards to train on. Default: the procedural worlds of the recipe."""
     latents: tuple[Path, ...] = ()
     """Folders of encoded clips (prepare latents) for a video_diffusion stage, instead of
     clips."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
-    """Changes such as stages.vae.steps=2000 or trainer.parallel=ddp; may be given again."""
+    """Recipe overrides such as stages.vae.steps=2000 or trainer.parallel=ddp; repeatable."""
     from_model: str | None = None
-    """Model (folder or name) whose trained parts stand in for those that no stage here trained."""
+    """Model folder or name that initialises the parts not trained by earlier stages."""
     features: str | None = None
-    """Weights of LPIPS, as vgg:FILE or alex:FILE; if left out, a stand-in without weights."""
+    """LPIPS weights: vgg:FILE or alex:FILE. Default: a distance without weights."""
     steps: int | None = None
-    """Save and stop after so many steps of this call."""
+    """Save and stop after this many steps."""
     minutes: float | None = None
-    """Save and stop after so many minutes of this call."""
+    """Save and stop after this many minutes."""
     device: str | None = None
-    """Such as cpu; if left out, a GPU if there is one."""
+    """Device, such as cpu. Default: a GPU if available."""
     ignore_gates: bool = False
-    """Start although the stages before fell short or are not over."""
+    """Start even if earlier stages are unfinished or below their quality thresholds."""
 
     def run(self) -> None:
-        """Train, then say how far it came."""
+        """Train, then print step and metrics."""
         from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import speck
-        from diff4splat.cli.renderer import prepare_renderer
-        from diff4splat.cli.worlds import prepare_sources
+        from diff4splat.cli.installation import single_gaussian
+        from diff4splat.cli.precompile import precompile_renderer, precompile_sources
         from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
         from diff4splat.training.recipe.overrides import override
         from diff4splat.training.train_stage import StageRequest, is_main_process, train_stage
@@ -60,8 +59,8 @@ class Train:
             recipe = with_latents(recipe, self.stage, self.latents)
         recipe.stage(self.stage)
         phases = ConsolePhases()
-        prepare_renderer(speck("cpu"), phases)
-        prepare_sources(recipe.stage(self.stage).data.sources, phases)
+        precompile_renderer(single_gaussian("cpu"), phases)
+        precompile_sources(recipe.stage(self.stage).data.sources, phases)
         request = StageRequest(
             recipe=recipe,
             stage=self.stage,
@@ -81,7 +80,9 @@ class Train:
         measures = ", ".join(f"{name} {value:.4g}" for name, value in result.measures.items())
         total = recipe.stage(self.stage).steps
         more = "" if result.outcome == "finished" else "; the same command goes on"
-        print(f"{self.stage}: step {result.step} of {total} ({measures or 'not judged yet'}){more}")
+        print(
+            f"{self.stage}: step {result.step} of {total} ({measures or 'not evaluated yet'}){more}"
+        )
 
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""
@@ -92,7 +93,7 @@ class Train:
         return load_model(self.from_model)
 
     def _require_some_work(self) -> None:
-        """Refuse limits that leave nothing to do, before anything is loaded.
+        """Reject limits below one step, before anything is loaded.
 
         Raises:
             ConfigError: a limit is not above 0.

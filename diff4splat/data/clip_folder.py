@@ -11,10 +11,10 @@ from pathlib import Path
 from diff4splat.data.checks import require_usable
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_part import WHOLE, ClipPart
+from diff4splat.data.codecs.decode import decode_clip, wanted_members
 from diff4splat.data.entry import ClipEntry
 from diff4splat.data.licenses import commercial_ok
 from diff4splat.data.manifest import Manifest, read_manifest
-from diff4splat.data.members.decode import decode_clip, wanted_members
 from diff4splat.data.shard_reader import ShardReader
 from diff4splat.errors import FileFormatError, InputError
 

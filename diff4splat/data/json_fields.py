@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
+from diff4splat.io.require_file import require_file
 
 VERSION = 1
 """Of manifest, index and clip note alike; it changes when an old reader would go wrong."""

@@ -11,7 +11,7 @@ import zlib
 from contextlib import suppress
 from pathlib import Path
 
-from diff4splat.data.members.encode import EncodedClip
+from diff4splat.data.codecs.encode import EncodedClip
 from diff4splat.data.shard_index import ShardIndex, Slot
 
 

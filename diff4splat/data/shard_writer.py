@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 
 from diff4splat.data.clip import Clip
+from diff4splat.data.codecs.encode import Coding, EncodedClip, encode_clip
 from diff4splat.data.entry import ClipEntry
 from diff4splat.data.manifest import (
     MANIFEST,
@@ -23,7 +24,6 @@ from diff4splat.data.manifest import (
     read_manifest,
     write_manifest,
 )
-from diff4splat.data.members.encode import Coding, EncodedClip, encode_clip
 from diff4splat.data.shard_file import ShardFile
 from diff4splat.data.shard_index import index_file, write_index
 from diff4splat.errors import ConfigError, InputError, OutputError

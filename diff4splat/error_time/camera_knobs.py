@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.error_time.render_knobs import half_faint_gaussians
 from diff4splat.error_time.scene_knobs import random_gaussians, rmse, truncate_harmonics
 from diff4splat.geometry import quaternion
@@ -60,11 +60,11 @@ class TimeSteps:
         return f"{self.rows} rows" if self.rows else f"within {self.tolerance_px:g} px"
 
 
-def chunk_knob() -> Knob:
+def chunk_knob() -> ApproximationSetting:
     """How many lines of a rolling shutter see the same straight motion."""
     rows = (SIZE_PX[0], 60, 30, 16, 8, 4, 2, 1)
     tolerances = (3.0, 1.0, 0.3, 0.1)
-    return Knob(
+    return ApproximationSetting(
         name="rows-per-chunk",
         summary="reading several lines as if what moves went straight and kept its shape",
         error_unit=_ERROR_UNIT,
@@ -82,23 +82,23 @@ def chunk_knob() -> Knob:
     )
 
 
-def aperture_knob() -> Knob:
+def aperture_knob() -> ApproximationSetting:
     """How many rays of a pixel start from the lens."""
     return _samples_knob(
         "aperture-samples", "averaging a few rays over the aperture", LENS_SAMPLES, blurred_picture
     )
 
 
-def exposure_knob() -> Knob:
+def exposure_knob() -> ApproximationSetting:
     """How many moments of the exposure a pixel sees."""
     return _samples_knob(
         "exposure-samples", "averaging a few moments", EXPOSURE_SAMPLES, exposed_picture
     )
 
 
-def trace_light_knob() -> Knob:
+def trace_light_knob() -> ApproximationSetting:
     """When a ray has seen enough layers."""
-    return Knob(
+    return ApproximationSetting(
         name="trace-light-cutoff",
         summary="ending rays where little light comes through from behind",
         error_unit=_ERROR_UNIT,
@@ -112,8 +112,8 @@ def trace_light_knob() -> Knob:
     )
 
 
-def _samples_knob(name: str, summary: str, default: int, run) -> Knob:
-    return Knob(
+def _samples_knob(name: str, summary: str, default: int, run) -> ApproximationSetting:
+    return ApproximationSetting(
         name=name,
         summary=summary,
         error_unit=_ERROR_UNIT,

@@ -13,10 +13,10 @@ from functools import cache
 import torch
 from torch import Tensor
 
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
+from diff4splat.flow.analytic_mixture import GaussianMixture, random_mixture
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, Guidance, guided
 from diff4splat.flow.levels import Schedule, make_levels
-from diff4splat.flow.mixture import GaussianMixture, random_mixture
 from diff4splat.flow.samplers import SAMPLERS, VelocityFn, find_sampler, integrate
 
 TRAJECTORIES = 192
@@ -58,18 +58,18 @@ REFERENCE = SamplerSetting(sampler="midpoint", steps=2000, schedule="uniform")
 """Agrees with twice as many steps, and with another sampler, to about 1e-6."""
 
 
-def sampler_knob() -> Knob:
+def sampler_knob() -> ApproximationSetting:
     """Which sampler, at how many network calls, on the log-SNR schedule."""
     return _compare_samplers("sampler", "solving the sampling equation in few steps", Guidance())
 
 
-def guided_sampler_knob() -> Knob:
+def guided_sampler_knob() -> ApproximationSetting:
     """The same under strong guidance, which makes the flow stiffer."""
     summary = f"solving the sampling equation with guidance {GUIDANCE_WEIGHT:g} in few steps"
     return _compare_samplers("sampler-guided", summary, Guidance(weight=GUIDANCE_WEIGHT))
 
 
-def levels_knob() -> Knob:
+def levels_knob() -> ApproximationSetting:
     """Which noise levels to visit, with the default sampler."""
     schedules = (("log_snr", 1.0), ("uniform", 1.0), ("uniform", 3.0), ("uniform", 5.0))
     settings = tuple(
@@ -77,7 +77,7 @@ def levels_knob() -> Knob:
         for schedule, shift in schedules
         for calls in CALLS
     )
-    return Knob(
+    return ApproximationSetting(
         name="levels",
         summary="spacing of the noise levels between 1 and 0",
         error_unit=_ERROR_UNIT,
@@ -92,13 +92,13 @@ def levels_knob() -> Knob:
     )
 
 
-def guidance_knob() -> Knob:
+def guidance_knob() -> ApproximationSetting:
     """At which noise levels to evaluate the unconditional branch."""
     intervals = ((0.0, 1.0), (0.2, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.9), (0.2, 0.8), (0.4, 0.7))
     settings = tuple(
         Guidance(weight=GUIDANCE_WEIGHT, low=low, high=high) for low, high in intervals
     )
-    return Knob(
+    return ApproximationSetting(
         name="guidance-interval",
         summary=f"guidance (weight {GUIDANCE_WEIGHT:g}) only inside an interval of noise levels",
         error_unit=_ERROR_UNIT,
@@ -117,13 +117,13 @@ def median_relative_error(result: Tensor, reference: Tensor) -> float:
     return float(((result - reference).norm(dim=-1) / reference.norm(dim=-1)).median())
 
 
-def _compare_samplers(name: str, summary: str, guidance: Guidance) -> Knob:
+def _compare_samplers(name: str, summary: str, guidance: Guidance) -> ApproximationSetting:
     settings = tuple(
         SamplerSetting(sampler=sampler.name, steps=calls // sampler.calls_per_step)
         for sampler in SAMPLERS.values()
         for calls in CALLS
     )
-    return Knob(
+    return ApproximationSetting(
         name=name,
         summary=summary,
         error_unit=_ERROR_UNIT,

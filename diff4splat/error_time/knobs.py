@@ -1,7 +1,7 @@
-"""Knobs: approximations whose error and run time are measured against a registered reference.
+"""Approximation settings whose error and run time are measured against a reference.
 
-A knob has settings from cheap to exact. ``run`` computes a result with one setting, ``error``
-compares it with the result of the reference setting; 0 means the same.
+The values of a setting range from fast to exact. ``run`` computes a result with one value,
+``error`` compares it with the result of the reference value; 0 means identical.
 """
 
 import re
@@ -12,15 +12,15 @@ from typing import Any
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knob:
-    """One approximation: what it may be set to, and against what it is measured."""
+class ApproximationSetting:
+    """One approximation: its values, and the reference value."""
 
     name: str
-    """Also part of file names: lower case, digits and ``-``."""
+    """Part of file names: lower case, digits and ``-``."""
     summary: str
     """What is approximated, in one line."""
     error_unit: str
@@ -29,16 +29,16 @@ class Knob:
     default: Hashable
     """One of ``settings``."""
     reference: Hashable
-    """The setting that counts as exact; need not be one of ``settings``."""
+    """The exact value; need not be in ``settings``."""
     run: Callable[[Any], Tensor]
     error: Callable[[Tensor, Tensor], float]
     """(result, result of the reference) to an error of 0 or above."""
     series: Callable[[Any], str] = lambda _: ""
-    """Settings of the same series are one curve in the plot."""
+    """Values of one series form one curve in the plot."""
     label: Callable[[Any], str] = str
     """Short name of a setting beside its point."""
     label_meaning: str = ""
-    """What the labels say, where they are bare numbers."""
+    """Meaning of the labels, if they are plain numbers."""
 
     def __post_init__(self) -> None:
         if not re.fullmatch("[a-z0-9]+(-[a-z0-9]+)*", self.name):
@@ -57,9 +57,9 @@ class Knob:
 class KnobRegistry:
     """Knobs by name, in the order in which they were registered."""
 
-    _knobs: dict[str, Knob] = field(default_factory=dict)
+    _knobs: dict[str, ApproximationSetting] = field(default_factory=dict)
 
-    def register(self, knob: Knob) -> None:
+    def register(self, knob: ApproximationSetting) -> None:
         """Add a knob.
 
         Raises:
@@ -69,7 +69,7 @@ class KnobRegistry:
             raise ConfigError(f"knob {knob.name}: expected a new name, got one that is taken")
         self._knobs[knob.name] = knob
 
-    def knobs(self, names: tuple[str, ...] = ()) -> tuple[Knob, ...]:
+    def knobs(self, names: tuple[str, ...] = ()) -> tuple[ApproximationSetting, ...]:
         """All knobs, or those of the given names.
 
         Raises:

@@ -1,7 +1,7 @@
 """The knobs that come with the library; other packages register theirs beside them."""
 
 from diff4splat.error_time import camera_knobs, flow_knobs, render_knobs, scene_knobs
-from diff4splat.error_time.knobs import Knob, KnobRegistry
+from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 
 _BUILDERS = (
     flow_knobs.sampler_knob,
@@ -28,7 +28,7 @@ def register_known_knobs(registry: KnobRegistry) -> None:
         registry.register(build())
 
 
-def known_knobs() -> tuple[Knob, ...]:
+def known_knobs() -> tuple[ApproximationSetting, ...]:
     """All of them."""
     registry = KnobRegistry()
     register_known_knobs(registry)

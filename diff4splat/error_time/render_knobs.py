@@ -18,11 +18,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.error_time.scene_knobs import random_gaussians, rmse, truncate_harmonics
 from diff4splat.geometry.camera import pinhole
 from diff4splat.render.api import render
-from diff4splat.render.raster.plan import (
+from diff4splat.render.raster.raster_settings import (
     DEFAULT_LIGHT_CUTOFF,
     DEFAULT_TILE_PX,
     TILE_SIZES_PX,
@@ -74,9 +74,9 @@ class Arithmetic:
         return f"{self.backend} {str(self.dtype).removeprefix('torch.')}"
 
 
-def tile_knob() -> Knob:
+def tile_knob() -> ApproximationSetting:
     """How many pixels share one list of Gaussians."""
-    return Knob(
+    return ApproximationSetting(
         name="tile-size",
         summary="cutting the picture into tiles, which should change nothing",
         error_unit=_ERROR_UNIT,
@@ -89,10 +89,10 @@ def tile_knob() -> Knob:
     )
 
 
-def support_knob() -> Knob:
+def support_knob() -> ApproximationSetting:
     """Below which contribution to a pixel a Gaussian ends."""
     denominators = (16, 64, 128, 255, 512, 1024, 10_000)
-    return Knob(
+    return ApproximationSetting(
         name="support-cutoff",
         summary="cutting off Gaussians where they contribute little",
         error_unit=_ERROR_UNIT,
@@ -105,9 +105,9 @@ def support_knob() -> Knob:
     )
 
 
-def light_knob() -> Knob:
+def light_knob() -> ApproximationSetting:
     """When a pixel has seen enough layers."""
-    return Knob(
+    return ApproximationSetting(
         name="light-cutoff",
         summary="stopping where little light comes through from behind",
         error_unit=_ERROR_UNIT,
@@ -121,14 +121,14 @@ def light_knob() -> Knob:
     )
 
 
-def dilation_knob() -> Knob:
+def dilation_knob() -> ApproximationSetting:
     """What stands in for the average over a pixel's square."""
     settings = tuple(
         Dilation(variance_px2=variance, compensated=compensated)
         for compensated in (False, True)
         for variance in _DILATIONS_PX2
     )
-    return Knob(
+    return ApproximationSetting(
         name="dilation",
         summary="blurring footprints instead of averaging over pixels",
         error_unit=_ERROR_UNIT,
@@ -143,11 +143,11 @@ def dilation_knob() -> Knob:
     )
 
 
-def precision_knob() -> Knob:
+def precision_knob() -> ApproximationSetting:
     """Which back end, in which floating-point numbers."""
     kinds = (("raster", torch.float32), ("reference", torch.float32), ("reference", torch.float64))
     settings = tuple(Arithmetic(backend=backend, dtype=dtype) for backend, dtype in kinds)
-    return Knob(
+    return ApproximationSetting(
         name="precision",
         summary="drawing in single precision, with kernels or PyTorch",
         error_unit=_ERROR_UNIT,

@@ -11,7 +11,7 @@ from functools import cache
 import torch
 from torch import Tensor
 
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.scene.edit import MIN_OPACITY
 from diff4splat.scene.gaussians import Gaussians
@@ -22,9 +22,9 @@ SIZE_PX = (144, 192)
 _ERROR_UNIT = "RMSE of RGB in [0, 1]"
 
 
-def pruning_knob() -> Knob:
+def pruning_knob() -> ApproximationSetting:
     """Which Gaussians are too transparent to keep."""
-    return Knob(
+    return ApproximationSetting(
         name="pruning",
         summary="dropping Gaussians below an opacity",
         error_unit=_ERROR_UNIT,
@@ -38,9 +38,9 @@ def pruning_knob() -> Knob:
     )
 
 
-def harmonics_knob() -> Knob:
+def harmonics_knob() -> ApproximationSetting:
     """How many bands of view-dependent colour to evaluate."""
-    return Knob(
+    return ApproximationSetting(
         name="sh-degree",
         summary="leaving out the upper bands of the spherical harmonics",
         error_unit=_ERROR_UNIT,

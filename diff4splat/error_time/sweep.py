@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.errors import ConfigError
 
 Clock = Callable[[], float]
@@ -35,7 +35,7 @@ class Measurement:
 class SweepResult:
     """All settings of one knob, in the knob's order."""
 
-    knob: Knob
+    knob: ApproximationSetting
     repeats: int
     rows: tuple[Measurement, ...]
 
@@ -84,7 +84,7 @@ class SweepResult:
 
 
 def sweep(
-    knob: Knob,
+    knob: ApproximationSetting,
     repeats: int = 3,
     advance: Callable[[], None] = lambda: None,
     clock: Clock = time.perf_counter,
@@ -115,12 +115,14 @@ def sweep(
     return SweepResult(knob=knob, repeats=repeats, rows=tuple(_row(knob, *row) for row in measured))
 
 
-def steps_of(knob: Knob, repeats: int) -> int:
+def steps_of(knob: ApproximationSetting, repeats: int) -> int:
     """How many runs ``sweep`` makes."""
     return 1 + len(knob.settings) * (1 + repeats)
 
 
-def _row(knob: Knob, setting: Hashable, seconds: list[float], error: float) -> Measurement:
+def _row(
+    knob: ApproximationSetting, setting: Hashable, seconds: list[float], error: float
+) -> Measurement:
     return Measurement(
         setting=setting,
         label=knob.label(setting),

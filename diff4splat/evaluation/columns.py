@@ -1,30 +1,30 @@
-"""The columns of the table: what each measure is called, and which way is better."""
+"""Columns of the results table: title, meaning, and which direction is better."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from diff4splat.evaluation.protocol import Task
+from diff4splat.evaluation.protocols.protocol import Task
 
 SYSTEM = "system"
-"""Row of the system under test in stored results."""
+"""Row of the system in stored results."""
 PSNR_CAP_DB = 100.0
-"""Equal pictures count as this: an infinite item would swallow every mean."""
+"""Value of identical images: an infinite PSNR would make every mean infinite."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """One measure."""
+    """One metric."""
 
     key: str
     title: str
     better: Literal["higher", "lower", "neither"]
-    """Neither: it says something of the clips, not of the rows."""
+    """``neither`` if the value depends on the clips alone."""
     meaning: str
     tasks: tuple[Task, ...] = ("generation", "reconstruction")
 
     @property
     def sign(self) -> int:
-        """Times a difference, above 0 means better; 0 where nothing is."""
+        """Factor that makes differences above 0 mean better; 0 for ``neither``."""
         return {"higher": 1, "lower": -1, "neither": 0}[self.better]
 
 
@@ -33,32 +33,37 @@ COLUMNS = (
         key="psnr",
         title="PSNR [dB]",
         better="higher",
-        meaning=f"colour of the judged pictures, capped at {PSNR_CAP_DB:g} per picture",
+        meaning=f"colour of the target images, capped at {PSNR_CAP_DB:g} per image",
     ),
     Column(
         key="covisible_psnr",
         title="PSNR seen [dB]",
         better="higher",
-        meaning="PSNR over the pixels whose surface the input shows, as true depth tells",
+        meaning="PSNR over the pixels whose surface is visible in the input, by ground truth depth",
     ),
     Column(
         key="covisible_share",
         title="seen",
         better="neither",
-        meaning="share of such pixels in the judged pictures; it depends on the clips alone",
+        meaning="fraction of such pixels in the target images; depends on the clips alone",
     ),
-    Column(key="ssim", title="SSIM", better="higher", meaning="structure of the judged pictures"),
+    Column(
+        key="ssim",
+        title="SSIM",
+        better="higher",
+        meaning="structural similarity of the target images",
+    ),
     Column(
         key="perceptual",
         title="perceptual",
         better="lower",
-        meaning="perceptual distance of the judged pictures, by the features named above",
+        meaning="perceptual distance of the target images, by the features named above",
     ),
     Column(
         key="depth_pearson",
         title="depth r",
         better="higher",
-        meaning="correlation of rendered and true depth where the truth has one",
+        meaning="correlation of rendered and true depth where true depth is known",
     ),
     Column(
         key="depth_absrel",
@@ -70,71 +75,74 @@ COLUMNS = (
         key="track_error",
         title="track EPE",
         better="lower",
-        meaning="distance from where followed points are truly, in units of which the median "
-        "depth of the first frame is 4",
+        meaning="end-point error of tracked points, in units where the median depth of the "
+        "first frame is 4",
     ),
     Column(
         key="track_ratio",
         title="EPE / still",
         better="lower",
-        meaning="track EPE over that of standing still; clips without motion have none",
+        meaning="track EPE divided by that of zero motion; undefined for clips without motion",
     ),
     Column(
         key="moving_share",
         title="moving if still",
         better="lower",
-        meaning="share of Gaussians that move on clips in which nothing does",
+        meaning="fraction of moving Gaussians on static clips",
     ),
     Column(
         key="loop_psnr",
         title="loop [dB]",
         better="higher",
-        meaning="last against first picture of a closed path while time runs, still clips only",
+        meaning="last against first image of a closed path while time runs, static clips only",
     ),
     Column(
         key="pose_translation",
         title="RPE trans",
         better="lower",
-        meaning="error of the camera's steps as recovered from rendered pictures, scene units",
+        meaning="translation error of camera steps estimated from rendered images, scene units",
     ),
     Column(
-        key="pose_rotation", title="RPE rot [°]", better="lower", meaning="the same for its turns"
+        key="pose_rotation",
+        title="RPE rot [°]",
+        better="lower",
+        meaning="rotation error of the same steps",
     ),
     Column(
         key="pose_failed",
         title="RPE failed",
         better="lower",
-        meaning="share of steps that could not be recovered",
+        meaning="fraction of steps whose estimation failed",
     ),
     Column(
         key="text_right",
         title="direction right",
         better="higher",
         tasks=("text",),
-        meaning="share of captions whose direction the named object takes; 0.5 is chance, and "
-        "what ignoring the text gets",
+        meaning="fraction of captions whose direction the named object follows; 0.5 is chance, "
+        "and the value of a system that ignores the text",
     ),
     Column(
         key="text_both",
         title="both right",
         better="higher",
         tasks=("text",),
-        meaning="share of cases right for left and for right; ignoring the text gets 0",
+        meaning="fraction of samples correct for both left and right; 0 without using the text",
     ),
     Column(
         key="text_still",
         title="still if asked",
         better="higher",
         tasks=("text",),
-        meaning="share of Gaussians that stand still when nothing is to move",
+        meaning="fraction of static Gaussians if the text requests no motion",
     ),
 )
 PRIMARY = {"generation": "psnr", "reconstruction": "psnr", "text": "text_right"}
-"""Decides which items are called best and worst."""
+"""Metric that ranks the items from best to worst."""
 
 
 def columns_of(task: Task) -> tuple[Column, ...]:
-    """The columns that a task fills."""
+    """Columns of a task."""
     return tuple(column for column in COLUMNS if task in column.tasks)
 
 

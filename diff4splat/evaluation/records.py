@@ -1,4 +1,4 @@
-"""What was measured on one item, as plain numbers that go into a file and come back unchanged."""
+"""Results of one item as plain numbers, with a lossless JSON form."""
 
 import math
 from collections.abc import Iterable
@@ -9,19 +9,19 @@ from diff4splat.errors import FileFormatError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """One measure of one row on one item."""
+    """Value of one metric for one row of one item."""
 
     row: str
-    """The system under test, or a baseline."""
+    """The system or a baseline."""
     key: str
     value: float
     parts: tuple[float | None, ...] = ()
-    """Its values per judged picture, where it is their mean; None did not count."""
+    """Values per target image if ``value`` is their mean; None is not counted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Skip:
-    """One measure that an item does not allow, and why; never an error of the system."""
+    """A metric that is undefined for an item, and why; never an error of the system."""
 
     row: str
     key: str
@@ -30,20 +30,20 @@ class Skip:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ItemResult:
-    """Everything about one item."""
+    """All results of one item."""
 
     item: int
     clip: str
-    """Its identifier."""
+    """Identifier of the clip."""
     clip_sha256: str
-    """Of its pictures."""
+    """Hash of the images of the clip."""
     scores: tuple[Score, ...]
     skips: tuple[Skip, ...] = ()
 
     def value(self, row: str, key: str) -> float | None:
-        """One score, if it was taken."""
-        found = (s.value for s in self.scores if s.row == row and s.key == key)
-        return next(found, None)
+        """One score; None if it is missing."""
+        values = (s.value for s in self.scores if s.row == row and s.key == key)
+        return next(values, None)
 
     def to_json(self) -> dict[str, object]:
         """Plain values."""
@@ -52,7 +52,7 @@ class ItemResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """An item that could not be measured."""
+    """An item whose measurement failed."""
 
     item: int
     clip: str
@@ -60,22 +60,22 @@ class Failure:
 
 
 def score(row: str, key: str, values: Iterable[float]) -> Score | Skip:
-    """The mean of finite ``values``, or a skip when there is none."""
+    """The mean of the finite ``values``; a skip if no value is finite."""
     parts = tuple(float(value) for value in values)
     finite = [value for value in parts if math.isfinite(value)]
     if not finite:
         return Skip(row=row, key=key, why="no picture allows it")
-    # Parts keep their place, so that they still belong to their pictures.
-    kept = tuple(round(value, 6) if math.isfinite(value) else None for value in parts)
+    # Parts keep their index, so that they still belong to their images.
+    rounded = tuple(round(value, 6) if math.isfinite(value) else None for value in parts)
     mean = round(math.fsum(finite) / len(finite), 6)
-    return Score(row=row, key=key, value=mean, parts=kept if len(parts) > 1 else ())
+    return Score(row=row, key=key, value=mean, parts=rounded if len(parts) > 1 else ())
 
 
 def read_item(record: object, where: str) -> ItemResult:
-    """The item that ``to_json`` wrote.
+    """Read an item that ``to_json`` wrote.
 
     Raises:
-        FileFormatError: something else.
+        FileFormatError: the record has another structure.
     """
     try:
         scores = tuple(Score(**{**s, "parts": tuple(s["parts"])}) for s in record["scores"])

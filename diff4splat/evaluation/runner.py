@@ -1,31 +1,31 @@
-"""Measures item after item: takes up what is there, keeps going when one fails, and counts it."""
+"""Measure all items: reuse stored results, and continue after a failed item."""
 
 from dataclasses import dataclass
 
 from diff4splat.errors import Diff4SplatError, InputError
-from diff4splat.evaluation.measuring import Setup, measure_item
+from diff4splat.evaluation.measure_item import Setup, measure_item
+from diff4splat.evaluation.protocols.sources import ClipSource, require_enough
 from diff4splat.evaluation.records import Failure, ItemResult
-from diff4splat.evaluation.result_store import ItemStore
-from diff4splat.evaluation.sources import ClipSource, require_enough
+from diff4splat.evaluation.report.result_store import ItemStore
 from diff4splat.progress.phases import Phases
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a run ended with."""
+    """Results of a run."""
 
     setup: Setup
     items: tuple[ItemResult, ...]
     failures: tuple[Failure, ...]
-    asked: int
-    """Items that the run was to measure."""
-    taken_up: int
-    """Of these, how many had been measured before."""
+    requested: int
+    """Number of items that the run was asked to measure."""
+    resumed: int
+    """Number of items with stored results of an earlier run."""
 
     @property
     def is_subset(self) -> bool:
-        """Fewer than the protocol has: figures cannot be compared with those of whole runs."""
-        return self.asked < self.setup.protocol.items(self.setup.task)
+        """Whether items of the protocol are missing; then means are not comparable."""
+        return self.requested < self.setup.protocol.items(self.setup.task)
 
 
 def run_items(
@@ -34,16 +34,16 @@ def run_items(
     """Measure the first ``limit`` items, or all.
 
     Raises:
-        InputError: the source is empty or too short, or ``limit`` is not within the protocol.
+        InputError: the source is empty or too short, or ``limit`` exceeds the protocol.
         OutputError: results cannot be stored.
     """
     require_enough(source, setup.protocol)
-    wanted = range(_asked(setup, limit))
+    wanted = range(_requested_count(setup, limit))
     missing = [item for item in wanted if item not in store.items]
     failures = []
     with phases.phase(f"measure {setup.task}", len(missing)) as advance:
         for item in missing:
-            result = attempt(item, source, setup)
+            result = try_item(item, source, setup)
             if isinstance(result, Failure):
                 failures.append(result)
             else:
@@ -53,29 +53,29 @@ def run_items(
         setup=setup,
         items=tuple(store.items[item] for item in wanted if item in store.items),
         failures=tuple(failures),
-        asked=len(wanted),
-        taken_up=len(wanted) - len(missing),
+        requested=len(wanted),
+        resumed=len(wanted) - len(missing),
     )
 
 
-def attempt(item: int, source: ClipSource, setup: Setup) -> ItemResult | Failure:
-    """One item; whatever goes wrong with it is told, not raised."""
+def try_item(item: int, source: ClipSource, setup: Setup) -> ItemResult | Failure:
+    """Measure one item; an error becomes a ``Failure``."""
     name = f"index {setup.protocol.source.first + item}"
     try:
         clip = source.clip(setup.protocol.source.first + item)
         name = clip.note.identifier
         return measure_item(item, clip, setup)
     except Exception as error:
-        # One bad clip, or one that a network cannot take, must not cost the others.
+        # One bad clip must not cost the results of the others.
         kind = "" if isinstance(error, Diff4SplatError) else f"{type(error).__name__}: "
         return Failure(item=item, clip=name, why=kind + " ".join(str(error).split()))
 
 
-def require_some(outcome: Outcome) -> Outcome:
-    """Return ``outcome`` unless nothing at all could be measured.
+def require_results(outcome: Outcome) -> Outcome:
+    """Return ``outcome`` unless every item failed.
 
     Raises:
-        InputError: with the first reason.
+        InputError: with the first failure.
     """
     if outcome.items or not outcome.failures:
         return outcome
@@ -86,10 +86,10 @@ def require_some(outcome: Outcome) -> Outcome:
     )
 
 
-def _asked(setup: Setup, limit: int | None) -> int:
-    whole = setup.protocol.items(setup.task)
+def _requested_count(setup: Setup, limit: int | None) -> int:
+    total = setup.protocol.items(setup.task)
     if limit is None:
-        return whole
-    if not 1 <= limit <= whole:
-        raise InputError(f"--items: expected 1 to {whole} for this protocol, got {limit}")
+        return total
+    if not 1 <= limit <= total:
+        raise InputError(f"--items: expected 1 to {total} for this protocol, got {limit}")
     return limit

@@ -13,7 +13,12 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError
-from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import (
+    TensorFile,
+    read_metadata,
+    read_tensors,
+    write_tensors,
+)
 
 CHECKPOINT_FILE = "checkpoint.safetensors"
 CHECKPOINT_FORMAT = "diff4splat-fit-1"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.io.sheet_canvas import Canvas, Style, fitted
+from diff4splat.io.figures.page_layout import Canvas, Style, fitted
 
 DIFFERENCE_GAIN = 4.0
 _CELL_PX, _GAP_PX, _MARGIN_PX, _LABEL_PX = 360, 12, 24, 34

@@ -16,7 +16,7 @@ from diff4splat.fitting.frames.frame_renderer import FrameRenderer, loss_mask
 from diff4splat.fitting.frames.frame_store import FrameStore
 from diff4splat.fitting.optics.camera_model import CameraModel
 from diff4splat.metrics.image import psnr
-from diff4splat.metrics.structure import WINDOW_PX, ssim
+from diff4splat.metrics.ssim import WINDOW_PX, ssim
 from diff4splat.scene.scene import Scene
 
 MAX_PSNR_DB = 99.0

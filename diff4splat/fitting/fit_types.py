@@ -11,7 +11,7 @@ from diff4splat.fitting.frames.frame_renderer import FrameRenderer
 from diff4splat.fitting.optics.camera_model import CameraModel
 from diff4splat.fitting.settings import FitSettings
 from diff4splat.progress.phases import Phases
-from diff4splat.progress.skipped import Omissions
+from diff4splat.progress.skipped import SkippedWorkList
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.scene import Scene
@@ -49,7 +49,7 @@ class FitResult:
     held_out: list[FrameQuality]
     training: list[FrameQuality]
     """Quality on a few training frames."""
-    omissions: Omissions
+    omissions: SkippedWorkList
     renderer: FrameRenderer
     cameras: CameraModel | None
     """Optimised cameras; None if no camera parameter was learned."""

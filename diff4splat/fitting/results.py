@@ -23,15 +23,15 @@ from diff4splat.fitting.fit_types import FitResult
 from diff4splat.fitting.frames.frame_store import FrameStore
 from diff4splat.fitting.settings import FitSettings
 from diff4splat.io.atomic import atomic_folder, write_text
-from diff4splat.io.images import write_png
-from diff4splat.io.optics_json import optics_json
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.cameras.optics_json import optics_json
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.outputs.card import LIBRARIES, scene_facts
 from diff4splat.outputs.scene_folder import write_view
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
 
 RESULT_FILES = ("scene.safetensors", "video.mp4", "comparison.png", "card.json")
@@ -141,7 +141,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
         "seconds": {name: round(value, 3) for name, value in log.phases.seconds.items()},
         "seconds_fitting": round(result.seconds, 3),
         "peak_memory_bytes": peak_memory_bytes(),
-        "left_out": [*result.omissions.to_json(), *log.omissions.to_json()],
+        "left_out": [*result.omissions.to_json(), *log.skipped.to_json()],
         "versions": {name: version(name) for name in LIBRARIES},
         "machine": {
             "python": platform.python_version(),

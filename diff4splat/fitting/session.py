@@ -20,7 +20,7 @@ from diff4splat.fitting.motions.protocol import LearnedMotion
 from diff4splat.fitting.objective.step_objective import Objective
 from diff4splat.fitting.optics.learned import LearnedOptics
 from diff4splat.fitting.stage_loop import StageLoop, StageSchedule
-from diff4splat.progress.skipped import Omissions
+from diff4splat.progress.skipped import SkippedWorkList
 
 
 class FitSession:
@@ -48,7 +48,7 @@ class FitSession:
         )
         self.evaluator = Evaluator(renderer=self.renderer, store=self.store)
         self.logger = FitLogger(folder=request.folder, note=request.note)
-        self.omissions = Omissions()
+        self.omissions = SkippedWorkList()
         self.fingerprint = fingerprint(self.capture, self.settings, request.init)
         self._start_s = time.perf_counter()
 

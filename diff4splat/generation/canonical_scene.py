@@ -66,7 +66,7 @@ def reconstruct_refined(
     kept = ~visible_in_earlier_frame(depth.detach(), cameras)
     if duplicates := int((~kept).sum()):
         why, saved = "an earlier key frame shows the same points", f"{duplicates:,} Gaussians"
-        log.left_out("duplicate pixels", why, saved)
+        log.record_skipped("duplicate pixels", why, saved)
     scene = reconstruct(maps, base, config, kept)
     if maps.border is None:
         return scene
@@ -121,7 +121,7 @@ def prune_cells(scene: CanonicalScene, min_opacity: float, log: RunLog) -> Canon
         )
     if dropped:
         faintest = float(opacities[~kept].max())
-        log.left_out(
+        log.record_skipped(
             "faint Gaussians",
             f"opacity below {min_opacity:g}",
             f"{dropped:,} of {len(kept):,} Gaussians",

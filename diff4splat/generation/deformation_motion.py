@@ -33,7 +33,7 @@ def deform(
     if network is None:
         return static_over(key_times_s)
     if network.is_identity:
-        log.left_out(
+        log.record_skipped(
             "deformation network",
             "its output layers are zero, so nothing can move",
             f"{len(key_times_s)} network calls and all key times",

@@ -14,7 +14,7 @@ from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.paths.build import build_path
 from diff4splat.paths.camera_path import CameraPath, require_usable
-from diff4splat.paths.picture_size import resized
+from diff4splat.paths.resize import resized
 from diff4splat.paths.settings import PathFrame, PathSettings
 from diff4splat.paths.spline import resample
 

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, pinhole
-from diff4splat.io.images import read_photo
+from diff4splat.io.photos.images import read_photo
 
 SIDE_MULTIPLE = 16
 """Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""
@@ -48,7 +48,7 @@ class InputImage:
     notes: tuple[str, ...] = ()
     """What was done to the photograph, in words."""
 
-    def to(self, device: torch.device) -> "Picture":
+    def to(self, device: torch.device) -> "InputImage":
         """Move pixels and camera."""
         return replace(self, rgb=self.rgb.to(device), camera=self.camera.to(device))
 

@@ -80,7 +80,7 @@ class GenerationPlan:
         for skipped in self.skipped:
             saved = f"{counts[skipped.part]:,} weights neither loaded nor run"
             error = None if skipped.changes_result else 0.0
-            log.left_out(skipped.part, skipped.why, saved, error)
+            log.record_skipped(skipped.part, skipped.why, saved, error)
 
 
 def plan_generation(

@@ -50,5 +50,5 @@ def _sample_motion(
         sample = sample_motion(model.networks.motion_unet, image, frames, request, advance)
     if sample.calls.saved:
         why = "no prompt" if request.text is None else why_unguided(motion.guidance)
-        log.left_out("guidance pass", why, f"{sample.calls.saved} network calls")
+        log.record_skipped("guidance pass", why, f"{sample.calls.saved} network calls")
     return sample

@@ -49,7 +49,7 @@ class GenerationSettings:
     steps: int = 8
     sampler: str = "multistep2"
     schedule: Schedule | None = None
-    """None takes the better one for the number of steps, as measured in docs/reference/samplers.md."""
+    """None takes the better one for the number of steps (docs/results/samplers.md)."""
     shift: float = 1.0
     """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
     guidance: Guidance = DEFAULT_GUIDANCE

@@ -34,7 +34,7 @@ def prune_static_tracks(
     if static == 0:
         return motion
     why = f"they move by at most {threshold_px:g} px"
-    log.left_out("key times of static Gaussians", why, f"{static:,} tracks", threshold_px)
+    log.record_skipped("key times of static Gaussians", why, f"{static:,} tracks", threshold_px)
     return keep_moving(motion, moves)
 
 

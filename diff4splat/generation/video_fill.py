@@ -103,7 +103,7 @@ def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
         sample = sample_video(model.networks.dit, conditions, settings, request.seed, advance)
     if sample.calls.saved:
         why = "no prompt" if request.text is None else why_unguided(settings.guidance)
-        log.left_out("guidance pass", why, f"{sample.calls.saved} network calls")
+        log.record_skipped("guidance pass", why, f"{sample.calls.saved} network calls")
     latent = VideoLatent(
         latent=sample.latent, first_frame=request.image, cameras=request.path.cameras
     )

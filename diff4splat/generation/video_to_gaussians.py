@@ -50,7 +50,7 @@ def raw_video_maps(model: Model, video: VideoLatent, *, moving: bool, log: RunLo
         frames = decode_posed_video(model, video)
     else:
         why = "LDRM reads latents"
-        log.left_out("video decoder", why, "decoding every frame")
+        log.record_skipped("video decoder", why, "decoding every frame")
     maps = model.networks.ldrm(video.latent, rays, frames, moving=moving)
     return RawVideoMaps(maps=maps, frames=frames)
 

@@ -24,8 +24,8 @@ from torch import Tensor
 from diff4splat.errors import FileFormatError, InputError, OutputError, ShapeError
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.atomic import atomic_path
-from diff4splat.io.existing import require_file
-from diff4splat.io.quiet import native_stderr_silenced
+from diff4splat.io.require_file import require_file
+from diff4splat.io.silence_stderr import silence_native_stderr
 from diff4splat.paths.camera_path import CameraPath, require_usable
 
 _REST = (
@@ -143,7 +143,7 @@ def _verify(
 def _silent() -> Iterator[io.StringIO]:
     """Catch what the library prints: it reports damaged pixels only that way."""
     said = io.StringIO()
-    with native_stderr_silenced(), redirect_stdout(said):
+    with silence_native_stderr(), redirect_stdout(said):
         yield said
 
 

@@ -14,7 +14,7 @@ from torch import Tensor
 from diff4splat.errors import FileFormatError, InputError
 from diff4splat.geometry.rigid import require_rigid
 from diff4splat.paths.formats.json_fields import kind_of, numbers, optional_number
-from diff4splat.paths.names import quoted
+from diff4splat.paths.messages import quoted
 
 JsonObject = Mapping[str, object]
 _FARTHEST = 1 << 48

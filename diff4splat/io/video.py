@@ -18,7 +18,7 @@ from torch import Tensor
 from diff4splat.errors import ConfigError, InputError, OutputError, ShapeError
 from diff4splat.io.atomic import atomic_path
 from diff4splat.io.pixels import to_bytes
-from diff4splat.io.quiet import native_stderr_silenced
+from diff4splat.io.silence_stderr import silence_native_stderr
 
 _CODECS = ("vp09", "mp4v")
 Frame = Float[Tensor, "h w 3"]
@@ -96,7 +96,7 @@ def _opened(
     """A writer with the first codec that opens, finished or abandoned at the end of the block."""
     temporary.touch()  # names the trouble with the folder, which OpenCV would not
     for codec in _CODECS:
-        with native_stderr_silenced():
+        with silence_native_stderr():
             code = cv2.VideoWriter.fourcc(*codec)
             writer = cv2.VideoWriter(str(temporary), cv2.CAP_FFMPEG, code, fps, size_px[::-1])
         if writer.isOpened():
@@ -109,7 +109,7 @@ def _opened(
     try:
         yield writer, codec
     finally:
-        with native_stderr_silenced():
+        with silence_native_stderr():
             writer.release()
 
 
@@ -135,7 +135,7 @@ def _bgr(frame: Frame) -> UInt8[np.ndarray, "h2 w2 3"]:
 
 def _verify(temporary: Path, count: int, file: Path) -> None:
     """Decode what was written: OpenCV does not report a full disk."""
-    with native_stderr_silenced():
+    with silence_native_stderr():
         reader = cv2.VideoCapture(str(temporary), cv2.CAP_FFMPEG)
         found = 0
         while reader.grab():

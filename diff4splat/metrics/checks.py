@@ -1,8 +1,7 @@
-"""What measures and losses ask of their tensors: equal shapes, and float32 or better.
+"""Checks of metric and loss inputs: equal shapes, and at least float32.
 
-Half precision has three digits: sums over pixels and differences of products drown in it, so
-everything is widened first, and automatic mixed precision is switched off where it would narrow
-again.
+Half precision has three digits, too few for sums over pixels and differences of products. Inputs
+are promoted first, and automatic mixed precision is disabled where it would convert them back.
 """
 
 from contextlib import AbstractContextManager, nullcontext
@@ -13,8 +12,8 @@ from torch import Tensor
 from diff4splat.errors import ShapeError
 
 
-def widen(*tensors: Tensor) -> tuple[Tensor, ...]:
-    """All in their common dtype, but at least float32."""
+def promote(*tensors: Tensor) -> tuple[Tensor, ...]:
+    """Promote tensors to their common dtype, at least float32."""
     dtype = torch.float32
     for tensor in tensors:
         dtype = torch.promote_types(dtype, tensor.dtype)
@@ -22,15 +21,15 @@ def widen(*tensors: Tensor) -> tuple[Tensor, ...]:
 
 
 def no_autocast(like: Tensor) -> AbstractContextManager[None]:
-    """A region in which matrix products and convolutions stay in the dtype of their inputs."""
+    """Context in which matrix products and convolutions keep the dtype of their inputs."""
     kind = like.device.type
-    # Some devices know no automatic mixed precision, and refuse to have it switched off.
-    known = torch.amp.is_autocast_available(kind)
-    return torch.autocast(kind, enabled=False) if known else nullcontext()
+    # Some devices have no automatic mixed precision, and raise an error when it is disabled.
+    is_available = torch.amp.is_autocast_available(kind)
+    return torch.autocast(kind, enabled=False) if is_available else nullcontext()
 
 
 def require_alike(what: str, got: Tensor, like: Tensor) -> None:
-    """Refuse to broadcast.
+    """Require equal shapes, without broadcasting.
 
     Raises:
         ShapeError: the shapes differ.
@@ -40,7 +39,7 @@ def require_alike(what: str, got: Tensor, like: Tensor) -> None:
 
 
 def require_mask(valid: Tensor, shape: tuple[int, ...]) -> None:
-    """Refuse a mask that does not belong to its map.
+    """Require a boolean mask of the expected shape.
 
     Raises:
         ShapeError: another shape, or not boolean.

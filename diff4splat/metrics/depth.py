@@ -16,8 +16,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, masked_mean, mean_or_nan
+from diff4splat.metrics.checks import promote, require_alike, require_mask
+from diff4splat.metrics.masked import masked_mean, mean_or_nan, zero_masked
 
 FLATTEST = 1e-6
 """Standard deviation, as a share of the mean size, below which a map has no variation."""
@@ -56,12 +56,12 @@ def _flat(depth: Tensor, truth: Tensor, valid: Tensor) -> tuple[Tensor, Tensor, 
     require_alike("depth", depth, truth)
     require_mask(valid, truth.shape)
     keep = valid.flatten(-2)
-    depth, truth = widen(depth.flatten(-2), truth.flatten(-2))
-    return hidden_as_zero(depth, keep), hidden_as_zero(truth, keep), keep
+    depth, truth = promote(depth.flatten(-2), truth.flatten(-2))
+    return zero_masked(depth, keep), zero_masked(truth, keep), keep
 
 
 def _centered(depth: Tensor, keep: Tensor) -> Tensor:
     """Less the mean, in units of the mean size."""
     size = masked_mean(depth.abs(), keep)[..., None]
     depth = depth / torch.where(size > 0, size, 1.0)
-    return hidden_as_zero(depth - masked_mean(depth, keep)[..., None], keep)
+    return zero_masked(depth - masked_mean(depth, keep)[..., None], keep)

@@ -11,14 +11,14 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 
-def hidden_as_zero(values: Float[Tensor, "*d"], keep: Bool[Tensor, "*#d"]) -> Float[Tensor, "*d"]:
+def zero_masked(values: Float[Tensor, "*d"], keep: Bool[Tensor, "*#d"]) -> Float[Tensor, "*d"]:
     """The values where ``keep``, and 0 elsewhere."""
     return torch.where(keep, values, torch.zeros((), dtype=values.dtype, device=values.device))
 
 
 def masked_mean(values: Float[Tensor, "*b p"], keep: Bool[Tensor, "*b p"]) -> Float[Tensor, "*b"]:
     """Mean over kept places; 0 with zero gradient where none is kept."""
-    return hidden_as_zero(values, keep).sum(-1) / keep.sum(-1).clamp(min=1)
+    return zero_masked(values, keep).sum(-1) / keep.sum(-1).clamp(min=1)
 
 
 def mean_or_nan(values: Float[Tensor, "*b p"], keep: Bool[Tensor, "*b p"]) -> Float[Tensor, "*b"]:

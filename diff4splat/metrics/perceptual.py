@@ -7,7 +7,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.metrics.checks import require_alike, widen
+from diff4splat.metrics.checks import promote, require_alike
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 
 
@@ -26,6 +26,7 @@ def perceptual_distance(
         raise ShapeError(f"image: expected h w 3 with a pixel, got {tuple(image.shape)}")
     batch, size = image.shape[:-3], image.shape[-3:]
     image, reference = (
-        picture.reshape(batch.numel(), *size).movedim(-1, 1) for picture in widen(image, reference)
+        picture.reshape(batch.numel(), *size).movedim(-1, 1)
+        for picture in promote(image, reference)
     )
     return features.distance(image, reference).reshape(batch)

@@ -9,8 +9,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, mean_or_nan
+from diff4splat.metrics.checks import promote, require_alike, require_mask
+from diff4splat.metrics.masked import mean_or_nan, zero_masked
 
 
 def track_endpoint_error(
@@ -25,6 +25,6 @@ def track_endpoint_error(
     """
     require_alike("predicted", predicted, truth)
     require_mask(valid, truth.shape[:-1])
-    predicted, truth = (hidden_as_zero(part, valid[..., None]) for part in widen(predicted, truth))
+    predicted, truth = (zero_masked(part, valid[..., None]) for part in promote(predicted, truth))
     apart = torch.linalg.vector_norm(predicted - truth, dim=-1)
     return mean_or_nan(apart, valid)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.geometry import quaternion
-from diff4splat.io.figures import new_figure, save_figure
+from diff4splat.io.figures.plots import new_figure, save_figure
 from diff4splat.paths.camera_path import CameraPath, require_usable
 
 SHOWN_CAMERAS = 7

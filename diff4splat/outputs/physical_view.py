@@ -9,11 +9,11 @@ from pathlib import Path
 import torch
 
 from diff4splat.errors import ConfigError
+from diff4splat.io.cameras.optics_json import optics_json
 from diff4splat.io.exr import write_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.optics_json import optics_json
+from diff4splat.io.photos.images import write_png
 from diff4splat.io.video import write_video
-from diff4splat.outputs.photographs import Taken, geometry_kind, photographs
+from diff4splat.outputs.photo_sequence import CaptureStats, geometry_kind, render_photographs
 from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, frames_per_second
 from diff4splat.paths.physical_path import PhysicalPath
 from diff4splat.progress.run_log import RunLog
@@ -22,8 +22,8 @@ from diff4splat.scene.scene import Scene
 
 
 def write_physical_view(
-    scene: Scene, filmed: PhysicalPath, file: Path, settings: PhotoSettings, log: RunLog
-) -> Taken:
+    scene: Scene, physical_path: PhysicalPath, file: Path, settings: PhotoSettings, log: RunLog
+) -> CaptureStats:
     """Take every frame into one file whose suffix says what it holds; returns what they needed.
 
     Raises:
@@ -31,18 +31,20 @@ def write_physical_view(
         OutputError: the file cannot be written.
     """
     suffix = require_view_suffix(file)
-    kind, taken = geometry_kind(filmed), Taken()
+    kind, taken = geometry_kind(physical_path), CaptureStats()
     wanted = (kind,) if suffix == ".exr" else ("rgb",)
-    with log.phases.phase("render", len(filmed)) as advance:
-        frames = photographs(scene, filmed, wanted, settings, advance, taken)
+    with log.phases.phase("render", len(physical_path)) as advance:
+        frames = render_photographs(scene, physical_path, wanted, settings, advance, taken)
         if suffix == ".mp4":
-            write_video((frame.rgb for frame in frames), file, frames_per_second(filmed.path))
+            write_video(
+                (frame.rgb for frame in frames), file, frames_per_second(physical_path.path)
+            )
         elif suffix == ".png":
             write_png(next(frames).rgb, file)
         else:
             values = torch.stack([getattr(frame, kind) for frame in frames])
-            optics = json.dumps(optics_json(filmed.optics))
-            write_depth_exr(values, filmed.path, file, quantity=kind, optics=optics)
+            optics = json.dumps(optics_json(physical_path.optics))
+            write_depth_exr(values, physical_path.path, file, quantity=kind, optics=optics)
     return taken
 
 

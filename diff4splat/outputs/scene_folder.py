@@ -12,10 +12,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
-from diff4splat.io.contact_sheet import SheetContent, contact_sheet
 from diff4splat.io.exr import write_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.figures.contact_sheet import SheetContent, contact_sheet
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.io.video import write_video
 from diff4splat.outputs.card import Result
 from diff4splat.paths.camera_path import CameraPath
@@ -48,11 +48,11 @@ def render_frames(scene: Scene, path: CameraPath, log: RunLog, with_depth: bool 
     with log.phases.phase("render", len(path)) as advance, torch.no_grad():
         frames = list(render_video(scene, path, outputs=outputs, advance=advance))
     if isinstance(scene.motion, StaticMotion):
-        log.left_out("states per frame", "nothing moves", f"{len(path) - 1} scene states")
+        log.record_skipped("states per frame", "nothing moves", f"{len(path) - 1} scene states")
     rgb = torch.stack([frame.rgb for frame in frames]).clamp(0, 1)
     if with_depth:
         return Frames(rgb=rgb, depth=torch.stack([frame.depth for frame in frames]))
-    log.left_out("depth", "not asked for", f"{len(path)} blended depth maps")
+    log.record_skipped("depth", "not asked for", f"{len(path)} blended depth maps")
     return Frames(rgb=rgb, depth=None)
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import InputError
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 Easing = Literal["linear", "smooth", "ease-in", "ease-out"]
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from diff4splat.errors import InputError
-from diff4splat.paths.names import quoted, unknown_name
+from diff4splat.paths.messages import quoted, unknown_name
 from diff4splat.paths.presets import ALIASES, AMBIGUOUS, PRESETS, Preset
 from diff4splat.paths.settings import require_amplitude
 

@@ -1,7 +1,7 @@
-"""Phases of a long command: how far each is, how long it took, and the peak memory of the process.
+"""Progress and run time per phase of a long command, and the peak memory of the process.
 
-A phase is a named stretch of work with a known number of steps. Code that works reports steps to a
-``Phases`` object and knows nothing about terminals; the command line draws the bars.
+A phase is a named part of the work with a known number of steps. Library code reports steps to a
+``Phases`` object; the command line draws the progress bars.
 """
 
 import resource
@@ -15,27 +15,27 @@ Advance = Callable[[], None]
 
 
 def peak_memory_bytes() -> int:
-    """Largest resident size of this process so far."""
+    """Peak resident memory of this process in bytes."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
 
 
 @dataclass(slots=True)
 class Phases:
-    """Collects seconds per phase; subclasses may draw."""
+    """Collects seconds per phase; subclasses may draw progress bars."""
 
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def phase(self, name: str, steps: int = 1) -> Iterator[Advance]:
-        """Time a phase of ``steps`` steps; call the yielded function after each one."""
-        began = time.perf_counter()
+        """Time a phase; call the yielded function after each of its ``steps`` steps."""
+        start = time.perf_counter()
         with self.bar(name, steps) as advance:
             yield advance
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - began
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
     @contextmanager
     def bar(self, name: str, steps: int) -> Iterator[Advance]:
-        """Show progress of one phase; silent here."""
+        """Progress bar of one phase; silent in this class."""
         del name, steps
         yield lambda: None

@@ -1,18 +1,18 @@
-"""What a run tells about itself: seconds per phase and what it left out."""
+"""Log of a run: seconds per phase, and skipped work."""
 
 from dataclasses import dataclass, field
 
 from diff4splat.progress.phases import Phases
-from diff4splat.progress.skipped import Omissions, SkippedWork
+from diff4splat.progress.skipped import SkippedWork, SkippedWorkList
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunLog:
-    """Handed down through a command; silent unless its phases draw."""
+    """Passed through a command; prints nothing unless its phases draw progress bars."""
 
     phases: Phases = field(default_factory=Phases)
-    omissions: Omissions = field(default_factory=Omissions)
+    skipped: SkippedWorkList = field(default_factory=SkippedWorkList)
 
-    def left_out(self, what: str, why: str, saved: str, error: float | None = 0.0) -> None:
-        """Record one thing that this run did not need."""
-        self.omissions.add(SkippedWork(what=what, why=why, saved=saved, error=error))
+    def record_skipped(self, what: str, why: str, saved: str, error: float | None = 0.0) -> None:
+        """Record work that this run did not need."""
+        self.skipped.add(SkippedWork(what=what, why=why, saved=saved, error=error))

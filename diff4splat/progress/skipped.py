@@ -1,6 +1,6 @@
-"""What a run left out because this scene does not need it, what that saved and what it cost.
+"""Work that a run skipped because the scene does not need it: savings and error.
 
-Goes into ``card.json`` beside the scene, in the order in which things were left out.
+Stored in ``card.json`` beside the scene, in order.
 """
 
 import math
@@ -12,14 +12,14 @@ from diff4splat.errors import ConfigError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkippedWork:
-    """One thing that was not computed, loaded or stored."""
+    """One computation, network or file that was skipped."""
 
     what: str
     why: str
     saved: str
-    """In words with a unit: ``1,234 parameters``, ``12 network calls``."""
+    """Text with a unit: ``1,234 parameters``, ``12 network calls``."""
     error: float | None = 0.0
-    """What skipping it changed in the result: 0 is nothing, None is not measured."""
+    """Resulting error; 0 if the result is identical, None if it was not measured."""
 
     def __post_init__(self) -> None:
         if not (self.what and self.why and self.saved):
@@ -35,15 +35,15 @@ class SkippedWork:
 
 
 @dataclass(slots=True)
-class Omissions:
-    """Collects omissions while a command runs."""
+class SkippedWorkList:
+    """Collects skipped work while a command runs."""
 
     _records: list[SkippedWork] = field(default_factory=list)
 
-    def add(self, omission: SkippedWork) -> None:
-        """Append; the same record twice counts once, so that loops may report freely."""
-        if omission not in self._records:
-            self._records.append(omission)
+    def add(self, record: SkippedWork) -> None:
+        """Append ``record`` unless it is in the list, so that loops may report repeatedly."""
+        if record not in self._records:
+            self._records.append(record)
 
     def __iter__(self) -> Iterator[SkippedWork]:
         return iter(self._records)

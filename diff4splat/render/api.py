@@ -56,7 +56,7 @@ def render(
         InputError: a camera with NaN, infinity or a focal length of 0 or less, or such features.
     """
     wanted = _require_sources(require_outputs(outputs), settings)
-    settings = made_for(scene_or_gaussians, settings)
+    settings = with_default_dilation(scene_or_gaussians, settings)
     if camera.batch_shape == () and not isinstance(time_s, Tensor):
         job = _job(scene_or_gaussians, camera, time_s, wanted, settings)
         return choose(backend, job).render(job)
@@ -129,7 +129,7 @@ def render_video(
     Raises:
         ConfigError: an unknown output.
     """
-    wanted, settings = require_outputs(outputs), made_for(scene, settings)
+    wanted, settings = require_outputs(outputs), with_default_dilation(scene, settings)
     if "flow" not in wanted:
         _require_sources(wanted, settings)
     return _frames(scene, path, wanted, settings, backend, advance)
@@ -168,7 +168,7 @@ def _frames(
         yield picture
 
 
-def made_for(subject: Scene | Gaussians, settings: RenderSettings) -> RenderSettings:
+def with_default_dilation(subject: Scene | Gaussians, settings: RenderSettings) -> RenderSettings:
     """The settings with what the subject itself asks for, where they leave it open."""
     if settings.dilation_px2 is not None or not isinstance(subject, Scene):
         return settings

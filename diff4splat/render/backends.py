@@ -1,6 +1,7 @@
-"""The table of renderers. A back end is a module with ``refusal(job)`` and ``render(job)``.
+"""The table of renderers.
 
-To add one, write the module and name it here; nothing is imported before it is asked for.
+A back end is a module with ``unsupported_reason(job)`` and ``render(job)``. To add one, write the
+module and name it here. A back end is imported when it is first chosen.
 """
 
 import warnings
@@ -26,7 +27,7 @@ class Backend(Protocol):
     that draws frames of one scene with shared work, or None where it cannot.
     """
 
-    def refusal(self, job: RenderJob) -> str | None:
+    def unsupported_reason(self, job: RenderJob) -> str | None:
         """Why ``job`` cannot be done here ("expected X, got Y"), or None."""
         ...
 
@@ -46,7 +47,7 @@ def choose(name: str, job: RenderJob) -> Backend:
     if name not in BACKENDS:
         raise ConfigError(f"backend: expected auto, {', '.join(BACKENDS)}, got {name!r}")
     found = _load(name)
-    reason = found.refusal(job)
+    reason = found.unsupported_reason(job)
     if reason is not None:
         raise ConfigError(f"backend {name!r}: {reason}; use backend='auto'")
     return found
@@ -57,7 +58,7 @@ def _first(job: RenderJob) -> Backend:
     reasons = []
     for name in BACKENDS:
         found = _load(name)
-        reason = found.refusal(job)
+        reason = found.unsupported_reason(job)
         if reason is None:
             break
         reasons.append(f"{name}: {reason}")

@@ -31,7 +31,7 @@ from diff4splat.render.support import usable_gaussians
 from diff4splat.scene import harmonics
 
 
-def refusal(job: RenderJob) -> str | None:
+def unsupported_reason(job: RenderJob) -> str | None:
     """Why gsplat cannot do ``job``, or None; the first job that it might do loads the kernels."""
     with torch.autocast(job.gaussians.means.device.type, enabled=False):
         return (

@@ -18,7 +18,7 @@ from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
 
 
-def refusal(job: RenderJob) -> str | None:
+def unsupported_reason(job: RenderJob) -> str | None:
     """None: there is nothing that this back end cannot do."""
     del job
 

@@ -8,9 +8,10 @@ import torch
 
 from diff4splat.errors import ShapeError
 from diff4splat.flow.path import add_noise, velocity
+from diff4splat.generation.canonical_scene import CanonicalScene
+from diff4splat.generation.deformation_motion import deform
 from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
-from diff4splat.generation.reconstruction import Canonical, deform
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole, project
@@ -26,7 +27,7 @@ from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
-from diff4splat.render.physical.lines import line_shares
+from diff4splat.render.physical.sensor_rows import line_shares
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -274,9 +275,9 @@ def test_time(generated: Scene) -> None:
     seen = []
     network.register_forward_pre_hook(lambda _, arguments: seen.append(float(arguments[1])))
     network.heads[0].weight.data.fill_(1e-3)
-    canonical = Canonical(
+    canonical = CanonicalScene(
         gaussians=generated.gaussians,
-        cells=torch.arange(len(generated.gaussians)),
+        cell_index=torch.arange(len(generated.gaussians)),
         maps=RawGaussianMaps(
             gaussians=torch.zeros(1, 12, 5, 32, 32), tokens=torch.randn(1, 24, 2, 2, 2)
         ),

@@ -15,7 +15,7 @@ import torch
 from PIL import Image
 
 from diff4splat.cli.main import run
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 
 Spoil = Callable[[Path], Path]
 

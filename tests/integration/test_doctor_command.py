@@ -7,25 +7,28 @@ import sys
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
 
 import pytest
 import torch
 from PIL import Image
 
-from diff4splat.cli import doctor, fields, installation, worlds
+from diff4splat.cli import doctor, installation
 from diff4splat.cli.console import ConsolePhases
 from diff4splat.cli.main import run
-from diff4splat.data_prep.synthetic.renderer import warm as drawing
+from diff4splat.cli.precompile import GROUPS, precompile_sources
+from diff4splat.data_prep.synthetic.renderer.jit import GROUP as WORLDS
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.scene_files.scene_file import save_scene
+from diff4splat.kernels.group import KernelGroup
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.backends import BACKENDS
-from diff4splat.render.raster import backend, warm
+from diff4splat.render.raster import backend
+from diff4splat.render.raster.jit import GROUP as RASTER
 from diff4splat.render.trace import support
-from diff4splat.render.trace import warm as tracer
+from diff4splat.render.trace.jit import GROUP as TRACE
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.hexplane.jit import GROUP as HEXPLANE
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 from diff4splat.training.recipe.data import SourceSettings
@@ -48,30 +51,30 @@ def _without_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def cold(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """A renderer that says it is not compiled; the list fills when somebody compiles it."""
-    monkeypatch.setattr(warm, "ensure_compiled", lambda: None)
-    return not_compiled(monkeypatch, warm, KERNELS)
+    monkeypatch.setattr(RASTER, "ensure_compiled", lambda: None)
+    return not_compiled(monkeypatch, RASTER, KERNELS)
 
 
 @pytest.fixture
 def cold_drawing(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The same of what draws worlds."""
-    return not_compiled(monkeypatch, drawing, DRAWING)
+    return not_compiled(monkeypatch, WORLDS, DRAWING)
 
 
 @pytest.fixture
 def cold_tracer(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The same of the ray tracer."""
-    return not_compiled(monkeypatch, tracer, TRACING)
+    return not_compiled(monkeypatch, TRACE, TRACING)
 
 
 @pytest.fixture
 def cold_fields(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The same of HexPlane fields."""
-    return not_compiled(monkeypatch, fields, FIELDS)
+    return not_compiled(monkeypatch, HEXPLANE, FIELDS)
 
 
 def not_compiled(
-    monkeypatch: pytest.MonkeyPatch, module: ModuleType, names: tuple[str, ...]
+    monkeypatch: pytest.MonkeyPatch, group: KernelGroup, names: tuple[str, ...]
 ) -> list[str]:
     compiled: list[str] = []
 
@@ -81,9 +84,9 @@ def not_compiled(
         compiled.extend(names)
         return 0.5
 
-    monkeypatch.setattr(module, "is_ready", lambda: bool(compiled))
-    monkeypatch.setattr(module, "kernel_count", lambda: len(names))
-    monkeypatch.setattr(module, "warm", compile_all)
+    monkeypatch.setattr(group, "is_ready", lambda: bool(compiled))
+    monkeypatch.setattr(group, "kernel_count", lambda: len(names))
+    monkeypatch.setattr(group, "precompile", compile_all)
     return compiled
 
 
@@ -137,19 +140,11 @@ def test_what_is_not_compiled_is_said_and_not_compiled(
 ) -> None:
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
-    seconds = {
-        "worlds": worlds.COMPILE_S,
-        "renderer trace": installation.COMPILE_TRACER_S,
-        "hexplane fields": fields.COMPILE_S,
-    }
-    for name, value in seconds.items():
-        assert f"will compile on first use (about {value} s)" in table[name]
+    groups = (WORLDS, HEXPLANE, RASTER, TRACE)
+    for name, group in zip(GROUPS, groups, strict=True):
+        assert f"will compile on first use (about {group.compile_s} s)" in table[name]
         assert "doctor --warm" in table[name]
     assert cold_drawing == cold_tracer == cold_fields == []
-    assert (
-        f"will compile on first use (about {installation.COMPILE_S} s)" in table["renderer raster"]
-    )
-    assert "doctor --warm" in table["renderer raster"]
     assert table["self-test"].startswith("renderer reference")
     assert cold == []
 
@@ -157,7 +152,9 @@ def test_what_is_not_compiled_is_said_and_not_compiled(
 def test_a_back_end_that_refuses_says_why(
     cold_drawing: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr(backend, "refusal", lambda job: "expected a fast CPU, got a slow one")
+    monkeypatch.setattr(
+        backend, "unsupported_reason", lambda job: "expected a fast CPU, got a slow one"
+    )
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
     assert table["renderer raster"] == "refuses: expected a fast CPU, got a slow one"
@@ -172,7 +169,7 @@ def test_with_a_gpu_every_back_end_is_asked_twice(
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "a fast one")
     refusals = {"cpu": None, "cuda": "expected CPU tensors, got cuda"}
-    monkeypatch.setattr(installation, "refusal", lambda name, device: refusals[device])
+    monkeypatch.setattr(installation, "unsupported_reason", lambda name, device: refusals[device])
     monkeypatch.setattr(installation, "self_test", lambda: "fine")
     assert run(["doctor"]) == 0
     shown = capsys.readouterr().out
@@ -257,8 +254,8 @@ def test_warm_compiles_once(
 def test_warm_says_when_there_was_nothing_to_do(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    for module in (warm, drawing, tracer, fields):
-        monkeypatch.setattr(module, "warm", lambda advance: 0.1)
+    for group in (RASTER, WORLDS, TRACE, HEXPLANE):
+        monkeypatch.setattr(group, "precompile", lambda on_kernel: 0.1)
     assert run(["doctor", "--warm"]) == 0
     shown = capsys.readouterr().err
     for name in ("renderer raster", *OTHERS):
@@ -268,24 +265,19 @@ def test_warm_says_when_there_was_nothing_to_do(
 def test_a_tracer_that_refuses_says_why(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr(support, "refusal", lambda gaussians: "expected the package numba")
+    monkeypatch.setattr(
+        support, "unsupported_reason", lambda gaussians: "expected the package numba"
+    )
     assert run(["doctor"]) == 0
     table = rows(capsys.readouterr().out)
     assert table["renderer trace"] == "refuses: expected the package numba"
 
 
-def test_warming_reaches_the_kernels_of_fields() -> None:
-    assert fields.warm() >= 0
-    assert fields.is_ready()
-    assert fields.kernel_count() == 2
-    assert all(kernel.signatures for kernel in fields.kernels())
-
-
 def test_warm_says_when_nothing_can_be_kept(
-    cold_drawing: list[str], capsys: pytest.CaptureFixture
+    cold_drawing: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    nowhere = SimpleNamespace(stats=SimpleNamespace(cache_path=None))
-    doctor.warm_one("worlds", drawing.compile_drawing, [nowhere])
+    monkeypatch.setattr(WORLDS.kernels[0]._cache, "_cache_path", None)
+    doctor.precompile_group("worlds")
     assert "not kept, because no folder can be written to" in capsys.readouterr().err
 
 
@@ -300,10 +292,10 @@ def test_sources_compile_what_draws_worlds_where_one_of_them_is_worlds(
 ) -> None:
     phases = ConsolePhases()
     sources = [SourceSettings(kind=kind, folder="clips") for kind in kinds]
-    worlds.prepare_sources(sources, phases)
+    precompile_sources(sources, phases)
     assert cold_drawing == list(happens)
     assert ("compile   " in capsys.readouterr().err) == bool(happens)
-    worlds.prepare_sources(sources, phases)
+    precompile_sources(sources, phases)
     assert cold_drawing == list(happens)
 
 
@@ -402,9 +394,9 @@ def test_a_fresh_machine_compiles_for_good(tmp_path: Path) -> None:
         return done.stderr
 
     first = doctor_says()
-    assert f"renderer raster: compiled {warm.kernel_count()} kernels in" in first
-    assert f"worlds: compiled {drawing.kernel_count()} kernels in" in first
+    assert f"renderer raster: compiled {RASTER.kernel_count()} kernels in" in first
+    assert f"worlds: compiled {WORLDS.kernel_count()} kernels in" in first
     assert "renderer trace: compiled" in first
-    assert f"hexplane fields: compiled {fields.kernel_count()} kernels in" in first
+    assert f"hexplane fields: compiled {HEXPLANE.kernel_count()} kernels in" in first
     assert str(tmp_path) in first
     assert doctor_says().count("was already compiled; loaded in") == 4

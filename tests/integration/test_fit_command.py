@@ -9,7 +9,7 @@ from PIL import Image
 from small_fits import ball_capture, write_ball_folder
 
 from diff4splat.cli.main import run
-from diff4splat.io.scene_file import load_scene
+from diff4splat.io.scene_files.scene_file import load_scene
 from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.spacetime import SpacetimeMotion

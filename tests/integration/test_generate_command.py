@@ -10,9 +10,9 @@ import torch
 from diff4splat.cli.main import run
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.io.exr import read_depth_exr
-from diff4splat.io.images import read_photo, write_png
-from diff4splat.io.ply import read_ply
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.photos.images import read_photo, write_png
+from diff4splat.io.ply.ply_file import read_ply
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
 from diff4splat.outputs import scene_folder
 from diff4splat.render.api import render, render_video

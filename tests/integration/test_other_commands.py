@@ -10,7 +10,7 @@ from PIL import Image
 
 from diff4splat.cli.main import run
 from diff4splat.geometry.camera import pinhole
-from diff4splat.io.path_files import write_path
+from diff4splat.io.cameras.path_files import write_path
 from diff4splat.paths.build import build_path
 from diff4splat.paths.presets import PRESETS
 from diff4splat.paths.settings import PathFrame, PathSettings

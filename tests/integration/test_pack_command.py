@@ -9,7 +9,7 @@ from packed_models import TRAINED, packed_folder, ship, trained_folder
 from training_commands import refusal
 
 from diff4splat.cli.main import run
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.model import load_model

@@ -8,21 +8,16 @@ import pytest
 import torch
 from filmed_scenes import DOT_DEPTH, WALL_DEPTH, filmed_scene, png_rgb
 
-from diff4splat.cli.lens_choice import lens_of
 from diff4splat.cli.main import run
-from diff4splat.cli.optics_choice import (
-    choose_effects,
-    choose_optics,
-    middle_focus,
-    photo_settings,
-    radius_of_f_stop,
-)
-from diff4splat.cli.optics_options import OpticsOptions, require_consistent
+from diff4splat.cli.options.aperture import central_focus, f_stop_radius
+from diff4splat.cli.options.lens import build_lens
+from diff4splat.cli.options.optics import OpticsOptions, require_consistent
+from diff4splat.cli.options.physical_path import choose_effects, choose_optics, to_photo_settings
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.io.camera_record import read_camera_record
+from diff4splat.io.cameras.camera_record import read_camera_record
 from diff4splat.io.exr import read_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.outputs.camera_dataset.sequences import EFFECTS
 from diff4splat.render.physical.api import photograph
 
@@ -80,7 +75,7 @@ def test_a_picture_is_what_the_library_takes(
         seed=9,
     )
     filmed, _ = choose_optics(scene, scene.path, options)
-    settings = photo_settings(options)
+    settings = to_photo_settings(options)
     photo = photograph(scene, filmed.camera(1), filmed.time_s(1), settings=settings)
     write_png(photo.rgb, tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
@@ -138,7 +133,7 @@ def test_a_data_set_is_written_whole_and_once(
     assert "combined: 2 rays per pixel" in text
     assert set(EFFECTS) < {path.name for path in out.iterdir()}
     own = read_camera_record(out / "combined" / "camera.json")
-    optics = own.filmed.optics
+    optics = own.physical_path.optics
     assert optics.exposure_s == pytest.approx(0.05)
     assert optics.shutter.readout_s == pytest.approx(0.05)
     assert optics.aperture.focus_distance == pytest.approx(WALL_DEPTH, abs=0.3)
@@ -210,15 +205,15 @@ def test_an_f_stop_is_the_focal_length_over_two_n() -> None:
     path = filmed_scene().path  # 9.6 px of 12: a focal length of 0.8 sensors
     for sensor_mm, metres, want in ((None, None, 0.0288 / 4), (24.0, 0.1, 0.192 / 4)):
         options = OpticsOptions(f_stop=2.0, sensor_size=sensor_mm, metres_per_unit=metres)
-        assert radius_of_f_stop(options, path) == pytest.approx(want)
+        assert f_stop_radius(options, path) == pytest.approx(want)
 
 
 def test_the_focus_is_what_the_middle_of_the_first_frame_shows() -> None:
     scene = filmed_scene(size_px=(40, 48))
-    focus = middle_focus(scene, scene.path)
+    focus = central_focus(scene, scene.path)
     assert focus.distance == pytest.approx(DOT_DEPTH, abs=0.05)
     empty = scene.select(torch.arange(len(scene.gaussians)) < 1)
-    fallback = middle_focus(empty, scene.path)
+    fallback = central_focus(empty, scene.path)
     assert "shows nothing in its middle" in fallback.note
     assert fallback.distance > 0
 
@@ -226,7 +221,7 @@ def test_the_focus_is_what_the_middle_of_the_first_frame_shows() -> None:
 def test_coefficients_go_where_opencv_has_them() -> None:
     twelve = tuple(float(value) / 100 for value in range(1, 13))
     options = OpticsOptions(lens="opencv", lens_coefficients=twelve)
-    lens, path = lens_of(options, filmed_scene().path)
+    lens, path = build_lens(options, filmed_scene().path)
     assert lens.radial.tolist() == [0.01, 0.02, 0.05, 0.06, 0.07, 0.08]
     assert lens.tangential.tolist() == [0.03, 0.04]
     assert lens.thin_prism.tolist() == [0.09, 0.1, 0.11, 0.12]
@@ -239,7 +234,7 @@ def test_coefficients_of_cycles_are_known_by_their_sign() -> None:
         options = OpticsOptions(
             lens="blender", lens_coefficients=(0.0, sign * 0.02, 0.0, 0.0, 0.0), sensor_size=24.0
         )
-        lens, bent = lens_of(options, path)
+        lens, bent = build_lens(options, path)
         assert lens.cycles_signs == (sign < 0)
         assert bent.cameras.focal_px[0].tolist() == [0.5, 0.5]
 

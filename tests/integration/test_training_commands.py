@@ -25,8 +25,8 @@ from training_commands import (
 )
 
 from diff4splat.cli.main import run
-from diff4splat.evaluation.protocol_json import protocol_json
-from diff4splat.io.images import write_png
+from diff4splat.evaluation.protocols.protocol_json import protocol_json
+from diff4splat.io.photos.images import write_png
 from diff4splat.training.prerequisites import last_checkpoint
 
 

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from diff4splat.geometry.optics import Direction
-from diff4splat.render.physical.lines import line_of, line_shares
+from diff4splat.render.physical.sensor_rows import line_of, line_shares
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,16 +9,16 @@ import torch
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, ClipMetadata, Tracks, View
-from diff4splat.evaluation.protocol import Judged
-from diff4splat.evaluation.sample import Case
+from diff4splat.evaluation.protocols.protocol import Targets
+from diff4splat.evaluation.protocols.sample import EvalSample
 from diff4splat.geometry.camera import Camera, pinhole
 
 
-def seen_by_loops(case: Case) -> np.ndarray:
+def seen_by_loops(case: EvalSample) -> np.ndarray:
     """(picture, row, column), from the definition alone."""
     clip = case.clip
     masks = []
-    for view, frame in case.judged.pairs:
+    for view, frame in case.targets.pairs:
         depth = clip.views[view].depth[frame].double().numpy()
         mask = np.zeros(depth.shape, bool)
         for row, column in np.ndindex(*depth.shape):
@@ -80,7 +80,7 @@ def _stands(clip: Clip, instance: int) -> bool:
 FLAT_FRAMES, FLAT_SIZE, FLAT_DEPTH = 5, (8, 10), 4.0
 
 
-def flat_case(given: tuple[int, ...] = (0, 2, 4), pair: tuple[int, int] = (1, 1)) -> Case:
+def flat_case(given: tuple[int, ...] = (0, 2, 4), pair: tuple[int, int] = (1, 1)) -> EvalSample:
     """Two equal cameras that stand before a wall; instance 1, with a tracked point that stays."""
     clip = Clip(
         note=ClipMetadata(identifier="flat", source="flat 1", license="CC0-1.0"),
@@ -88,10 +88,10 @@ def flat_case(given: tuple[int, ...] = (0, 2, 4), pair: tuple[int, int] = (1, 1)
         views=(_flat_view(), _flat_view()),
         tracks=tracked(torch.zeros(FLAT_FRAMES, 1, 3), [1]),
     )
-    return Case(
+    return EvalSample(
         clip=clip,
         task="reconstruction",
-        judged=Judged(pairs=(pair,), source_frames=()),
+        targets=Targets(pairs=(pair,), source_frames=()),
         input_frames=given,
         has_depth=True,
     )
@@ -106,7 +106,7 @@ def tracked(positions: Tensor, instances: list[int]) -> Tracks:
     )
 
 
-def with_view(case: Case, view: int, **changes: object) -> Case:
+def with_view(case: EvalSample, view: int, **changes: object) -> EvalSample:
     """The case with parts of one view replaced."""
     views = list(case.clip.views)
     views[view] = replace(views[view], **changes)

@@ -7,10 +7,10 @@ import torch
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, ClipMetadata, ObjectNote, Tracks, View
-from diff4splat.evaluation.protocol import Judged, Protocol
-from diff4splat.evaluation.protocol_json import load_protocol
-from diff4splat.evaluation.sample import Case
-from diff4splat.evaluation.systems import Identity
+from diff4splat.evaluation.protocols.protocol import Protocol, Targets
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.sample import EvalSample
+from diff4splat.evaluation.systems.evaluated_system import Identity
 from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
@@ -35,8 +35,8 @@ def tiny_protocol(count: int = 3) -> Protocol:
         frames=FRAMES,
         views=2,
         size_px=SIZE,
-        generation=Judged(pairs=((0, 2), (0, 4), (1, 0), (1, 4)), source_frames=(0,)),
-        reconstruction=Judged(pairs=((1, 0), (1, 4)), source_frames=(0, 2)),
+        generation=Targets(pairs=((0, 2), (0, 4), (1, 0), (1, 4)), source_frames=(0,)),
+        reconstruction=Targets(pairs=((1, 0), (1, 4)), source_frames=(0, 2)),
         track_frames=(0, 2, 4),
         loop=replace(whole.loop, frames=5, size_px=SIZE),
         pose=replace(whole.pose, frames=4, size_px=(96, 120)),
@@ -171,10 +171,10 @@ class Fixed:
             untrained=False,
         )
 
-    def answer(self, case: Case, seed: int) -> Scene:
+    def predict(self, case: EvalSample, seed: int) -> Scene:
         self.calls += 1
         return self.scene
 
-    def generate(self, case: Case, prompt: str | None, seed: int) -> Scene:
+    def generate(self, case: EvalSample, prompt: str | None, seed: int) -> Scene:
         self.calls += 1
         return self.told(prompt or "") if self.told else self.scene

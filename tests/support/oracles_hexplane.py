@@ -17,7 +17,7 @@ import oracles_io
 import torch
 from torch import Tensor
 
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.hexplane.decoder import (
     HEAD_NAMES,

@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 
 from diff4splat.geometry.camera import pinhole
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion

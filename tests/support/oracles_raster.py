@@ -15,7 +15,7 @@ from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.render.api import render
-from diff4splat.render.raster.plan import DEFAULT_LIGHT_CUTOFF
+from diff4splat.render.raster.raster_settings import DEFAULT_LIGHT_CUTOFF
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians

@@ -15,7 +15,7 @@ import numpy as np
 import oracles_io
 import torch
 
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.spacetime import SpacetimeMotion
 from diff4splat.scene.motion.spacetime_conversion import SpacetimeGaussians

@@ -14,7 +14,7 @@ from torch import Tensor
 from diff4splat.data.capture.capture import Capture, Flow, Frame, PointCloud
 from diff4splat.geometry import rigid
 from diff4splat.geometry.camera import Camera, join_cameras, pinhole
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.render.api import render
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import dc_from_color

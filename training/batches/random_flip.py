@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
+from diff4splat.captions.mirror import mirrored_caption
 from diff4splat.training.batches.clip_batch import ClipBatch
 
 

@@ -80,7 +80,7 @@ def _window(clip: Clip, settings: DataSettings, generator: torch.Generator) -> C
         return crop(clip, settings.clip_frames, generator)
     if clip.frames != settings.clip_frames:
         raise InputError(
-            f"clip {clip.note.identifier}: expected {settings.clip_frames} moments, got "
+            f"clip {clip.note.identifier}: expected {settings.clip_frames} keyframes, got "
             f"{clip.frames} frames; draw such clips or train with data.keyframes_only=false"
         )
     return repeat_keyframes(clip, settings.keyframe_spacing)

@@ -48,7 +48,7 @@ class ClipSamples:
         return collate(samples)
 
     def _name(self, number: int) -> str:
-        """For the log: losses are told apart by source."""
+        """For the log: losses are logged per source."""
         source = self.recipe.data.sources[number]
         return f"{number} {source.folder or f'{source.kind} {source.split}'}"
 

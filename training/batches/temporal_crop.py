@@ -1,4 +1,4 @@
-"""A clip's frames from a random start, or moments that stand for all frames.
+"""A random temporal crop of a clip, or keyframes repeated to all frames.
 
 Axes: ``f`` frames. The world of what is cut out is again its first input camera.
 """
@@ -32,7 +32,7 @@ def crop(clip: Clip, frames: int, generator: torch.Generator) -> Clip:
 
 
 def repeat_keyframes(clip: Clip, stride: int) -> Clip:
-    """Moments as a whole clip, in which each stands for the ``stride`` frames up to it."""
+    """Keyframes as a full clip: each is repeated for the ``stride`` frames up to it."""
     every = torch.arange(1 + (clip.frames - 1) * stride)
     return _frames(clip, (every + stride - 1) // stride)
 
@@ -58,7 +58,7 @@ def _frames(clip: Clip, window: slice | Int[Tensor, " t"]) -> Clip:
 
 
 def drop_projections(tracks: Tracks) -> Tracks:
-    """The same points; where they were chosen is no longer said, as that may have been cut off."""
+    """The same points without their source frames, which may lie outside the crop."""
     return replace(tracks, found_at=torch.full_like(tracks.found_at, -1))
 
 

@@ -14,16 +14,21 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.captions.mirror import mirrored_caption
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.clip_part import ClipPart
-from diff4splat.data_prep.synthetic.captions.mirror import mirrored_caption
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.model import Model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.augment import mirrored
+from diff4splat.training.batches.motion_targets import (
+    extend_to_all_cells,
+    moving_mask,
+    pixel_motion,
+)
 from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.resize import resized
 from diff4splat.training.batches.temporal_crop import from_first_camera

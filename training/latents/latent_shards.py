@@ -17,7 +17,12 @@ from torch import Tensor
 
 from diff4splat.errors import FileFormatError, InputError
 from diff4splat.geometry.camera import Camera, join_cameras
-from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import (
+    TensorFile,
+    read_metadata,
+    read_tensors,
+    write_tensors,
+)
 
 PATTERN = "latents-*.safetensors"
 TENSORS = ("latent", "focal_px", "center_px", "pose", "is_static")

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, widen
+from diff4splat.metrics.checks import promote, require_alike
 
 CHARBONNIER_WIDTH = 1e-3
 """Below this error the loss is quadratic."""
@@ -28,7 +28,7 @@ def kl_divergence(
         ShapeError: the shapes differ.
     """
     require_alike("log_variance", log_variance, mean)
-    mean, log_variance = widen(mean, log_variance)
+    mean, log_variance = promote(mean, log_variance)
     # expm1 keeps the small difference of near-equal numbers around a variance of 1.
     divergence = 0.5 * (mean.square() + (log_variance.expm1() - log_variance))
     return divergence.flatten(1).mean(1)
@@ -43,7 +43,7 @@ def charbonnier(
         ShapeError: the shapes differ.
     """
     require_alike("video", video, reference)
-    video, reference = widen(video, reference)
+    video, reference = promote(video, reference)
     width = torch.full_like(video[:1], CHARBONNIER_WIDTH)
     error = torch.hypot(video - reference, width) - CHARBONNIER_WIDTH
     return error.flatten(1).mean(1)

@@ -19,8 +19,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, masked_mean
+from diff4splat.metrics.checks import promote, require_alike, require_mask
+from diff4splat.metrics.masked import masked_mean, zero_masked
 
 LEAST_PIXELS = 16
 """Fewer valid pixels correlate by accident."""
@@ -46,7 +46,7 @@ def depth_correlation(
     if valid is None:
         valid = (truth > 0) & truth.isfinite()
     require_mask(valid, truth.shape)
-    rendered, truth, keep = *widen(rendered.flatten(-2), truth.flatten(-2)), valid.flatten(-2)
+    rendered, truth, keep = *promote(rendered.flatten(-2), truth.flatten(-2)), valid.flatten(-2)
     truth_size = _size(truth, keep)
     # Correlation does not change with the unit; in these units nothing over- or underflows.
     rendered_size = torch.maximum(_size(rendered, keep), FLATTEST * truth_size)
@@ -67,7 +67,7 @@ def depth_log_error(
     """
     require_alike("depth", depth, truth)
     valid = (truth > 0) & truth.isfinite()
-    depth, truth = widen(depth, torch.where(valid, truth, 1.0))
+    depth, truth = promote(depth, torch.where(valid, truth, 1.0))
     error = (depth.log() - truth.log()).abs()
     return masked_mean(error.flatten(1), valid.flatten(1))
 
@@ -81,11 +81,11 @@ def depth_smoothness(
     Raises:
         ShapeError: the shapes differ.
     """
-    (rendered,) = widen(rendered)
+    (rendered,) = promote(rendered)
     if valid is None:
         valid = torch.ones_like(rendered, dtype=torch.bool)
     require_mask(valid, rendered.shape)
-    depth = hidden_as_zero(rendered, valid)
+    depth = zero_masked(rendered, valid)
     mean = masked_mean(depth.abs().flatten(-2), valid.flatten(-2))[..., None, None]
     depth = depth / mean.clamp(min=LEAST_MEAN)
     return _variation(depth, valid, -1) + _variation(depth, valid, -2)
@@ -110,8 +110,8 @@ def _size(depth: Tensor, keep: Tensor) -> Tensor:
 
 
 def _centered(depth: Tensor, unit: Tensor, keep: Tensor) -> Tensor:
-    depth = hidden_as_zero(depth, keep) / torch.where(unit > 0, unit, 1.0)
-    return hidden_as_zero(depth - masked_mean(depth, keep)[..., None], keep)
+    depth = zero_masked(depth, keep) / torch.where(unit > 0, unit, 1.0)
+    return zero_masked(depth - masked_mean(depth, keep)[..., None], keep)
 
 
 def _deviation(centered: Tensor, keep: Tensor) -> Tensor:

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.path import velocity as path_velocity
-from diff4splat.metrics.checks import require_alike, widen
+from diff4splat.metrics.checks import promote, require_alike
 
 
 def flow_matching(
@@ -39,7 +39,7 @@ def flow_matching(
         ShapeError: the shapes differ.
     """
     require_alike("velocity", velocity, clean)
-    velocity, clean, noise = widen(velocity, clean, noise)
+    velocity, clean, noise = promote(velocity, clean, noise)
     error = (velocity - path_velocity(clean, noise)).square()
     if channels is not None:
         error = error * channels.to(error)[:, None, None, None]

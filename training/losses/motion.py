@@ -18,8 +18,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, require_mask, widen
-from diff4splat.metrics.masked import hidden_as_zero, masked_mean
+from diff4splat.metrics.checks import promote, require_alike, require_mask
+from diff4splat.metrics.masked import masked_mean, zero_masked
 
 
 def track_motion(
@@ -49,9 +49,9 @@ def track_motion(
 
 def _known(predicted: Tensor, truth: Tensor, valid: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
     require_alike("predicted", predicted, truth)
-    predicted, truth = widen(predicted, truth)
+    predicted, truth = promote(predicted, truth)
     if valid is None:
         valid = torch.ones_like(truth[..., 0], dtype=torch.bool)
     require_mask(valid, truth.shape[:-1])
     keep = valid[..., None]
-    return hidden_as_zero(predicted, keep), hidden_as_zero(truth, keep), valid
+    return zero_masked(predicted, keep), zero_masked(truth, keep), valid

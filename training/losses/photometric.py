@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.metrics.checks import require_alike, require_mask, widen
+from diff4splat.metrics.checks import promote, require_alike, require_mask
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.metrics.masked import masked_mean
 from diff4splat.metrics.perceptual import perceptual_distance
@@ -52,7 +52,7 @@ def perceptual_error(
 def _known(image: Tensor, reference: Tensor, valid: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
     """Widened pictures that agree in invalid pixels, and the mask."""
     require_alike("image", image, reference)
-    image, reference = widen(image, reference)
+    image, reference = promote(image, reference)
     if valid is None:
         return image, reference, torch.ones_like(image[..., 0], dtype=torch.bool)
     require_mask(valid, image.shape[:-1])

@@ -17,7 +17,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
-from diff4splat.metrics.checks import widen
+from diff4splat.metrics.checks import promote
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ class LevelDistribution:
 
 def sample_levels(uniform: Float[Tensor, " b"], draw: LevelDistribution) -> Float[Tensor, " b"]:
     """Levels in [0, 1] from uniform numbers in [0, 1]; the same numbers give the same levels."""
-    (levels,) = widen(uniform)
+    (levels,) = promote(uniform)
     if draw.kind == "logit_normal":
         levels = torch.sigmoid(draw.mean + draw.std * torch.special.ndtri(levels))
     if draw.shift == 1:

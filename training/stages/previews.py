@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.io.depth_colors import colorize, robust_range
+from diff4splat.io.figures.depth_colors import colorize, robust_range
 from diff4splat.io.pixels import from_bytes, unit_rgb
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.clip_batch import ClipBatch

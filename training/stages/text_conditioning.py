@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from diff4splat.data_prep.synthetic.captions.paraphrase import said_otherwise
+from diff4splat.captions.paraphrase import paraphrase
 from diff4splat.models.text_encoder.encoder import tokenize
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
@@ -55,5 +55,5 @@ class TextConditioning:
         generators = self.plan.random.per_sample(batch, "words")
         for caption, own in zip(batch.captions, generators, strict=True):
             draw, variant = torch.rand((), generator=own), torch.randint(12, (), generator=own)
-            paraphrased.append(said_otherwise(caption, float(draw), int(variant)))
+            paraphrased.append(paraphrase(caption, float(draw), int(variant)))
         return paraphrased

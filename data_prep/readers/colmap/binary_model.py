@@ -18,7 +18,7 @@ from diff4splat.data_prep.readers.colmap.model import (
     ModelImage,
 )
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
+from diff4splat.io.require_file import require_file
 
 _POINT_2D_BYTES, _SEEN_BYTES = 24, 8
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from diff4splat.data_prep.readers.colmap.binary_model import require_known_model
 from diff4splat.data_prep.readers.colmap.model import PARAMETERS, ModelCamera, ModelImage
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
+from diff4splat.io.require_file import require_file
 
 _CAMERA = "CAMERA_ID MODEL WIDTH HEIGHT PARAMS"
 _IMAGE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"

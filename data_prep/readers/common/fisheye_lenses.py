@@ -16,7 +16,7 @@ from diff4splat.errors import FileFormatError
 from diff4splat.geometry.lenses.equirectangular import Equirectangular
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Optics
-from diff4splat.io.lens_json import as_file_error
+from diff4splat.io.cameras.lens_json import as_file_error
 
 _SMALLEST_CIRCLE = 0.5
 """Diameter of what a fisheye sees, in shorter sides of the picture; real ones fill more."""

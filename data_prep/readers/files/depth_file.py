@@ -10,7 +10,7 @@ from PIL import Image
 
 from diff4splat.data_prep.readers.files.float_files import exr_channels, npy_array
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
+from diff4splat.io.require_file import require_file
 
 MILLIMETRE = 1e-3
 """Default unit of integer depth, in metres."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from diff4splat.errors import FileFormatError, InputError
-from diff4splat.paths.names import quoted
+from diff4splat.paths.messages import quoted
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".exr", ".npy")
 

@@ -9,8 +9,8 @@ import numpy as np
 import OpenEXR
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
-from diff4splat.io.quiet import native_stderr_silenced
+from diff4splat.io.require_file import require_file
+from diff4splat.io.silence_stderr import silence_native_stderr
 
 FLOAT_SUFFIXES = (".exr", ".npy")
 
@@ -66,7 +66,7 @@ def _opened(file: Path, header_only: bool) -> OpenEXR.File:
     try:
         # The library tells of damaged pixels by printing alone, and two threads that catch what is
         # printed would take it from each other.
-        with _PRINTING, native_stderr_silenced(), redirect_stdout(said):
+        with _PRINTING, silence_native_stderr(), redirect_stdout(said):
             opened = OpenEXR.File(str(file), separate_channels=True, header_only=header_only)
     except (RuntimeError, ValueError, TypeError, MemoryError) as error:
         raise _damaged(file) from error

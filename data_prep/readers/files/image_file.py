@@ -21,8 +21,8 @@ from diff4splat.data_prep.readers.files.float_files import (
     npy_array,
 )
 from diff4splat.errors import FileFormatError
-from diff4splat.io import photo_rules
-from diff4splat.io.existing import require_file
+from diff4splat.io.photos import photo_validation
+from diff4splat.io.require_file import require_file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,7 @@ def _image(file: Path) -> Iterator[Image.Image]:
         # Pillow warns about sizes and odd metadata; neither is a reason to stop.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with Image.open(file, formats=photo_rules.FORMATS) as image:
+            with Image.open(file, formats=photo_validation.FORMATS) as image:
                 yield image
     except FileFormatError:
         raise
@@ -117,7 +117,7 @@ def _image(file: Path) -> Iterator[Image.Image]:
 def _levels(file: Path) -> np.ndarray:
     """uint8, ``h w 3`` or ``h w 4``."""
     with _image(file) as image:
-        if photo_rules.is_deep(image):
+        if photo_validation.is_deep(image):
             raise FileFormatError(
                 f"{file}: expected 8 bits per channel, got more; convert it to 8 bits, or to "
                 "OpenEXR or NumPy with values from 0 to 1"

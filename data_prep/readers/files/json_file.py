@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
+from diff4splat.io.require_file import require_file
 from diff4splat.paths.formats.json_fields import kind_of
 
 MAX_BYTES = 256 * 2**20

@@ -12,9 +12,9 @@ from jaxtyping import Float
 from diff4splat.data.capture.capture import PointCloud
 from diff4splat.data_prep.readers.files.float_files import npy_array
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
-from diff4splat.io.ply_body import Columns, read_columns
-from diff4splat.io.ply_header import read_header
+from diff4splat.io.ply.ply_body import Columns, read_columns
+from diff4splat.io.ply.ply_header import read_header
+from diff4splat.io.require_file import require_file
 
 DEFAULT_GREY = 0.5
 """For points without colours."""

@@ -15,8 +15,8 @@ from jaxtyping import UInt8
 from diff4splat.data_prep.readers.files.image_file import Pixels
 from diff4splat.data_prep.readers.files.lru_cache import LruCache
 from diff4splat.errors import FileFormatError
-from diff4splat.io.existing import require_file
-from diff4splat.io.quiet import native_stderr_silenced
+from diff4splat.io.require_file import require_file
+from diff4splat.io.silence_stderr import silence_native_stderr
 
 CACHE_BYTES = 1 << 30
 """For all videos of a capture together."""
@@ -34,7 +34,7 @@ class VideoFile:
         require_file(file, "a video")
         self.file, self.shrink, self._cache, self._lock = file, shrink, cache, Lock()
         # Only here: what silences the decoder is not safe between threads, and reading has to be.
-        with native_stderr_silenced():
+        with silence_native_stderr():
             self._open()
         self.frames = int(self._stream.get(cv2.CAP_PROP_FRAME_COUNT))
         self.fps = float(self._stream.get(cv2.CAP_PROP_FPS))

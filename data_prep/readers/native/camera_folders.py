@@ -5,8 +5,8 @@ from pathlib import Path
 
 from diff4splat.data_prep.readers.files.file_discovery import natural_key
 from diff4splat.errors import ConfigError
-from diff4splat.io.camera_record import FILE, FORMAT
-from diff4splat.paths.names import unknown_name
+from diff4splat.io.cameras.camera_record import FILE, FORMAT
+from diff4splat.paths.messages import unknown_name
 
 DATASET, DATASET_FORMAT = "dataset.json", "diff4splat-camera-dataset"
 _HEAD_BYTES = 256

@@ -28,8 +28,8 @@ from diff4splat.data_prep.readers.native.camera_folders import camera_folders
 from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.errors import FileFormatError
 from diff4splat.geometry.optics import Optics
-from diff4splat.io.camera_record import FILE, CameraRecord, read_camera_record
-from diff4splat.io.optics_json import optics_json
+from diff4splat.io.cameras.camera_record import FILE, CameraRecord, read_camera_record
+from diff4splat.io.cameras.optics_json import optics_json
 
 EXPECTED_FILES = (
     "camera.json beside its pictures, or folders of these (diff4splat render --dataset)"
@@ -97,7 +97,7 @@ def _shots(record: CameraRecord, folder: Path, number: int) -> list[Shot]:
                 size_px=path.cameras.size_px,
             ),
             world_from_camera=path.cameras.world_from_camera[index],
-            time_s=record.filmed.time_s(index),
+            time_s=record.physical_path.time_s(index),
             camera=number,
             mask=mask,
             depth=None
@@ -121,7 +121,7 @@ def _require_frames_on_track(record: CameraRecord, file: Path) -> None:
     Raises:
         FileFormatError: naming the first that is not.
     """
-    track, path = record.filmed.track, record.filmed.path
+    track, path = record.physical_path.track, record.physical_path.path
     if track is None:
         return
     expected, got = track.at(path.times_s), path.cameras.world_from_camera
@@ -141,9 +141,9 @@ def _require_same_optics(records: Sequence[CameraRecord], folders: Sequence[Path
     Raises:
         FileFormatError: naming what differs, and where.
     """
-    known = _flat(optics_json(records[0].filmed.optics))
+    known = _flat(optics_json(records[0].physical_path.optics))
     for record, folder in zip(records[1:], folders[1:], strict=True):
-        other = _flat(optics_json(record.filmed.optics))
+        other = _flat(optics_json(record.physical_path.optics))
         for key in {**known, **other}:
             mine, theirs = known.get(key), other.get(key)
             if mine != theirs:

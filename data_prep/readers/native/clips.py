@@ -27,7 +27,7 @@ from diff4splat.data_prep.readers.native.clip_frames import ClipFrames
 from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.geometry.camera import Camera, join_cameras
-from diff4splat.paths.names import unknown_name
+from diff4splat.paths.messages import unknown_name
 
 EXPECTED_FILES = "manifest.json of a folder of clips (diff4splat-clips)"
 

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 class SceneKind:
     """One kind of place."""
 
-    phrase: str
-    """Name in captions."""
     area_radius_m: tuple[float, float]
     tilt_deg: tuple[float, float]
     """Tilt of the camera."""
@@ -33,7 +31,6 @@ class SceneKind:
 SCENE_KINDS: dict[str, SceneKind] = {
     "room": SceneKind(
         weight=2.0,
-        phrase="in a room",
         tags=frozenset(["room"]),
         area_radius_m=(0.7, 1.3),
         tilt_deg=(6.0, 28.0),
@@ -43,7 +40,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "tabletop": SceneKind(
         weight=1.5,
-        phrase="on a table",
         tags=frozenset(["table"]),
         area_radius_m=(0.16, 0.34),
         tilt_deg=(10.0, 34.0),
@@ -53,7 +49,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "meadow": SceneKind(
         weight=1.5,
-        phrase="in a meadow",
         tags=frozenset(["ground"]),
         far=frozenset(["tree", "conifer", "house", "windmill", "bush"]),
         area_radius_m=(1.2, 3.6),
@@ -65,7 +60,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "garden": SceneKind(
         weight=1.5,
-        phrase="in a garden",
         tags=frozenset(["ground"]),
         far=frozenset(["tree", "house", "bush", "fence"]),
         area_radius_m=(0.8, 2.2),
@@ -77,7 +71,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "dunes": SceneKind(
         weight=0.7,
-        phrase="on sand",
         tags=frozenset(["sand"]),
         far=frozenset(["conifer", "tower", "bush"]),
         area_radius_m=(1.0, 3.4),
@@ -89,7 +82,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "street": SceneKind(
         weight=1.5,
-        phrase="in a street",
         tags=frozenset(["street"]),
         far=frozenset(["house", "flats", "tree", "tower"]),
         area_radius_m=(1.4, 3.6),
@@ -101,7 +93,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "courtyard": SceneKind(
         weight=1.5,
-        phrase="in a courtyard",
         tags=frozenset(["street", "ground"]),
         area_radius_m=(1.1, 2.6),
         tilt_deg=(4.0, 26.0),
@@ -110,7 +101,6 @@ SCENE_KINDS: dict[str, SceneKind] = {
     ),
     "seabed": SceneKind(
         weight=0.6,
-        phrase="under water",
         tags=frozenset(["sea"]),
         area_radius_m=(0.7, 1.8),
         tilt_deg=(2.0, 18.0),

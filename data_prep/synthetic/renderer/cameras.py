@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.renderer.compiled import kernel
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.geometry.camera import Camera
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 
 from diff4splat.data_prep.synthetic.renderer.cameras import RenderCamera, sample_grid, to_camera
-from diff4splat.data_prep.synthetic.renderer.compiled import kernel
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.occlusion import visible_points
 from diff4splat.data_prep.synthetic.renderer.rasterise import NEAR_M, blank, rasterise, weights
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import TriangleBuffer

@@ -1,6 +1,6 @@
 """Kernel: vertex normals, each triangle weighted by its area."""
 
-from diff4splat.data_prep.synthetic.renderer.compiled import kernel
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.numerics import cross, unit
 
 

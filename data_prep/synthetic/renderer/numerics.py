@@ -5,7 +5,7 @@ Libraries differ in the last bit of an exponential or a sine; these do not.
 
 import math
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined
+from diff4splat.kernels.jit import inlined
 
 _FAR = 1e8
 """Coordinates beyond are held here: their fractions would be gone, and integers overflow later."""

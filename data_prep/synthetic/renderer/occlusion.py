@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from diff4splat.data_prep.synthetic.renderer.cameras import RenderCamera
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, kernel
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.rasterise import NEAR_M, bounds, edges, touch, within
+from diff4splat.kernels.jit import inlined
 
 _IN_FRONT = 1.0 + 1e-4
 

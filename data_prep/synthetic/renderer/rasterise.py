@@ -15,8 +15,9 @@ import math
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, kernel
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.numerics import clamp, cross, dot
+from diff4splat.kernels.jit import inlined
 
 NEAR_M = 0.01
 """What is nearer to the camera's plane is not drawn."""

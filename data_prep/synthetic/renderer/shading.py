@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, kernel, merged, shared
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.numerics import (
     blend,
     clamp,
@@ -24,6 +24,7 @@ from diff4splat.data_prep.synthetic.renderer.shadows import Chart, lit, open_sky
 from diff4splat.data_prep.synthetic.renderer.skies import ambient, sky
 from diff4splat.data_prep.synthetic.renderer.textures.materials import pattern
 from diff4splat.data_prep.synthetic.renderer.tone import encoded, filmic
+from diff4splat.kernels.jit import inlined, merged, shared
 
 _AVERAGED_PX = 0.8
 """Textures are averaged over a little less than a pixel: lenses are about as sharp."""

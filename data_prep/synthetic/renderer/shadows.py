@@ -13,10 +13,11 @@ import numpy as np
 from jaxtyping import Float64
 
 from diff4splat.data_prep.synthetic.renderer.cameras import SampleGrid
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, kernel, shared
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.numerics import clamp, dot
 from diff4splat.data_prep.synthetic.renderer.rasterise import blank, rasterise
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import TriangleBuffer
+from diff4splat.kernels.jit import inlined, shared
 
 _TURN_X, _TURN_Y = -0.7373688780783197, 0.6754902942615238
 """The golden angle: points of a spiral cover a disc evenly (Vogel 1979)."""

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, shared
 from diff4splat.data_prep.synthetic.renderer.numerics import blend, clamp, dot, ramp
 from diff4splat.data_prep.synthetic.renderer.textures.noise import flat_octaves
 from diff4splat.data_prep.synthetic.world import World
+from diff4splat.kernels.jit import inlined, shared
 
 
 class Lighting(NamedTuple):

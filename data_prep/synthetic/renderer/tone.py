@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined
 from diff4splat.data_prep.synthetic.renderer.numerics import clamp
+from diff4splat.kernels.jit import inlined
 
 _STEPS = 4096
 

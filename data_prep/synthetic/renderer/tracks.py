@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from diff4splat.data_prep.synthetic.renderer.cameras import RenderCamera, sample_grid, to_camera
-from diff4splat.data_prep.synthetic.renderer.compiled import kernel
 from diff4splat.data_prep.synthetic.renderer.ground_truth import GroundTruth, camera_vertices
+from diff4splat.data_prep.synthetic.renderer.jit import kernel
 from diff4splat.data_prep.synthetic.renderer.occlusion import visible_points
 from diff4splat.data_prep.synthetic.renderer.rasterise import NEAR_M, weights
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import TriangleBuffer

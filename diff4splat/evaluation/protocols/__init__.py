@@ -1,1 +1,1 @@
-"""Versioned evaluation protocols as JSON; a published one never changes, a better one is new."""
+"""Evaluation protocols: bundled JSON files, their types, and the clips that they name."""

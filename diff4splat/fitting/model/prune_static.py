@@ -14,7 +14,7 @@ from diff4splat.fitting.model.static_detection import confirm_static
 from diff4splat.fitting.motions.static import NoMotion
 from diff4splat.fitting.settings import FitSettings
 from diff4splat.progress.skipped import SkippedWork
-from diff4splat.render.physical.viewer import radians_per_pixel
+from diff4splat.render.physical.view_cone import radians_per_pixel
 
 MAX_TIMES = 16
 

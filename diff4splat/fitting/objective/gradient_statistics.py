@@ -13,7 +13,7 @@ from torch import Tensor
 
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.physical_camera import PhysicalCamera
-from diff4splat.render.physical.viewer import viewer_of
+from diff4splat.render.physical.view_cone import view_cone
 
 
 class GradientStatistics:
@@ -59,10 +59,10 @@ def ndc_scale(
     total = points.new_zeros(len(points))
     for camera in cameras:
         typed = camera.to(points.dtype)
-        viewer = viewer_of(typed, time_s)
-        offset = points - viewer.place
+        cone = view_cone(typed, time_s)
+        offset = points - cone.position
         distance = offset.norm(dim=-1)
-        in_front = offset @ viewer.ahead >= min(viewer.least_cosine, 0.0) * distance
-        half_image_rad = 0.5 * typed.camera.size_px[1] / viewer.pixels_per_radian
+        in_front = offset @ cone.ahead >= min(cone.least_cosine, 0.0) * distance
+        half_image_rad = 0.5 * typed.camera.size_px[1] / cone.pixels_per_radian
         total = total + torch.where(in_front, distance * half_image_rad, 0.0)
     return total / len(cameras)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from diff4splat.data.capture.capture import Flow, Frame
 from diff4splat.fitting.settings import LossWeights
-from diff4splat.metrics.structure import WINDOW_PX, ssim
+from diff4splat.metrics.ssim import WINDOW_PX, ssim
 from diff4splat.render.physical.settings import Photograph
 from diff4splat.render.settings import RenderOutput
 

@@ -22,7 +22,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.metrics.checks import no_autocast, require_alike, widen
+from diff4splat.metrics.checks import no_autocast, promote, require_alike
 
 SCALES = 4
 DIRECTIONS = 8
@@ -60,7 +60,7 @@ class GradientPyramidFeatures:
         require_alike("image", image, reference)
         if 0 in image.shape[1:]:
             raise ShapeError(f"image: expected a pixel, got {tuple(image.shape)}")
-        pictures = torch.cat(widen(image, reference))
+        pictures = torch.cat(promote(image, reference))
         with no_autocast(pictures):
             scales = _pyramid(_opponent(pictures))
             structure = torch.stack([_structure(colors) for colors in scales]).mean(0)

@@ -16,8 +16,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.metrics.checks import no_autocast, require_alike, widen
-from diff4splat.metrics.features.trunks import Trunk
+from diff4splat.metrics.checks import no_autocast, promote, require_alike
+from diff4splat.metrics.features.backbones import Backbone
 
 SHIFT = (-0.030, -0.088, -0.188)
 SCALE = (0.458, 0.448, 0.450)
@@ -28,7 +28,7 @@ NORM_FLOOR = 1e-10
 class Lpips:
     """LPIPS with given weights, all of them frozen; a ``PerceptualFeatures``."""
 
-    def __init__(self, trunk: Trunk, weights: dict[str, Tensor]) -> None:
+    def __init__(self, trunk: Backbone, weights: dict[str, Tensor]) -> None:
         """``weights`` by the names of ``lpips_weights.expected_shapes``."""
         self._trunk = trunk
         self._weights = {key: value.detach() for key, value in weights.items()}
@@ -49,7 +49,7 @@ class Lpips:
         """
         require_alike("image", image, reference)
         self._require_size(image)
-        pictures = torch.cat(widen(image, reference))
+        pictures = torch.cat(promote(image, reference))
         with no_autocast(pictures):
             weights = self._weights_like(pictures)
             slices = self._trunk.outputs(_standardized(pictures), weights)

@@ -18,15 +18,15 @@ from safetensors.torch import load_file
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.metrics.features.backbones import Backbone
 from diff4splat.metrics.features.lpips import SCALE, SHIFT
-from diff4splat.metrics.features.trunks import Trunk
 
 SCALING = {"scaling_layer.shift": SHIFT, "scaling_layer.scale": SCALE}
 SHOWN = 4
 """Names listed in an error message before "and so on"."""
 
 
-def read_lpips_weights(files: Sequence[Path], trunk: Trunk) -> dict[str, Tensor]:
+def read_lpips_weights(files: Sequence[Path], trunk: Backbone) -> dict[str, Tensor]:
     """All weights of one or two files, float32, by the names of the lpips package.
 
     Raises:
@@ -55,7 +55,7 @@ def read_lpips_weights(files: Sequence[Path], trunk: Trunk) -> dict[str, Tensor]
     return weights
 
 
-def expected_shapes(trunk: Trunk) -> dict[str, tuple[int, ...]]:
+def expected_shapes(trunk: Backbone) -> dict[str, tuple[int, ...]]:
     """Name and shape of every weight that LPIPS with this trunk has."""
     shapes: dict[str, tuple[int, ...]] = {}
     for name, layer in trunk.convolutions().items():
@@ -66,7 +66,7 @@ def expected_shapes(trunk: Trunk) -> dict[str, tuple[int, ...]]:
     return shapes
 
 
-def _by_package_names(tensors: dict[str, Tensor], trunk: Trunk) -> dict[str, Tensor]:
+def _by_package_names(tensors: dict[str, Tensor], trunk: Backbone) -> dict[str, Tensor]:
     slices = {layer.index: name for name, layer in trunk.convolutions().items()}
     named: dict[str, Tensor] = {}
     for key, value in tensors.items():

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.io.sheet_canvas import FAINT, Canvas, Style, fitted, text_width, wrap
+from diff4splat.io.figures.page_layout import FAINT, Canvas, Style, fitted, text_width, wrap
 
 _MARGIN, _GAP = 40, 16
 _BOX = (290, 290)

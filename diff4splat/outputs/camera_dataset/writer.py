@@ -19,18 +19,23 @@ from torch import Tensor
 from diff4splat import __version__
 from diff4splat.errors import ConfigError
 from diff4splat.io.atomic import atomic_folder, write_text
-from diff4splat.io.camera_record import (
+from diff4splat.io.cameras.camera_record import (
     FILE,
     CameraRecord,
+    FrameFiles,
     GeometryKind,
-    TakenFrame,
     write_camera_record,
 )
+from diff4splat.io.cameras.optics_json import optics_json
 from diff4splat.io.exr import write_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.optics_json import optics_json
+from diff4splat.io.photos.images import write_png
 from diff4splat.outputs.camera_dataset.sheet import SheetRow, camera_sheet, thumbnail
-from diff4splat.outputs.photographs import Taken, geometry_kind, photographs, stopped
+from diff4splat.outputs.photo_sequence import (
+    CaptureStats,
+    freeze_time,
+    geometry_kind,
+    render_photographs,
+)
 from diff4splat.paths.physical_path import PhysicalPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.physical.settings import Photograph, PhotoSettings
@@ -45,7 +50,7 @@ BLIND_GREY = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DatasetJob:
-    """What is filmed."""
+    """One sequence of the data set."""
 
     scene: Scene
     sequences: Mapping[str, PhysicalPath]
@@ -60,12 +65,12 @@ class _Sequence:
     """One of them, while it is being written."""
 
     name: str
-    filmed: PhysicalPath
+    physical_path: PhysicalPath
     kind: GeometryKind
     folder: Path
 
 
-def write_camera_dataset(job: DatasetJob, folder: Path, log: RunLog) -> dict[str, Taken]:
+def write_camera_dataset(job: DatasetJob, folder: Path, log: RunLog) -> dict[str, CaptureStats]:
     """Film and write everything, whole or not at all; returns what each sequence needed.
 
     Raises:
@@ -73,18 +78,21 @@ def write_camera_dataset(job: DatasetJob, folder: Path, log: RunLog) -> dict[str
         OutputError: the folder cannot be written, or the disk is full.
     """
     require_empty(folder)
-    taken, rows = {}, []
+    stats, rows = {}, []
     with atomic_folder(folder) as staging:
-        for name, filmed in job.sequences.items():
+        for name, physical_path in job.sequences.items():
             (staging / name).mkdir()
-            own = _Sequence(
-                name=name, filmed=filmed, kind=geometry_kind(filmed), folder=staging / name
+            sequence = _Sequence(
+                name=name,
+                physical_path=physical_path,
+                kind=geometry_kind(physical_path),
+                folder=staging / name,
             )
-            taken[name], row = _write_sequence(job, own, log)
+            stats[name], row = _write_sequence(job, sequence, log)
             rows.append(row)
-        write_text(staging / DATASET, json.dumps(_contents(job, taken), indent=1) + "\n")
+        write_text(staging / DATASET, json.dumps(_contents(job, stats), indent=1) + "\n")
         write_png(camera_sheet(rows, job.scene.provenance.license), staging / SHEET)
-    return taken
+    return stats
 
 
 def require_empty(folder: Path) -> None:
@@ -100,42 +108,44 @@ def require_empty(folder: Path) -> None:
         )
 
 
-def _write_sequence(job: DatasetJob, own: _Sequence, log: RunLog) -> tuple[Taken, SheetRow]:
-    taken, pictures = Taken(), []
-    count = len(own.filmed)
+def _write_sequence(
+    job: DatasetJob, sequence: _Sequence, log: RunLog
+) -> tuple[CaptureStats, SheetRow]:
+    stats, pictures = CaptureStats(), []
+    count = len(sequence.physical_path)
     shown = set(torch.linspace(0, count - 1, min(count, SHOWN)).round().int().tolist())
-    with log.phases.phase(own.name, count) as advance:
-        frames = photographs(
-            stopped(job.scene, job.time_s),
-            own.filmed,
-            ("rgb", own.kind),
+    with log.phases.phase(sequence.name, count) as advance:
+        frames = render_photographs(
+            freeze_time(job.scene, job.time_s),
+            sequence.physical_path,
+            ("rgb", sequence.kind),
             job.settings,
             advance,
-            taken,
+            stats,
         )
         files = []
         for index, photo in enumerate(frames):
-            files.append(_write_frame(own, index, photo))
+            files.append(_write_frame(sequence, index, photo))
             if index in shown:
-                pictures.append((own.filmed.time_s(index), thumbnail(_shown(photo))))
-    blind = taken.valid is not None and not bool(taken.valid.all())
+                pictures.append((sequence.physical_path.time_s(index), thumbnail(_shown(photo))))
+    blind = stats.valid is not None and not bool(stats.valid.all())
     if blind:
-        write_png(taken.valid[..., None].expand(-1, -1, 3).float(), own.folder / VALID)
+        write_png(stats.valid[..., None].expand(-1, -1, 3).float(), sequence.folder / VALID)
     record = CameraRecord(
-        effect=own.name,
-        filmed=own.filmed,
+        effect=sequence.name,
+        physical_path=sequence.physical_path,
         frames=tuple(files),
-        geometry=own.kind,
-        settings=replace(job.settings, samples=taken.samples),
+        geometry=sequence.kind,
+        settings=replace(job.settings, samples=stats.samples),
         scene=job.scene.provenance,
         generator=f"diff4splat {__version__}",
         valid=VALID if blind else None,
         scene_time_s=job.time_s,
-        intervals=taken.intervals,
-        interval_error_px=taken.interval_error_px,
+        intervals=stats.intervals,
+        interval_error_px=stats.interval_error_px,
     )
-    write_camera_record(record, own.folder / FILE)
-    return taken, SheetRow(name=own.name, facts=taken.lines()[0], pictures=tuple(pictures))
+    write_camera_record(record, sequence.folder / FILE)
+    return stats, SheetRow(name=sequence.name, facts=stats.lines()[0], pictures=tuple(pictures))
 
 
 def _shown(photo: Photograph) -> Float[Tensor, "h w 3"]:
@@ -143,24 +153,24 @@ def _shown(photo: Photograph) -> Float[Tensor, "h w 3"]:
     return torch.where(photo.valid[..., None], photo.rgb, BLIND_GREY)
 
 
-def _write_frame(own: _Sequence, index: int, photo: Photograph) -> TakenFrame:
-    files = TakenFrame(
-        picture=f"frame_{index:04d}.png", geometry=f"{own.kind}/frame_{index:04d}.exr"
+def _write_frame(sequence: _Sequence, index: int, photo: Photograph) -> FrameFiles:
+    files = FrameFiles(
+        image=f"frame_{index:04d}.png", geometry=f"{sequence.kind}/frame_{index:04d}.exr"
     )
-    write_png(photo.rgb, own.folder / files.picture)
+    write_png(photo.rgb, sequence.folder / files.image)
     at = slice(index, index + 1)
-    path = own.filmed.path
+    path = sequence.physical_path.path
     write_depth_exr(
-        getattr(photo, own.kind)[None],
+        getattr(photo, sequence.kind)[None],
         replace(path, cameras=path.cameras[at], times_s=path.times_s[at]),
-        own.folder / files.geometry,
-        quantity=own.kind,
-        optics=json.dumps(optics_json(own.filmed.optics)),
+        sequence.folder / files.geometry,
+        quantity=sequence.kind,
+        optics=json.dumps(optics_json(sequence.physical_path.optics)),
     )
     return files
 
 
-def _contents(job: DatasetJob, taken: Mapping[str, Taken]) -> dict[str, object]:
+def _contents(job: DatasetJob, stats: Mapping[str, CaptureStats]) -> dict[str, object]:
     """What lies where."""
     first = next(iter(job.sequences.values()))
     return {
@@ -176,14 +186,14 @@ def _contents(job: DatasetJob, taken: Mapping[str, Taken]) -> dict[str, object]:
             {
                 "name": name,
                 "cameras": f"{name}/{FILE}",
-                "size_px": list(filmed.path.cameras.size_px),
-                "geometry": geometry_kind(filmed),
-                "samples": taken[name].samples,
-                "intervals": taken[name].intervals,
-                "interval_error_px": taken[name].interval_error_px,
-                "blind_share": taken[name].blind_share,
-                "left_out": list(taken[name].left_out),
+                "size_px": list(physical_path.path.cameras.size_px),
+                "geometry": geometry_kind(physical_path),
+                "samples": stats[name].samples,
+                "intervals": stats[name].intervals,
+                "interval_error_px": stats[name].interval_error_px,
+                "blind_share": stats[name].blind_share,
+                "left_out": list(stats[name].left_out),
             }
-            for name, filmed in job.sequences.items()
+            for name, physical_path in job.sequences.items()
         ],
     }

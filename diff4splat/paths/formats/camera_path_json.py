@@ -28,8 +28,8 @@ from diff4splat.paths.formats.json_fields import (
     picture_size,
 )
 from diff4splat.paths.formats.source import DEFAULT_FPS, PathSource
-from diff4splat.paths.names import quoted
-from diff4splat.paths.picture_size import fitted
+from diff4splat.paths.messages import quoted
+from diff4splat.paths.resize import fitted
 
 
 def parse(text: str, source: PathSource) -> CameraPath:

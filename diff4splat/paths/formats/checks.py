@@ -14,7 +14,7 @@ from diff4splat.errors import FileFormatError
 from diff4splat.geometry import rigid
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.camera_path import CameraPath
-from diff4splat.paths.names import quoted
+from diff4splat.paths.messages import quoted
 from diff4splat.paths.settings import MAX_POSES
 
 _ROUNDING = 1e-3

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from diff4splat.errors import FileFormatError
 from diff4splat.paths.formats.checks import finite_number, finite_numbers, require_pose_count
-from diff4splat.paths.names import quoted
+from diff4splat.paths.messages import quoted
 
 _LARGEST_SIDE_PX = 100_000
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from diff4splat.errors import FileFormatError
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.formats.json_fields import numbers, optional_number
-from diff4splat.paths.names import quoted
+from diff4splat.paths.messages import quoted
 
 _PLAIN_MODELS = {"PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"}
 """Without distortion coefficients all of these are pinhole cameras."""

@@ -28,7 +28,7 @@ from diff4splat.paths.formats.json_fields import (
 )
 from diff4splat.paths.formats.pinhole_fields import pinhole_px
 from diff4splat.paths.formats.source import PathSource
-from diff4splat.paths.picture_size import fitted
+from diff4splat.paths.resize import fitted
 
 _LENS = ("fl_x", "fl_y", "cx", "cy")
 

@@ -18,10 +18,10 @@ from torch import Tensor
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.optics import Shutter, as_float
 from diff4splat.geometry.physical_camera import PhysicalCamera
-from diff4splat.render.physical.lines import line_count, line_shares
+from diff4splat.render.physical.linear_motion import is_linear, midpoint
+from diff4splat.render.physical.sensor_rows import line_count, line_shares
 from diff4splat.render.physical.settings import PhotoSettings
-from diff4splat.render.physical.straight import halfway, is_straight
-from diff4splat.render.physical.viewer import Viewer
+from diff4splat.render.physical.view_cone import ViewCone
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -60,22 +60,22 @@ class Intervals:
 
 @torch.no_grad()
 def choose_intervals(
-    scene: Scene, camera: PhysicalCamera, time_s: float, viewer: Viewer, settings: PhotoSettings
+    scene: Scene, camera: PhysicalCamera, time_s: float, cone: ViewCone, settings: PhotoSettings
 ) -> Intervals:
     """Intervals for one picture of a scene that moves meanwhile."""
     window = camera.optics.window_s(time_s)
     first, last = (edge - time_s for edge in window)
-    if is_straight(scene):
+    if is_linear(scene):
         return Intervals((first, last), 0.0)
     moving = _only_moving(scene)
     shutter = camera.optics.shutter
     rolls = shutter is not None and as_float(shutter.readout_s) > 0
     if rolls and settings.rows_per_chunk is not None:
         edges = _chunk_edges(camera, shutter, settings.rows_per_chunk, first)
-        return Intervals(edges, _largest(moving, edges, time_s, viewer))
+        return Intervals(edges, _largest(moving, edges, time_s, cone))
     kinks = [kink - time_s for kink in _kinks_s(scene.motion)]
     edges = [first, *(kink for kink in kinks if first < kink < last), last]
-    return _halved(moving, edges, time_s, viewer, settings)
+    return _halved(moving, edges, time_s, cone, settings)
 
 
 def _only_moving(scene: Scene) -> Scene:
@@ -111,10 +111,10 @@ def _chunk_edges(
 
 
 def _halved(
-    scene: Scene, edges: list[float], time_s: float, viewer: Viewer, settings: PhotoSettings
+    scene: Scene, edges: list[float], time_s: float, cone: ViewCone, settings: PhotoSettings
 ) -> Intervals:
     """Halve the interval with the largest error until all are within the tolerance."""
-    measure = _Measure(scene, time_s, viewer)
+    measure = _Measure(scene, time_s, cone)
     errors = {span: measure.error_px(*span) for span in pairwise(edges)}
     while len(errors) < settings.most_intervals:
         worst = max(errors, key=lambda span: errors[span])
@@ -128,16 +128,16 @@ def _halved(
     return Intervals(tuple(ends), max(errors.values()))
 
 
-def _largest(scene: Scene, edges: Sequence[float], time_s: float, viewer: Viewer) -> float:
-    measure = _Measure(scene, time_s, viewer)
+def _largest(scene: Scene, edges: Sequence[float], time_s: float, cone: ViewCone) -> float:
+    measure = _Measure(scene, time_s, cone)
     return max(measure.error_px(*span) for span in pairwise(edges))
 
 
 class _Measure:
     """Errors of intervals; keeps the last states, since neighbours share their ends."""
 
-    def __init__(self, scene: Scene, time_s: float, viewer: Viewer) -> None:
-        self._scene, self._time_s, self._viewer = scene, time_s, viewer
+    def __init__(self, scene: Scene, time_s: float, cone: ViewCone) -> None:
+        self._scene, self._time_s, self._cone = scene, time_s, cone
         self._ends: dict[float, Gaussians] = {}
 
     def error_px(self, earliest_s: float, latest_s: float) -> float:
@@ -146,14 +146,14 @@ class _Measure:
             return 0.0
         early, late = self._end(earliest_s), self._end(latest_s)
         straight = Straight(early, late)
-        found = max(
-            straight.error_px(early, 0.0, self._viewer), straight.error_px(late, 1.0, self._viewer)
+        largest = max(
+            straight.error_px(early, 0.0, self._cone), straight.error_px(late, 1.0, self._cone)
         )
         for part in _PROBES:
             at_s = earliest_s + part * (latest_s - earliest_s)
             state = self._scene.state_at(self._time_s + at_s)
-            found = max(found, straight.error_px(state, part, self._viewer))
-        return found
+            largest = max(largest, straight.error_px(state, part, self._cone))
+        return largest
 
     def _end(self, at_s: float) -> Gaussians:
         if at_s not in self._ends:
@@ -164,31 +164,35 @@ class _Measure:
 
 
 class Straight:
-    """What stands for Gaussians between two states, to be held against them."""
+    """The linear approximation between two states, compared with the true states."""
 
     def __init__(self, early: Gaussians, late: Gaussians) -> None:
         self._early, self._late = early.means, late.means
-        self._made = halfway(early, late)
-        self._shape = _root(self._made)
+        self._midpoint = midpoint(early, late)
+        self._shape = _root(self._midpoint)
 
-    def error_px(self, true: Gaussians, part: float, viewer: Viewer) -> float:
-        """How far anything that is seen is from where, or how, it should be; 0 where nothing is.
+    def error_px(self, true: Gaussians, part: float, cone: ViewCone) -> float:
+        """Largest visible error of position, shape and brightness in pixels; 0 if none is visible.
 
-        ``true`` is what stands at ``part`` of the way.
+        ``true`` is the state at ``part`` of the interval.
         """
-        made = self._made
-        seen = viewer.sees(true) | viewer.sees(made)
-        if not bool(seen.any()):
+        approximate = self._midpoint
+        visible = cone.contains(true) | cone.contains(approximate)
+        if not bool(visible.any()):
             return 0.0
         place = (true.means - torch.lerp(self._early, self._late, part)).norm(dim=-1)
         shape = (_root(true) - self._shape).norm(dim=-1).amax(-1)
-        return float((viewer.pixels(place + shape, true) + _brightness(true, made))[seen].max())
+        return float(
+            (cone.pixels(place + shape, true) + _brightness(true, approximate))[visible].max()
+        )
 
 
-def _brightness(true: Gaussians, made: Gaussians) -> Float[Tensor, " n"]:
+def _brightness(true: Gaussians, approximate: Gaussians) -> Float[Tensor, " n"]:
     """How much opacity and colour are off; |Σ_k a_k Y_k| ≤ |a| √(K / 4π) for all K of a degree."""
-    colors = (true.sh - made.sh).square().sum(1).amax(-1) * (true.sh.shape[1] / (4 * math.pi))
-    return (true.opacities - made.opacities).abs() + made.opacities * colors.sqrt()
+    colors = (true.sh - approximate.sh).square().sum(1).amax(-1) * (
+        true.sh.shape[1] / (4 * math.pi)
+    )
+    return (true.opacities - approximate.opacities).abs() + approximate.opacities * colors.sqrt()
 
 
 def _root(gaussians: Gaussians) -> Float[Tensor, "n 3 3"]:

@@ -1,4 +1,4 @@
-"""The picture of a camera without effects: the rasteriser's, answered as a photograph."""
+"""The image of a camera without effects: rasterised, and returned as a photograph."""
 
 import torch
 from jaxtyping import Float
@@ -9,7 +9,7 @@ from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.api import render
 from diff4splat.render.physical.effects import Effects
-from diff4splat.render.physical.exposing import middle_s
+from diff4splat.render.physical.ray_batches import middle_s
 from diff4splat.render.physical.settings import Photograph, PhotoSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
@@ -17,7 +17,7 @@ from diff4splat.scene.scene import Scene
 _SAME = frozenset({"rgb", "alpha", "depth", "median_depth"})
 
 
-def drawn(
+def rasterize_pinhole(
     subject: Scene | Gaussians,
     camera: PhysicalCamera,
     time_s: float,
@@ -26,23 +26,25 @@ def drawn(
     effects: Effects,
     backend: str,
 ) -> Photograph:
-    """What ``camera``, a pinhole that stands still, sees."""
-    own, middle = _posed(camera, time_s), middle_s(camera.optics, time_s)
-    asked = (outputs & _SAME) | ({"depth"} if "distance" in outputs else set()) or {"alpha"}
-    made = render(subject, own, middle, outputs=asked, settings=settings.raster, backend=backend)
+    """The image of ``camera``, a static pinhole."""
+    posed, middle = _posed(camera, time_s), middle_s(camera.optics, time_s)
+    requested = (outputs & _SAME) | ({"depth"} if "distance" in outputs else set()) or {"alpha"}
+    rendered = render(
+        subject, posed, middle, outputs=requested, settings=settings.raster, backend=backend
+    )
     pictures: dict[str, Float[Tensor, "h w ..."]] = {
-        name: getattr(made, name) for name in outputs & _SAME
+        name: getattr(rendered, name) for name in outputs & _SAME
     }
     if "distance" in outputs:
-        pictures["distance"] = distance_from_depth(own, made.depth)
+        pictures["distance"] = distance_from_depth(posed, rendered.depth)
     if "time_s" in outputs:
-        pictures["time_s"] = own.focal_px.new_full(own.size_px, middle - time_s)
+        pictures["time_s"] = posed.focal_px.new_full(posed.size_px, middle - time_s)
     return Photograph(
         **pictures,
-        valid=torch.ones(own.size_px, dtype=torch.bool, device=own.focal_px.device),
+        valid=torch.ones(posed.size_px, dtype=torch.bool, device=posed.focal_px.device),
         backend="raster",
         left_out=("rays: no effect of the camera shows, the rasteriser draws", *effects.left_out),
-        dropped_nonfinite=made.dropped_nonfinite,
+        dropped_nonfinite=rendered.dropped_nonfinite,
     )
 
 

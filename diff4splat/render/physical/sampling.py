@@ -6,7 +6,7 @@ Axes: ``p`` pixels, ``s`` samples. The aperture gets the first two dimensions, s
 from jaxtyping import Int
 from torch import Tensor
 
-from diff4splat.render.physical.disc import disc_points
+from diff4splat.render.physical.concentric_disc import disc_points
 from diff4splat.render.physical.effects import Effects
 from diff4splat.render.physical.sensor import Draws
 from diff4splat.render.physical.sobol import sample_points

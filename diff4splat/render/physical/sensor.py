@@ -14,7 +14,7 @@ from torch import Tensor
 
 from diff4splat.geometry.optics import Aperture, Optics
 from diff4splat.geometry.physical_camera import PhysicalCamera
-from diff4splat.render.physical.lines import line_count, line_of, line_shares
+from diff4splat.render.physical.sensor_rows import line_count, line_of, line_shares
 
 _LEAST_SLOPE = 1e-3
 """Of a ray to the plane in focus; flatter ones never get there."""

@@ -15,7 +15,7 @@ from diff4splat.render.trace.settings import TraceSettings
 OUTPUTS = ("rgb", "alpha", "depth", "median_depth", "distance", "time_s")
 """Every picture that a physical camera can make; ``valid`` comes with all of them."""
 GEOMETRY = frozenset({"depth", "median_depth", "distance", "time_s"})
-"""What is told for the one ray through the middle of pixel, lens and exposure."""
+"""Outputs of the one ray through the middle of pixel, lens and exposure."""
 LENS_SAMPLES, EXPOSURE_SAMPLES, PIXEL_SAMPLES = 64, 16, 16
 """Rays per pixel where nobody says how many: powers of two, which Sobol's points fill best."""
 MOST_SAMPLES = 1 << 16
@@ -43,7 +43,7 @@ class PhotoSettings:
     rows_per_chunk: int | None = None
     """Lines that share one such interval, in place of the tolerance."""
     most_intervals: int = 256
-    """Never more than this; what is then left of the error is told."""
+    """Limit of their number; the remaining error is reported."""
     trace: TraceSettings = field(default_factory=TraceSettings)
     raster: RenderSettings = field(default_factory=RenderSettings)
     """For cameras that turn out to be pinholes."""
@@ -81,7 +81,7 @@ class Photograph:
     """
 
     valid: Bool[Tensor, "h w"]
-    """Whether the lens sees anything there."""
+    """Whether the lens maps the pixel to a ray."""
     rgb: Float[Tensor, "h w 3"] | None = None
     alpha: Float[Tensor, "h w"] | None = None
     depth: Float[Tensor, "h w"] | None = None

@@ -15,7 +15,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera
 from diff4splat.render.channels import extra_channels, name_outputs
 from diff4splat.render.projection import camera_space, to_pixels
-from diff4splat.render.raster.plan import TILE_SIZES_PX, make_plan
+from diff4splat.render.raster.raster_settings import TILE_SIZES_PX, make_raster_settings
 from diff4splat.render.settings import RenderJob, RenderOutput
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
@@ -29,7 +29,7 @@ _MOST_GAUSSIANS = 1 << 24
 """Beyond it float32 cannot number the entries of a list."""
 
 
-def refusal(job: RenderJob) -> str | None:
+def unsupported_reason(job: RenderJob) -> str | None:
     """Why ``job`` cannot be done here, or None."""
     means = job.gaussians.means
     if means.device.type != "cpu":
@@ -46,49 +46,53 @@ def refusal(job: RenderJob) -> str | None:
 
 
 def render(job: RenderJob) -> RenderOutput:
-    """Make the pictures that ``job`` asks for."""
+    """Render the outputs of ``job``."""
     # Numba is loaded with the first picture, not with the library.
     from diff4splat.render.raster.function import rasterize
-    from diff4splat.render.raster.warm import ensure_compiled
+    from diff4splat.render.raster.jit import GROUP
 
-    ensure_compiled()
+    GROUP.ensure_compiled()
     medians = "median_depth" in job.outputs
     with torch.autocast("cpu", enabled=False):
         depth, extras = _depth_and_extras(job)
-        plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, extras.shape[1])
-        made = rasterize(plan, job.gaussians, extras, job.camera)
-        median_depth = _median_depth(depth, made.medians[0]) if medians else None
-        return _named(job, made, median_depth)
+        plan = make_raster_settings(
+            job.camera, job.settings, "rgb" in job.outputs, medians, extras.shape[1]
+        )
+        raster = rasterize(plan, job.gaussians, extras, job.camera)
+        median_depth = _median_depth(depth, raster.medians[0]) if medians else None
+        return _named(job, raster, median_depth)
 
 
 def open_sequence(scene: Scene, job: RenderJob) -> Callable[[Camera, float], RenderOutput] | None:
-    """Pictures of ``scene`` that share work, or None where they must be made one by one.
+    """A renderer of ``scene`` that shares work between frames, or None if that is impossible.
 
     ``job`` is the first of them. Flow and features are not shared, and gradients need each state.
     """
     if not job.outputs <= _SHARED_OUTPUTS or _wants_gradient(job):
         return None
-    from diff4splat.render.raster.plan import make_view
+    from diff4splat.render.raster.jit import GROUP
+    from diff4splat.render.raster.raster_settings import make_view
     from diff4splat.render.raster.sequence import Sequence
-    from diff4splat.render.raster.warm import ensure_compiled
 
-    ensure_compiled()
+    GROUP.ensure_compiled()
     medians = "median_depth" in job.outputs
     depths = "depth" in job.outputs
-    plan = make_plan(job.camera, job.settings, "rgb" in job.outputs, medians, 2 if depths else 0)
+    plan = make_raster_settings(
+        job.camera, job.settings, "rgb" in job.outputs, medians, 2 if depths else 0
+    )
     sequence = Sequence(scene, plan, depths)
 
     def draw(camera: Camera, time_s: float) -> RenderOutput:
         view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
-        made = sequence.draw(view, time_s)
-        median_depth = _median_depth(sequence.depth, made.medians[0]) if medians else None
-        return _named(job, made, median_depth)
+        raster = sequence.draw(view, time_s)
+        median_depth = _median_depth(sequence.depth, raster.medians[0]) if medians else None
+        return _named(job, raster, median_depth)
 
     return draw
 
 
 def _wants_gradient(job: RenderJob) -> bool:
-    """Whether anything that goes into a picture needs a gradient; the state tells for a motion."""
+    """Whether any input needs a gradient; for a motion, its state decides."""
     camera = job.camera
     tensors = [
         *(getattr(job.gaussians, f.name) for f in fields(job.gaussians)),
@@ -100,11 +104,11 @@ def _wants_gradient(job: RenderJob) -> bool:
 
 
 def _named(
-    job: RenderJob, made: "Raster", median_depth: Float[Tensor, "h w"] | None
+    job: RenderJob, raster: "Raster", median_depth: Float[Tensor, "h w"] | None
 ) -> RenderOutput:
-    counts = zip((f.name for f in fields(Gaussians)), made.unusable, strict=True)
+    counts = zip((f.name for f in fields(Gaussians)), raster.unusable, strict=True)
     dropped = {name: count for name, count in counts if count}
-    return name_outputs(job, made.planes.permute(1, 2, 0), made.light, median_depth, dropped)
+    return name_outputs(job, raster.planes.permute(1, 2, 0), raster.light, median_depth, dropped)
 
 
 def _depth_and_extras(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor, "n c"]]:

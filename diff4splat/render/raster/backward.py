@@ -1,4 +1,4 @@
-"""The way back: blend → sums per Gaussian → colours → Gaussians and camera.
+"""The backward pass: blend → sums per Gaussian → colours → Gaussians and camera.
 
 Sums over the picture run in the order of the tiles, sums over Gaussians part by part in float64, so
 gradients have the same bits whatever the number of threads.
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diff4splat.render.raster.blend_backward import blend_backward, sum_slots
-from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.kernels.parallel import parallel_for, ranges
+from diff4splat.render.raster.blending.blend_backward import blend_backward, sum_slots
 from diff4splat.render.raster.forward import (
     GAUSSIANS_PER_PART,
     TILES_PER_PART,
@@ -20,25 +20,29 @@ from diff4splat.render.raster.forward import (
     numbered,
     tiles_of,
 )
-from diff4splat.render.raster.harmonics import colors_backward
-from diff4splat.render.raster.plan import Plan
-from diff4splat.render.raster.project_backward import CAMERA_COLUMNS, POSITION, project_backward
+from diff4splat.render.raster.padded_image import PaddedImage, empty
+from diff4splat.render.raster.projection.harmonics import colors_backward
+from diff4splat.render.raster.projection.project_backward import (
+    CAMERA_COLUMNS,
+    POSITION,
+    project_backward,
+)
+from diff4splat.render.raster.raster_settings import RasterSettings
 from diff4splat.render.raster.tables import MOMENTS, Cloud, Doubles, Floats, View
-from diff4splat.render.raster.threads import ranges, spread
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """What the way back needs of the way forward."""
+    """What the backward pass needs of the forward pass."""
 
-    plan: Plan
+    plan: RasterSettings
     view: View
     found: Footprints
     values: Floats
-    canvas: Canvas
+    image: PaddedImage
     binned: Binned
     filled: Filled | None
-    """The lists, unless there were several regions; then they are made again."""
+    """The lists; None if there were several regions, whose lists are built again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +80,7 @@ def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradi
                 grads.means, camera[part, POSITION:],
             )  # fmt: skip
 
-    spread(work, numbered(parts))
+    parallel_for(work, numbered(parts))
     return Gradients(cloud=grads, sh=sh_grads, values=value_grads, camera=camera.sum(0))
 
 
@@ -84,7 +88,7 @@ def _blend_backward(
     drawn: Drawn, filled: Filled, incoming: Floats, moments: Floats, value_grads: Floats
 ) -> None:
     """Add the gradients of the tiles of a region."""
-    order, canvas = drawn.found.order, drawn.canvas
+    order, image = drawn.found.order, drawn.image
     slots = empty(len(filled.lists.members), MOMENTS + drawn.values.shape[1])
 
     tiles = tiles_of(filled.region, drawn.plan.grid)
@@ -92,11 +96,11 @@ def _blend_backward(
     def blend_tiles(first: int, last: int) -> None:
         blend_backward(
             tiles[first:last], drawn.plan.grid, filled.lists, drawn.found.prints, drawn.values,
-            drawn.plan.rules, canvas.light, canvas.stops, incoming, slots,
+            drawn.plan.rules, image.light, image.stops, incoming, slots,
         )  # fmt: skip
 
     def add(first: int, last: int) -> None:
         sum_slots(first, last, order, filled.first_slots, slots, moments, value_grads)
 
-    spread(blend_tiles, ranges(len(tiles), TILES_PER_PART))
-    spread(add, ranges(len(order), GAUSSIANS_PER_PART))
+    parallel_for(blend_tiles, ranges(len(tiles), TILES_PER_PART))
+    parallel_for(add, ranges(len(order), GAUSSIANS_PER_PART))

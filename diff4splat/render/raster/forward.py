@@ -1,4 +1,4 @@
-"""The way forward: project → sort by depth → colours → lists of tiles → blend.
+"""The forward pass: project → sort by depth → colours → lists of tiles → blend.
 
 Every stage is spread over threads in parts whose results do not depend on which thread does them.
 A picture with more pairs (tile, Gaussian) than may be kept is cut into regions of tiles that are
@@ -12,15 +12,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from diff4splat.render.raster.blend import FIXED, blend
-from diff4splat.render.raster.canvas import Canvas, empty
-from diff4splat.render.raster.harmonics import colors
-from diff4splat.render.raster.order import nearest_first
-from diff4splat.render.raster.plan import Plan
-from diff4splat.render.raster.project import SH, project
+from diff4splat.kernels.parallel import parallel_for, ranges
+from diff4splat.render.raster.blending.blend import FIXED, blend
+from diff4splat.render.raster.blending.depth_sort import depth_sort
+from diff4splat.render.raster.blending.tiles import count_pairs, fill_lists, place_lists
+from diff4splat.render.raster.padded_image import PaddedImage, empty
+from diff4splat.render.raster.projection.harmonics import colors
+from diff4splat.render.raster.projection.project import SH, project
+from diff4splat.render.raster.raster_settings import RasterSettings
 from diff4splat.render.raster.tables import Cloud, Doubles, Floats, Grid, Integers, Lists, View
-from diff4splat.render.raster.threads import ranges, spread
-from diff4splat.render.raster.tiles import count_pairs, fill_lists, place_lists
 
 GAUSSIANS_PER_PART = 4096
 TILES_PER_PART = 4
@@ -64,7 +64,7 @@ class Filled:
     """First slot of every rank, and one more: how many slots there are."""
 
 
-def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
+def footprints(cloud: Cloud, sh: Floats, view: View, plan: RasterSettings) -> Footprints:
     """Project all Gaussians and sort the visible ones."""
     count = len(cloud.means)
     prints, depth = empty(count, 8, dtype=torch.float64), empty(count)
@@ -77,7 +77,7 @@ def footprints(cloud: Cloud, sh: Floats, view: View, plan: Plan) -> Footprints:
         )
 
     visible = list_visible(count, work, unusable)
-    order = nearest_first(visible, depth)
+    order = depth_sort(visible, depth)
     return Footprints(prints=prints, depth=depth, visible=visible, order=order, unusable=unusable)
 
 
@@ -91,14 +91,14 @@ def list_visible(
     def part_work(part: int, first: int, last: int) -> None:
         found[part] = work(first, last, visible, faults[part])
 
-    spread(part_work, numbered(parts))
+    parallel_for(part_work, numbered(parts))
     unusable += faults.sum(0)
     kept = [visible[first : first + size] for (first, _), size in zip(parts, found, strict=True)]
     return np.concatenate([visible[:0], *kept])
 
 
 def channel_table(
-    plan: Plan, cloud: Cloud, sh: Floats, extras: Floats, view: View, visible: Integers
+    plan: RasterSettings, cloud: Cloud, sh: Floats, extras: Floats, view: View, visible: Integers
 ) -> Floats:
     """Per Gaussian: RGB if it is asked for, the extra channels, zeros up to the fixed number."""
     start = 3 if plan.colors else 0
@@ -111,11 +111,11 @@ def channel_table(
         def work(first: int, last: int) -> None:
             colors(first, last, visible, cloud.means, sh, view.position, values)
 
-        spread(work, ranges(len(visible), GAUSSIANS_PER_PART))
+        parallel_for(work, ranges(len(visible), GAUSSIANS_PER_PART))
     return values
 
 
-def bin_footprints(found: Footprints, plan: Plan) -> Binned:
+def bin_footprints(found: Footprints, plan: RasterSettings) -> Binned:
     """Count pairs, and cut the picture into regions of few enough of them or one tile."""
     grid, pieces = plan.grid, _pieces(found.order)
     counts = np.zeros((len(pieces), grid.rows * grid.columns), np.int32)
@@ -123,7 +123,7 @@ def bin_footprints(found: Footprints, plan: Plan) -> Binned:
     def work(piece: int, first: int, last: int) -> None:
         count_pairs(first, last, found.order, found.prints, grid, counts[piece])
 
-    spread(work, numbered(pieces))
+    parallel_for(work, numbered(pieces))
     per_tile = counts.sum(0, dtype=np.int64).reshape(grid.rows, grid.columns)
     regions = _split((0, grid.rows, 0, grid.columns), per_tile, plan.pair_limit)
     return Binned(counts=counts, regions=list(regions))
@@ -150,35 +150,35 @@ def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -
             first_slot[piece], first_slots, lists,
         )  # fmt: skip
 
-    spread(work, numbered(_pieces(found.order)))
+    parallel_for(work, numbered(_pieces(found.order)))
     return Filled(region=region, lists=lists, first_slots=first_slots)
 
 
 def blend_region(
-    plan: Plan, filled: Filled, found: Footprints, values: Floats, canvas: Canvas
+    plan: RasterSettings, filled: Filled, found: Footprints, values: Floats, image: PaddedImage
 ) -> None:
-    """Blend the tiles of a region into ``canvas``."""
+    """Blend the tiles of a region into ``image``."""
     tiles = tiles_of(filled.region, plan.grid)
-    blend_tiles(plan, tiles, filled.lists, found.prints, values, canvas)
+    blend_tiles(plan, tiles, filled.lists, found.prints, values, image)
 
 
 def blend_tiles(
-    plan: Plan,
+    plan: RasterSettings,
     tiles: NDArray[np.int64],
     lists: Lists,
     prints: Doubles,
     values: Floats,
-    canvas: Canvas,
+    image: PaddedImage,
 ) -> None:
-    """Blend some tiles into ``canvas``."""
+    """Blend some tiles into ``image``."""
 
     def work(first: int, last: int) -> None:
         blend(
-            tiles[first:last], plan.grid, lists, prints, values, plan.rules, canvas.planes,
-            canvas.light, canvas.stops, canvas.medians,
+            tiles[first:last], plan.grid, lists, prints, values, plan.rules, image.planes,
+            image.light, image.stops, image.medians,
         )  # fmt: skip
 
-    spread(work, ranges(len(tiles), TILES_PER_PART))
+    parallel_for(work, ranges(len(tiles), TILES_PER_PART))
 
 
 def tiles_of(region: Region, grid: Grid) -> NDArray[np.int64]:

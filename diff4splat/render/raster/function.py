@@ -14,8 +14,8 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera
 from diff4splat.render.raster import forward as stages
 from diff4splat.render.raster.backward import Drawn, gradients
-from diff4splat.render.raster.canvas import Canvas
-from diff4splat.render.raster.plan import Plan, make_view
+from diff4splat.render.raster.padded_image import PaddedImage
+from diff4splat.render.raster.raster_settings import RasterSettings, make_view
 from diff4splat.render.raster.tables import Cloud
 from diff4splat.scene.gaussians import Gaussians
 
@@ -34,7 +34,7 @@ class Raster:
 
 
 def rasterize(
-    plan: Plan, gaussians: Gaussians, extras: Float[Tensor, "n e"], camera: Camera
+    plan: RasterSettings, gaussians: Gaussians, extras: Float[Tensor, "n e"], camera: Camera
 ) -> Raster:
     """Blend colours and ``extras`` of Gaussians; gradients reach all tensors."""
     unusable: list[int] = []
@@ -62,28 +62,30 @@ def rasterize(
 
 class _Rasterize(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, plan: Plan, unusable: list[int], *tensors: Tensor) -> tuple[Tensor, ...]:
+    def forward(
+        ctx: Any, plan: RasterSettings, unusable: list[int], *tensors: Tensor
+    ) -> tuple[Tensor, ...]:
         cloud, sh, extras, pose, focal_px, center_px = _unpack(tensors)
         view = make_view(plan.grid, pose, focal_px, center_px)
         found = stages.footprints(cloud, sh, view, plan)
         unusable.extend(found.unusable.tolist())
         values = stages.channel_table(plan, cloud, sh, extras, view, found.visible)
-        canvas = Canvas(plan.grid, values.shape[1], plan.medians)
+        image = PaddedImage(plan.grid, values.shape[1], plan.medians)
         binned = stages.bin_footprints(found, plan)
         for region in binned.regions:
             filled = stages.fill_region(found, plan.grid, binned, region)
-            stages.blend_region(plan, filled, found, values, canvas)
+            stages.blend_region(plan, filled, found, values, image)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
             kept = filled if len(binned.regions) == 1 else None
             ctx.drawn = Drawn(
-                plan=plan, view=view, found=found, values=values, canvas=canvas, binned=binned,
+                plan=plan, view=view, found=found, values=values, image=image, binned=binned,
                 filled=kept,
             )  # fmt: skip
-        medians = canvas.whole(canvas.medians)
+        medians = image.padded(image.medians)
         ctx.mark_non_differentiable(medians)
         # Whole planes, because views of several results could not be changed in place.
-        return canvas.whole(canvas.planes), canvas.whole(canvas.light), medians
+        return image.padded(image.planes), image.padded(image.light), medians
 
     @staticmethod
     def backward(ctx: Any, planes: Tensor, light: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:

@@ -1,11 +1,12 @@
-"""Many pictures of one scene: what is still valid from the picture before is not made again.
+"""Many images of one scene; what is still valid from the previous image is reused.
 
-- What stands still is projected, sorted and binned once per camera.
+- Static Gaussians are projected, sorted and binned once per camera.
 - What moves is projected straight from its motion; no state of the scene is stored.
-- While the camera stands, only tiles that something moving touches, or touched before, are blended.
+- While the camera is static, only tiles that a moving Gaussian overlaps, or overlapped in the
+  previous image, are blended.
 - The large arrays live as long as the sequence.
 
-Pictures are those of ``render`` without gradients, up to the rounding of states to float32.
+Images are those of ``render`` without gradients, up to the rounding of states to float32.
 """
 
 from dataclasses import dataclass
@@ -16,38 +17,38 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from torch import Tensor
 
+from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster import forward as stages
-from diff4splat.render.raster.blend import FIXED
-from diff4splat.render.raster.canvas import Canvas, empty
+from diff4splat.render.raster.blending.blend import FIXED
+from diff4splat.render.raster.blending.depth_sort import depth_sort
+from diff4splat.render.raster.blending.merge import merge_lists, merge_orders
 from diff4splat.render.raster.forward import Footprints
 from diff4splat.render.raster.function import Raster
-from diff4splat.render.raster.harmonics import colors
-from diff4splat.render.raster.merge import merge_lists, merge_orders
-from diff4splat.render.raster.moving import Moving
-from diff4splat.render.raster.order import nearest_first
-from diff4splat.render.raster.plan import Plan
-from diff4splat.render.raster.project import SH, project
+from diff4splat.render.raster.padded_image import PaddedImage, empty
+from diff4splat.render.raster.projection.harmonics import colors
+from diff4splat.render.raster.projection.moving import Moving
+from diff4splat.render.raster.projection.project import SH, project
+from diff4splat.render.raster.raster_settings import RasterSettings
 from diff4splat.render.raster.tables import Integers, Lists, View
-from diff4splat.render.raster.threads import ranges, spread
 from diff4splat.scene.scene import Scene
 
 
 @dataclass(slots=True)
 class _Still:
-    """What the camera sees of the Gaussians that do not move."""
+    """Projection of the static Gaussians."""
 
     view: View
     order: Integers
     unusable: NDArray[np.int64]
     lists: Lists | None = None
-    """Made when the camera is used again; None while they are not made or do not fit."""
+    """Built when the camera is used again; None before, or if they do not fit."""
     too_large: bool = False
 
 
 class Sequence:
     """A scene to be drawn many times, by one plan; ``depths`` blends z and 1 behind the colours."""
 
-    def __init__(self, scene: Scene, plan: Plan, depths: bool) -> None:
+    def __init__(self, scene: Scene, plan: RasterSettings, depths: bool) -> None:
         gaussians = scene.gaussians
         self._plan, self._depths = plan, depths
         self._moving = Moving(scene)
@@ -61,9 +62,9 @@ class Sequence:
         channels = (3 if plan.colors else 0) + (2 if depths else 0)
         self._values = np.zeros((count, max(channels, FIXED)), np.float32)
         self._used = channels
-        self._canvas = Canvas(plan.grid, self._values.shape[1], plan.medians)
+        self._image = PaddedImage(plan.grid, self._values.shape[1], plan.medians)
         self._still: _Still | None = None
-        # Plain colours look the same from everywhere.
+        # Colours without harmonics do not depend on the view.
         self._colors_change = plan.colors and (self._moving.recolors or self._sh.shape[1] > 1)
         if plan.colors:
             self._color(np.arange(count, dtype=np.int32), (0.0, 0.0, 0.0))
@@ -107,7 +108,7 @@ class Sequence:
             )  # fmt: skip
 
         visible = stages.list_visible(len(index), work, unusable)
-        self._still = _Still(view, nearest_first(visible, self._depth), unusable)
+        self._still = _Still(view, depth_sort(visible, self._depth), unusable)
         self._fill_values(view, visible)
 
     def _see_moving(self, view: View, time_s: float) -> tuple[Integers, NDArray[np.int64]]:
@@ -117,7 +118,7 @@ class Sequence:
             self._plan, view, time_s, self._prints, self._depth, unusable
         )
         self._fill_values(view, visible)
-        return nearest_first(visible, self._depth), unusable
+        return depth_sort(visible, self._depth), unusable
 
     def _fill_values(self, view: View, visible: Integers) -> None:
         """Colours and depth channels of some Gaussians."""
@@ -131,10 +132,10 @@ class Sequence:
         def work(first: int, last: int) -> None:
             colors(first, last, visible, self._cloud.means, self._sh, position, self._values)
 
-        spread(work, ranges(len(visible), stages.GAUSSIANS_PER_PART))
+        parallel_for(work, ranges(len(visible), stages.GAUSSIANS_PER_PART))
 
     def _bin_still(self) -> bool:
-        """Whether there are lists of what stands still; made when a camera is used again."""
+        """Whether there are lists of the static Gaussians; built when a camera is used again."""
         still = self._still
         if still.lists is None and not still.too_large:
             found = self._footprints(still.order)
@@ -155,7 +156,7 @@ class Sequence:
             lists = stages.fill_region(found, self._plan.grid, binned, region).lists
             tiles = stages.tiles_of(region, self._plan.grid)
             tiles = tiles[wanted[tiles]]
-            stages.blend_tiles(self._plan, tiles, lists, self._prints, self._values, self._canvas)
+            stages.blend_tiles(self._plan, tiles, lists, self._prints, self._values, self._image)
 
     def _draw_stale(self, moving: Integers, wanted: NDArray[np.bool_]) -> bool:
         """Blend the ``wanted`` tiles that show, or are to show, something that moves.
@@ -173,7 +174,7 @@ class Sequence:
         merged = self._merged_lists(lists, tiles)
         if merged is None:
             return False
-        stages.blend_tiles(self._plan, tiles, merged, self._prints, self._values, self._canvas)
+        stages.blend_tiles(self._plan, tiles, merged, self._prints, self._values, self._image)
         self._stale[tiles] = touched[tiles]
         return True
 
@@ -191,7 +192,7 @@ class Sequence:
         def work(first: int, last: int) -> None:
             merge_lists(first, last, tiles, still, moving, self._depth, merged)
 
-        spread(work, ranges(len(tiles), stages.TILES_PER_PART))
+        parallel_for(work, ranges(len(tiles), stages.TILES_PER_PART))
         return merged
 
     def _tiles_in(self, rows: tuple[int, int] | None) -> NDArray[np.bool_]:
@@ -208,11 +209,11 @@ class Sequence:
         )
 
     def _picture(self, unusable: NDArray[np.int64]) -> Raster:
-        """Copies: the canvas is drawn over."""
-        canvas = self._canvas
+        """Copies, because the next image overwrites the planes."""
+        image = self._image
         return Raster(
-            planes=canvas.pictures(canvas.planes)[: self._used].clone(),
-            light=canvas.pictures(canvas.light)[0].clone(),
-            medians=canvas.pictures(canvas.medians).clone(),
+            planes=image.cropped(image.planes)[: self._used].clone(),
+            light=image.cropped(image.light)[0].clone(),
+            medians=image.cropped(image.medians).clone(),
             unusable=tuple(unusable.tolist()),
         )

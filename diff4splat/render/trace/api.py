@@ -1,4 +1,4 @@
-"""What rays see of Gaussians, still or moving: compiled where possible, else by brute force.
+"""Ray tracing of static or moving Gaussians: compiled where possible, else by brute force.
 
 Axes: ``r`` rays, ``n`` Gaussians.
 """
@@ -14,12 +14,12 @@ from torch import Tensor
 from diff4splat.errors import ConfigError, InputError, ShapeError
 from diff4splat.render.settings import require_outputs
 from diff4splat.render.trace import reference
-from diff4splat.render.trace.hierarchy import SearchTree
+from diff4splat.render.trace.bvh.bvh import Bvh
 from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.rays import Rays
-from diff4splat.render.trace.reference import Seen
+from diff4splat.render.trace.reference import RayOutputs
 from diff4splat.render.trace.settings import OUTPUTS, TraceOutput, TraceSettings
-from diff4splat.render.trace.support import refusal, usable
+from diff4splat.render.trace.support import unsupported_reason, valid_gaussians
 from diff4splat.scene.gaussians import Gaussians
 
 DEFAULTS = TraceSettings()
@@ -34,62 +34,63 @@ def trace(
     settings: TraceSettings = DEFAULTS,
     moving: MovingCloud | None = None,
     backend: str = "auto",
-    tree: SearchTree | None = None,
+    bvh: Bvh | None = None,
 ) -> TraceOutput:
-    """What each of ``rays`` sees; gradients reach Gaussians, motion, rays and background.
+    """Colour, distance, alpha or hits along ``rays``; all inputs and the background get gradients.
 
-    ``moving`` carries each Gaussian to the time of the ray that meets it. ``backend`` "compiled" is
-    for float32 on a CPU, "reference" for everything, "auto" the first of them that can.
-    A ``tree`` made by `hierarchy.span` saves time and changes no answer, whatever has moved since.
+    ``moving`` moves each Gaussian to the time of the ray that hits it. ``backend`` "compiled" is
+    for float32 on a CPU, "reference" for everything, "auto" the first that supports the inputs.
+    A ``bvh`` from `build_bvh` saves time and changes no result, whatever has moved since.
 
     Raises:
-        ConfigError: an unknown output or back end, one that cannot do this, or the tree of a scene
-            with more or fewer Gaussians.
+        ConfigError: an unknown output or back end, one that does not support the inputs, or the
+            ``bvh`` of a scene with another number of Gaussians.
         ShapeError: dtypes or devices differ, half precision, or another number of velocities.
         InputError: Gaussians that move, and rays without times.
     """
     wanted = require_outputs(outputs, OUTPUTS)
     _require_uniform(gaussians, rays, moving)
-    look = _backend(backend, gaussians)
-    kept, dropped = usable(gaussians, moving)
-    if tree is not None:
-        known = tree.among(kept)
+    tracer = _backend(backend, gaussians)
+    valid, dropped = valid_gaussians(gaussians, moving)
+    if bvh is not None:
+        order = bvh.select(valid)
         # Brute force tries every Gaussian and needs no order.
-        look = look if look is reference.look else partial(look, known=known)
+        if tracer is not reference.trace_reference:
+            tracer = partial(tracer, order=order)
     if dropped:
-        index = kept.nonzero().squeeze(1)
+        index = valid.nonzero().squeeze(1)
         gaussians = gaussians.select(index)
         moving = None if moving is None else moving.select(index)
-    existing = rays if rays.valid is None else rays.select(rays.valid.nonzero().squeeze(1))
+    valid_rays = rays if rays.valid is None else rays.select(rays.valid.nonzero().squeeze(1))
     with torch.autocast(rays.origins.device.type, enabled=False):
-        seen = look(gaussians, existing, settings, moving)
-        answers = _named(wanted, seen, settings)
+        traced = tracer(gaussians, valid_rays, settings, moving)
+        outputs = _named(wanted, traced, settings)
         if rays.valid is not None:
-            answers = {name: _scattered(value, rays.valid) for name, value in answers.items()}
+            outputs = {name: _scattered(value, rays.valid) for name, value in outputs.items()}
     return TraceOutput(
-        **answers, dropped_nonfinite=sum(dropped.values()), dropped_by_parameter=dropped
+        **outputs, dropped_nonfinite=sum(dropped.values()), dropped_by_parameter=dropped
     )
 
 
 def _backend(name: str, gaussians: Gaussians):
-    """What looks along rays.
+    """The function that traces.
 
     Raises:
-        ConfigError: the name is unknown, or the compiled tracer refuses.
+        ConfigError: the name is unknown, or the compiled tracer does not support the Gaussians.
     """
     if name not in BACKENDS:
         raise ConfigError(f"backend: expected one of {', '.join(BACKENDS)}, got {name!r}")
-    reason = refusal(gaussians) if name != "reference" else "not asked for"
+    reason = unsupported_reason(gaussians) if name != "reference" else "not asked for"
     if name == "compiled" and reason is not None:
         raise ConfigError(f"backend 'compiled': {reason}; use backend='auto'")
     if reason is not None:
-        return reference.look
+        return reference.trace_reference
     # Numba is loaded with the first rays, not with the library.
-    from diff4splat.render.trace.function import look
-    from diff4splat.render.trace.warm import ensure_compiled
+    from diff4splat.render.trace.function import trace_compiled
+    from diff4splat.render.trace.jit import GROUP
 
-    ensure_compiled()
-    return look
+    GROUP.ensure_compiled()
+    return trace_compiled
 
 
 def _require_uniform(gaussians: Gaussians, rays: Rays, moving: MovingCloud | None) -> None:
@@ -117,16 +118,16 @@ def _require_uniform(gaussians: Gaussians, rays: Rays, moving: MovingCloud | Non
 
 
 def _named(
-    wanted: frozenset[str], seen: Seen, settings: TraceSettings
+    wanted: frozenset[str], traced: RayOutputs, settings: TraceSettings
 ) -> dict[str, Float[Tensor, "r ..."] | Int[Tensor, " r"]]:
-    """The answers asked for."""
-    answers = {"median_distance": seen.median, "alpha": seen.weight, "hits": seen.hits}
+    """The requested outputs."""
+    outputs = {"median_distance": traced.median, "alpha": traced.weight, "hits": traced.hits}
     if "rgb" in wanted:
-        answers["rgb"] = seen.rgb + seen.light[:, None] * _background(settings, seen.light)
+        outputs["rgb"] = traced.rgb + traced.light[:, None] * _background(settings, traced.light)
     if "distance" in wanted:
-        weight = torch.where(seen.weight > 0, seen.weight, 1.0)
-        answers["distance"] = seen.distance_sum / weight
-    return {name: answers[name] for name in wanted}
+        weight = torch.where(traced.weight > 0, traced.weight, 1.0)
+        outputs["distance"] = traced.distance_sum / weight
+    return {name: outputs[name] for name in wanted}
 
 
 def _background(settings: TraceSettings, like: Float[Tensor, " r"]) -> Float[Tensor, "3"]:
@@ -138,6 +139,6 @@ def _background(settings: TraceSettings, like: Float[Tensor, " r"]) -> Float[Ten
 def _scattered(
     values: Float[Tensor, "m ..."] | Int[Tensor, " m"], valid: Bool[Tensor, " r"]
 ) -> Float[Tensor, "r ..."] | Int[Tensor, " r"]:
-    """Answers in the rows of the valid rays, 0 in the others."""
+    """Outputs in the rows of the valid rays, 0 in the others."""
     rows = values.new_zeros(len(valid), *values.shape[1:])
     return rows.index_copy(0, valid.nonzero().squeeze(1), values)

@@ -1,6 +1,6 @@
-"""The way back: packets look again, their rays are rewound, sums go to Gaussians.
+"""The backward pass: packets are traversed again, and sums over rays go to Gaussians.
 
-Nothing but the inputs is kept from the way forward. Sums over rays run in the order of the parts of
+Only the inputs are saved from the forward pass. Sums over rays run in the order of the parts of
 packets, so gradients have the same bits whatever the number of threads.
 """
 
@@ -10,14 +10,21 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from diff4splat.render.raster.canvas import empty
-from diff4splat.render.raster.threads import ranges, spread
-from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART
+from diff4splat.kernels.parallel import parallel_for, ranges
+from diff4splat.render.raster.padded_image import empty
+from diff4splat.render.trace.bvh.boxes import PRIMITIVES_PER_PART
 from diff4splat.render.trace.forward import PACKETS_PER_PART
-from diff4splat.render.trace.gradients import add_rows, finish, finish_motion
-from diff4splat.render.trace.rewind import rewind
-from diff4splat.render.trace.sums import COLOR, COLUMNS, LOBES, TO_RAY
-from diff4splat.render.trace.tables import Cloud, Doubles, Floats, Integers, Motion, Sight
+from diff4splat.render.trace.shading.gradient_sums import COLOR, COLUMNS, LOBES, TO_RAY
+from diff4splat.render.trace.shading.gradients import add_rows, finish, finish_motion
+from diff4splat.render.trace.shading.shade_backward import shade_backward
+from diff4splat.render.trace.tables import (
+    Cloud,
+    Doubles,
+    Floats,
+    Integers,
+    MotionArrays,
+    TraceInputs,
+)
 
 _LEAST_PARTS, _MOST_PARTS = 4, 64
 """How many parts of packets wait to be added at first, and ever."""
@@ -31,7 +38,7 @@ class Gradients:
     """Of everything that went in."""
 
     cloud: Cloud
-    motion: Motion
+    motion: MotionArrays
     plain_colors: Doubles
     """Of the colours without harmonics (n × 3)."""
     lobes: Floats
@@ -41,24 +48,24 @@ class Gradients:
 
 
 def gradients(
-    sight: Sight, cloud: Cloud, motion: Motion, seen_grads: Floats, memory_bytes: int
+    inputs: TraceInputs, cloud: Cloud, motion: MotionArrays, output_grads: Floats, memory_bytes: int
 ) -> Gradients:
-    """From gradients of what every ray sees (r × 7)."""
+    """Gradients of all inputs from those of the outputs (r × 7)."""
     count = len(cloud.means)
     totals = np.zeros((count, COLUMNS))
-    lobes = np.zeros((count if sight.bands > 1 else 0, LOBES), np.float32)
-    to_rays = empty(len(sight.rays.origins), TO_RAY)
-    for parts in _rewound(sight, seen_grads, to_rays, memory_bytes):
+    lobes = np.zeros((count if inputs.bands > 1 else 0, LOBES), np.float32)
+    to_rays = empty(len(inputs.rays.origins), TO_RAY)
+    for parts in _backward_parts(inputs, output_grads, to_rays, memory_bytes):
         _add(parts, totals, lobes)
     grads = Cloud(*(np.zeros(array.shape, np.float32) for array in cloud))
-    motion_grads = Motion(*(np.zeros(array.shape, np.float32) for array in motion))
+    motion_grads = MotionArrays(*(np.zeros(array.shape, np.float32) for array in motion))
 
     def work(first: int, last: int) -> None:
-        finish(first, last, cloud, sight.world.primitives, totals, grads)
+        finish(first, last, cloud, inputs.scene.primitives, totals, grads)
         if len(motion.velocities):
-            finish_motion(first, last, sight.world.primitives, totals, motion_grads)
+            finish_motion(first, last, inputs.scene.primitives, totals, motion_grads)
 
-    spread(work, ranges(count, PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(count, PRIMITIVES_PER_PART))
     return Gradients(
         cloud=grads,
         motion=motion_grads,
@@ -68,24 +75,24 @@ def gradients(
     )
 
 
-def _rewound(
-    sight: Sight, seen_grads: Floats, to_rays: Floats, memory_bytes: int
+def _backward_parts(
+    inputs: TraceInputs, output_grads: Floats, to_rays: Floats, memory_bytes: int
 ) -> Iterator[list[Part]]:
     """Sums of one block of parts after another, as many at once as fit in memory."""
-    todo = ranges(len(sight.rays.starts) - 1, PACKETS_PER_PART)
+    todo = ranges(len(inputs.rays.starts) - 1, PACKETS_PER_PART)
     pool: SimpleQueue[tuple[Integers, Integers]] = SimpleQueue()
     size, largest = _LEAST_PARTS, 1
     while todo:
         block, todo = todo[:size], todo[size:]
-        made: list[Part | None] = [None] * len(block)
+        results: list[Part | None] = [None] * len(block)
 
-        def work(part: int, first: int, last: int, made: list[Part | None] = made) -> None:
-            lists = _lists(pool, len(sight.world.primitives))
-            made[part] = rewind(first, last, sight, seen_grads, *lists, to_rays)
+        def work(part: int, first: int, last: int, results: list[Part | None] = results) -> None:
+            lists = _lists(pool, len(inputs.scene.primitives))
+            results[part] = shade_backward(first, last, inputs, output_grads, *lists, to_rays)
             pool.put(lists)
 
-        spread(work, ((number, *part) for number, part in enumerate(block)))
-        parts = [part for part in made if part is not None]
+        parallel_for(work, ((number, *part) for number, part in enumerate(block)))
+        parts = [part for part in results if part is not None]
         yield parts
         largest = max(largest, *(sum(array.nbytes for array in part) for part in parts))
         size = min(max(memory_bytes // largest, 1), _MOST_PARTS)
@@ -107,4 +114,4 @@ def _add(parts: list[Part], totals: Doubles, lobes: Floats) -> None:
             if len(lobes):
                 add_rows(low, high, listed, own_lobes, lobes)
 
-    spread(work, ranges(len(totals), max(PRIMITIVES_PER_PART, -(-len(totals) // 8))))
+    parallel_for(work, ranges(len(totals), max(PRIMITIVES_PER_PART, -(-len(totals) // 8))))

@@ -1,4 +1,4 @@
-"""The way forward: primitives → tree → packets → hits → what rays see.
+"""The forward pass: primitives → tree → packets → hits → outputs per ray.
 
 Every stage is spread over threads in parts whose results do not depend on which thread does them.
 """
@@ -7,48 +7,48 @@ import math
 
 import numpy as np
 
-from diff4splat.render.raster.canvas import empty
-from diff4splat.render.raster.threads import ranges, spread
-from diff4splat.render.trace.boxes import PRIMITIVES_PER_PART, boxes_between
-from diff4splat.render.trace.leaves import gather_leaves
-from diff4splat.render.trace.packets import bundle_rays
-from diff4splat.render.trace.primitives import prepare
+from diff4splat.kernels.parallel import parallel_for, ranges
+from diff4splat.render.raster.padded_image import empty
+from diff4splat.render.trace.bvh.boxes import PRIMITIVES_PER_PART, boxes_between
+from diff4splat.render.trace.bvh.leaves import gather_leaves
+from diff4splat.render.trace.bvh.primitives import prepare
+from diff4splat.render.trace.bvh.tree import NO_ORDER, build_tree
 from diff4splat.render.trace.settings import TraceSettings
-from diff4splat.render.trace.shade import SEEN, shade
+from diff4splat.render.trace.shading.shade import OUTPUT_COLUMNS, shade
 from diff4splat.render.trace.tables import (
     MEAN,
     MOVING_COLUMNS,
-    STILL_COLUMNS,
+    STATIC_COLUMNS,
     Cloud,
     Doubles,
     Floats,
     Integers,
-    Motion,
-    Rules,
-    Sight,
+    MotionArrays,
+    TraceInputs,
+    TraceRules,
+    TraceScene,
     Tree,
-    World,
 )
-from diff4splat.render.trace.tree import NOTHING_KNOWN, build
+from diff4splat.render.trace.traversal.packets import bundle_rays
 
 PACKETS_PER_PART = 16
-_ASKED = 1024
-"""Gaussians that tell how far away the scene is."""
+_SAMPLED = 1024
+"""Gaussians from which the distance of the scene is estimated."""
 _LEAST_SIZE = 1e-30
 _BYTES_PER_HIT, _SHARES = 12, 16
 """A packet may use a sixteenth of the memory, whatever the threads: that says where it is cut."""
 _LEAST_EXPONENT = -125.0
 """Smaller powers of 2 are no normal numbers in float32."""
 _LARGEST_ALPHA = 1 - 2.0**-24
-"""In float32; light is divided by 1 - alpha on the way back."""
+"""In float32; the backward pass divides light by 1 - alpha."""
 
 
-def make_rules(settings: TraceSettings, squared_gate: float) -> Rules:
+def make_rules(settings: TraceSettings, squared_gate: float) -> TraceRules:
     """What of the settings the kernels need."""
     drop = math.inf if settings.min_response is None else -math.log(settings.min_response)
     quartic = settings.kernel_degree == 4
-    # Whole numbers would compile every kernel again.
-    return Rules(
+    # Integers would compile every kernel again.
+    return TraceRules(
         log2_cutoff=max(math.log2(settings.alpha_cutoff), _LEAST_EXPONENT),
         alpha_max=min(float(settings.alpha_max), _LARGEST_ALPHA),
         dark=settings.dark,
@@ -61,63 +61,65 @@ def make_rules(settings: TraceSettings, squared_gate: float) -> Rules:
     )
 
 
-def make_primitives(cloud: Cloud, motion: Motion, rules: Rules) -> tuple[Doubles, Doubles]:
-    """What rays meet (n × 16, or 24 if it moves), and how many deviations it reaches (n)."""
+def make_primitives(
+    cloud: Cloud, motion: MotionArrays, rules: TraceRules
+) -> tuple[Doubles, Doubles]:
+    """Primitives (n × 16, or 24 if they move), and their reach in deviations (n)."""
     count, moves = len(cloud.means), len(motion.velocities) > 0
-    primitives = np.zeros((count, MOVING_COLUMNS if moves else STILL_COLUMNS))
+    primitives = np.zeros((count, MOVING_COLUMNS if moves else STATIC_COLUMNS))
     reach = np.empty(count)
 
     def work(first: int, last: int) -> None:
         prepare(first, last, cloud, motion, rules, primitives, reach)
 
-    spread(work, ranges(count, PRIMITIVES_PER_PART))
+    parallel_for(work, ranges(count, PRIMITIVES_PER_PART))
     return primitives, reach
 
 
-def make_world(
+def make_scene(
     cloud: Cloud,
-    motion: Motion,
+    motion: MotionArrays,
     colors: Floats,
     times: Floats,
-    rules: Rules,
-    known: Integers = NOTHING_KNOWN,
-) -> World:
-    """What rays between the earliest and the latest of ``times`` can look at.
+    rules: TraceRules,
+    order: Integers = NO_ORDER,
+) -> TraceScene:
+    """The scene for rays between the earliest and the latest of ``times``.
 
-    ``known`` is an order of Gaussians that may suit the search tree.
+    ``order`` is an order of the Gaussians in which neighbours follow each other.
     """
     primitives, reach = make_primitives(cloud, motion, rules)
     earliest, latest = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
-    tree = build(boxes_between(primitives, reach, earliest, latest), known)
+    tree = build_tree(boxes_between(primitives, reach, earliest, latest), order)
     moment = 0.5 * (earliest + latest)
     leaves = gather_leaves(tree, primitives, reach, moment)
-    return World(primitives, tree, leaves, moment, colors)
+    return TraceScene(primitives, tree, leaves, moment, colors)
 
 
-def see(sight: Sight) -> tuple[Floats, Integers]:
-    """What every ray sees (r × 7), and how many hits that is."""
-    count = len(sight.rays.origins)
-    seen, hits = empty(count, SEEN), np.empty(count, np.int32)
+def shade_rays(inputs: TraceInputs) -> tuple[Floats, Integers]:
+    """Outputs of every ray (r × 7), and the number of its hits."""
+    count = len(inputs.rays.origins)
+    outputs, hits = empty(count, OUTPUT_COLUMNS), np.empty(count, np.int32)
 
     def work(first: int, last: int) -> None:
-        shade(first, last, sight, seen, hits)
+        shade(first, last, inputs, outputs, hits)
 
-    spread(work, ranges(len(sight.rays.starts) - 1, PACKETS_PER_PART))
-    return seen, hits
+    parallel_for(work, ranges(len(inputs.rays.starts) - 1, PACKETS_PER_PART))
+    return outputs, hits
 
 
-def make_sight(
-    world: World,
+def make_inputs(
+    scene: TraceScene,
     arrays: tuple[Floats, Floats, Floats],
     settings: TraceSettings,
-    rules: Rules,
+    rules: TraceRules,
     bands: int,
-) -> Sight:
+) -> TraceInputs:
     """Rays (origins, directions, times) cut into packets."""
-    return Sight(
-        world,
+    return TraceInputs(
+        scene,
         bundle_rays(
-            *arrays, _viewed_size(world.tree, arrays[0]), _viewed_distance(world, arrays[0])
+            *arrays, _viewed_size(scene.tree, arrays[0]), _viewed_distance(scene, arrays[0])
         ),
         rules,
         bands,
@@ -132,11 +134,11 @@ def _viewed_size(tree: Tree, origins: Floats) -> float:
     return max(float(np.abs(corners).max(initial=0.0) + np.abs(away).max(initial=0.0)), _LEAST_SIZE)
 
 
-def _viewed_distance(world: World, origins: Floats) -> float:
+def _viewed_distance(scene: TraceScene, origins: Floats) -> float:
     """From the first ray's origin to half of the scene's Gaussians, by some of them."""
-    order = world.tree.order
+    order = scene.tree.order
     if not len(order) or not len(origins):
         return _LEAST_SIZE
-    some = order[:: max(len(order) // _ASKED, 1)]
-    away = world.primitives[some, MEAN : MEAN + 3] - origins[:1]
+    some = order[:: max(len(order) // _SAMPLED, 1)]
+    away = scene.primitives[some, MEAN : MEAN + 3] - origins[:1]
     return max(float(np.median(np.linalg.norm(away, axis=1))), _LEAST_SIZE)

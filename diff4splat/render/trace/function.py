@@ -12,17 +12,17 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn.functional import pad
 
-from diff4splat.render.raster.lanes import LANES
+from diff4splat.kernels.simd16 import LANES
 from diff4splat.render.trace.backward import Gradients, gradients
-from diff4splat.render.trace.forward import make_rules, make_sight, make_world, see
+from diff4splat.render.trace.bvh.tree import NO_ORDER
+from diff4splat.render.trace.forward import make_inputs, make_rules, make_scene, shade_rays
 from diff4splat.render.trace.moving import MovingCloud
 from diff4splat.render.trace.rays import Rays
-from diff4splat.render.trace.reference import Seen
+from diff4splat.render.trace.reference import RayOutputs
 from diff4splat.render.trace.settings import TraceSettings
-from diff4splat.render.trace.shade import DISTANCE, LIGHT, MEDIAN, RGB, WEIGHT
-from diff4splat.render.trace.tables import Cloud, Floats, Integers, Motion, Sight
-from diff4splat.render.trace.tint import PLAIN_COLUMNS
-from diff4splat.render.trace.tree import NOTHING_KNOWN
+from diff4splat.render.trace.shading.sh_color import PLAIN_COLUMNS
+from diff4splat.render.trace.shading.shade import DISTANCE, LIGHT, MEDIAN, RGB, WEIGHT
+from diff4splat.render.trace.tables import Cloud, Floats, Integers, MotionArrays, TraceInputs
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import DEGREE_ZERO
 
@@ -33,22 +33,22 @@ class _Arrays:
 
     cloud: Cloud
     sh: Tensor
-    motion: Motion
+    motion: MotionArrays
     origins: Floats
     directions: Floats
     times: Floats
 
 
-def look(
+def trace_compiled(
     gaussians: Gaussians,
     rays: Rays,
     settings: TraceSettings,
     moving: MovingCloud | None,
-    known: Integers = NOTHING_KNOWN,
-) -> Seen:
-    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable.
+    order: Integers = NO_ORDER,
+) -> RayOutputs:
+    """Outputs along valid ``rays`` through valid ``gaussians``.
 
-    ``known`` is an order of Gaussians that may suit the search tree.
+    ``order`` is an order of the Gaussians in which neighbours follow each other.
     """
     means = gaussians.means
     motion = (means.new_empty(0, 3), means.new_empty(0), means.new_empty(0))
@@ -59,12 +59,12 @@ def look(
     table, hits = _Trace.apply(
         settings,
         gate,
-        known,
+        order,
         *(means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh),
         *motion,
         *(rays.origins, rays.directions, times),
     )
-    return Seen(
+    return RayOutputs(
         rgb=table[:, RGB : RGB + 3],
         distance_sum=table[:, DISTANCE],
         weight=table[:, WEIGHT],
@@ -80,17 +80,17 @@ class _Trace(torch.autograd.Function):
         ctx: Any,
         settings: TraceSettings,
         squared_gate: float | None,
-        known: Integers,
+        order: Integers,
         *tensors: Tensor,
     ) -> tuple[Tensor, Tensor]:
-        sight = _sight(_unpack(tensors), settings, squared_gate, known)
-        seen, hits = see(sight)
+        inputs = _inputs(_unpack(tensors), settings, squared_gate, order)
+        outputs, hits = shade_rays(inputs)
         if any(ctx.needs_input_grad):
             ctx.save_for_backward(*tensors)
-            ctx.sight, ctx.memory_bytes = sight, settings.memory_bytes
+            ctx.inputs, ctx.memory_bytes = inputs, settings.memory_bytes
         counts = torch.from_numpy(hits).long()
         ctx.mark_non_differentiable(counts)
-        return torch.from_numpy(seen), counts
+        return torch.from_numpy(outputs), counts
 
     @staticmethod
     def backward(ctx: Any, table: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:
@@ -99,42 +99,48 @@ class _Trace(torch.autograd.Function):
                 "trace: expected create_graph=False, got True; use backend='reference' to "
                 "differentiate twice"
             )
-        own = _unpack(ctx.saved_tensors)
-        made = gradients(
-            ctx.sight, own.cloud, own.motion, table.contiguous().numpy(), ctx.memory_bytes
+        arrays = _unpack(ctx.saved_tensors)
+        grads = gradients(
+            ctx.inputs, arrays.cloud, arrays.motion, table.contiguous().numpy(), ctx.memory_bytes
         )
-        to_rays = torch.from_numpy(made.rays)
+        to_rays = torch.from_numpy(grads.rays)
         return (
             *(None, None, None),
-            *map(torch.from_numpy, made.cloud),
-            _sh_gradient(own.sh, made),
-            *map(torch.from_numpy, made.motion),
+            *map(torch.from_numpy, grads.cloud),
+            _sh_gradient(arrays.sh, grads),
+            *map(torch.from_numpy, grads.motion),
             to_rays[:, :3],
             to_rays[:, 3:6],
-            to_rays[:, 6] if len(own.times) else None,
+            to_rays[:, 6] if len(arrays.times) else None,
         )
 
 
 def _unpack(tensors: tuple[Tensor, ...]) -> _Arrays:
     plain = [tensor.detach().contiguous() for tensor in tensors]
-    arrays: list[np.ndarray] = [tensor.numpy() for tensor in plain]
+    numpy: list[np.ndarray] = [tensor.numpy() for tensor in plain]
     return _Arrays(
-        cloud=Cloud(*arrays[:4]),
+        cloud=Cloud(*numpy[:4]),
         sh=plain[4],
-        motion=Motion(*arrays[5:8]),
-        origins=arrays[8],
-        directions=arrays[9],
-        times=arrays[10],
+        motion=MotionArrays(*numpy[5:8]),
+        origins=numpy[8],
+        directions=numpy[9],
+        times=numpy[10],
     )
 
 
-def _sight(
-    own: _Arrays, settings: TraceSettings, squared_gate: float | None, known: Integers
-) -> Sight:
+def _inputs(
+    arrays: _Arrays, settings: TraceSettings, squared_gate: float | None, order: Integers
+) -> TraceInputs:
     rules = make_rules(settings, np.inf if squared_gate is None else squared_gate)
-    world = make_world(own.cloud, own.motion, _color_table(own.sh), own.times, rules, known)
-    return make_sight(
-        world, (own.origins, own.directions, own.times), settings, rules, own.sh.shape[1]
+    scene = make_scene(
+        arrays.cloud, arrays.motion, _color_table(arrays.sh), arrays.times, rules, order
+    )
+    return make_inputs(
+        scene,
+        (arrays.origins, arrays.directions, arrays.times),
+        settings,
+        rules,
+        arrays.sh.shape[1],
     )
 
 
@@ -149,7 +155,7 @@ def _plain_colors(sh: Float[Tensor, "n 1 3"]) -> Float[Tensor, "n 3"]:
     return 0.5 + DEGREE_ZERO * sh[:, 0]
 
 
-def _sh_gradient(sh: Float[Tensor, "n k 3"], made: Gradients) -> Float[Tensor, "n k 3"]:
+def _sh_gradient(sh: Float[Tensor, "n k 3"], grads: Gradients) -> Float[Tensor, "n k 3"]:
     if sh.shape[1] == 1:
-        return (DEGREE_ZERO * torch.from_numpy(made.plain_colors)).to(sh)[:, None]
-    return torch.from_numpy(made.lobes).view(-1, 3, LANES)[..., : sh.shape[1]].mT.contiguous()
+        return (DEGREE_ZERO * torch.from_numpy(grads.plain_colors)).to(sh)[:, None]
+    return torch.from_numpy(grads.lobes).view(-1, 3, LANES)[..., : sh.shape[1]].mT.contiguous()

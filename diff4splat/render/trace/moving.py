@@ -1,4 +1,4 @@
-"""Gaussians that move in a line and shine for a while: native 4D Gaussians, seen at any time.
+"""Gaussians with constant velocity and a pulse of opacity: native 4D Gaussians.
 
 Axes: ``n`` Gaussians. A 4D covariance is one to one with a slice covariance that does not change, a
 mean that moves at constant velocity, and a pulse of opacity in time (Yang et al., ICLR 2024):
@@ -58,7 +58,7 @@ class MovingCloud:
 
 
 @torch.no_grad()
-def usable_motion(
+def valid_motion(
     moving: MovingCloud, usable: Bool[Tensor, " n"]
 ) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
     """Those of the ``usable`` that are finite, can be squared, and have a deviation above 0.
@@ -72,8 +72,8 @@ def usable_motion(
         "time_deviations_s": moving.time_deviations_s > 0,
     }
     dropped = {}
-    for name, own in fine.items():
-        if count := int((usable & ~own).sum()):
+    for name, valid in fine.items():
+        if count := int((usable & ~valid).sum()):
             dropped[name] = count
-        usable = usable & own
+        usable = usable & valid
     return usable, dropped

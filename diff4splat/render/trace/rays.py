@@ -28,7 +28,7 @@ class Rays:
     """Rays that exist; the others, as outside the image circle of a lens, see nothing at all and
     may hold any numbers. None is all of them."""
     time_s: Float[Tensor, " r"] | None = None
-    """When each ray looks; needed for Gaussians that move."""
+    """Time of each ray; required if Gaussians move."""
 
     def __post_init__(self) -> None:
         _require_shapes(self)
@@ -52,8 +52,8 @@ class Rays:
 
     def select(self, index: Bool[Tensor, " r"] | Int[Tensor, " m"] | slice) -> "Rays":
         """The rays under a mask or at indices."""
-        own = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(self, **{k: None if v is None else v[index] for k, v in own.items()})
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{k: None if v is None else v[index] for k, v in values.items()})
 
 
 def _require_shapes(rays: Rays) -> None:

@@ -1,4 +1,4 @@
-"""Brute force in plain PyTorch: every ray meets every Gaussian; autograd does the way back.
+"""Brute force in plain PyTorch: every ray against every Gaussian, with gradients by autograd.
 
 Axes: ``r`` rays of a chunk, ``n`` Gaussians, ``p`` pairs (ray, Gaussian) that see each other, ``k``
 places in the longest list of a chunk. Per ray, over its pairs by (τ, index):
@@ -29,13 +29,13 @@ _BYTES_PER_MEETING = 512
 """Of a ray and a Gaussian that are only asked whether they see each other."""
 _BYTES_PER_PAIR = 2048
 """Of a pair that is blended, with its way back."""
-_SEEN = 8
+_OUTPUT_COLUMNS = 8
 """Columns of what a ray sees: rgb (3), Σ w τ, Σ w, light left, median τ, hits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
-    """What rays see, before the background."""
+class RayOutputs:
+    """Outputs per ray, before the background."""
 
     rgb: Float[Tensor, "r 3"]
     distance_sum: Float[Tensor, " r"]
@@ -43,14 +43,14 @@ class Seen:
     weight: Float[Tensor, " r"]
     """Σ w"""
     light: Float[Tensor, " r"]
-    """How much of what lies behind is seen."""
+    """Transmittance: the share of light from behind all hits."""
     median: Float[Tensor, " r"]
     hits: Int[Tensor, " r"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _World:
-    """What all rays look at."""
+class _Scene:
+    """Gaussians as all rays use them."""
 
     gaussians: Gaussians
     whiten: Float[Tensor, "n 3 3"]
@@ -58,19 +58,19 @@ class _World:
     settings: TraceSettings
 
 
-def look(
+def trace_reference(
     gaussians: Gaussians, rays: Rays, settings: TraceSettings, moving: MovingCloud | None
-) -> Seen:
-    """What ``rays``, all of them valid, see of ``gaussians``, all of them usable."""
-    world = _World(
+) -> RayOutputs:
+    """Outputs along valid ``rays`` through valid ``gaussians``."""
+    scene = _Scene(
         gaussians=gaussians.to(torch.float64),
         whiten=whitening(gaussians),
         moving=None if moving is None else _double(moving),
         settings=settings,
     )
     rays64 = _double(rays)
-    table = torch.cat(list(_tables(world, rays64))).to(gaussians.means.dtype)
-    return Seen(
+    table = torch.cat(list(_tables(scene, rays64))).to(gaussians.means.dtype)
+    return RayOutputs(
         rgb=table[:, :3],
         distance_sum=table[:, 3],
         weight=table[:, 4],
@@ -90,21 +90,21 @@ def _double(parts: Rays | MovingCloud) -> Rays | MovingCloud:
     return replace(parts, **numbers)
 
 
-def _tables(world: _World, rays: Rays) -> Iterator[Float[Tensor, "r 8"]]:
+def _tables(scene: _Scene, rays: Rays) -> Iterator[Float[Tensor, "r 8"]]:
     """What one group of rays after another sees."""
     remember = torch.is_grad_enabled()
-    for chunk in _slices(len(rays), world):
+    for chunk in _slices(len(rays), scene):
         own = rays.select(chunk)
-        ray, member, distance = _meetings(world, own)
+        ray, member, distance = _intersections(scene, own)
         counts = torch.bincount(ray, minlength=len(own))
-        for group in _groups(counts.tolist(), world.settings.memory_bytes // _BYTES_PER_PAIR):
+        for group in _groups(counts.tolist(), scene.settings.memory_bytes // _BYTES_PER_PAIR):
             mask = (ray >= group.start) & (ray < group.stop)
             lists = _nearest_first(ray[mask] - group.start, member[mask], distance[mask])
             part, longest = own.select(group), max(counts[group].tolist(), default=0)
             if remember:
                 yield checkpoint(
                     _blend,
-                    world,
+                    scene,
                     part,
                     *lists,
                     longest,
@@ -112,12 +112,12 @@ def _tables(world: _World, rays: Rays) -> Iterator[Float[Tensor, "r 8"]]:
                     preserve_rng_state=False,
                 )
             else:
-                yield _blend(world, part, *lists, longest)
+                yield _blend(scene, part, *lists, longest)
 
 
-def _slices(count: int, world: _World) -> Iterator[slice]:
-    per_ray = max(1, len(world.gaussians)) * _BYTES_PER_MEETING
-    size = max(1, world.settings.memory_bytes // per_ray)
+def _slices(count: int, scene: _Scene) -> Iterator[slice]:
+    per_ray = max(1, len(scene.gaussians)) * _BYTES_PER_MEETING
+    size = max(1, scene.settings.memory_bytes // per_ray)
     # Without rays there is one empty chunk, which keeps the graph together.
     return (slice(first, min(first + size, count)) for first in range(0, max(count, 1), size))
 
@@ -134,27 +134,27 @@ def _groups(counts: list[int], limit: int) -> Iterator[slice]:
 
 
 @torch.no_grad()
-def _meetings(
-    world: _World, rays: Rays
+def _intersections(
+    scene: _Scene, rays: Rays
 ) -> tuple[Int[Tensor, " p"], Int[Tensor, " p"], Float[Tensor, " p"]]:
     """(ray, Gaussian, τ) of all pairs that see each other."""
     device = rays.origins.device
-    everyone = torch.arange(len(world.gaussians), device=device)[None]
+    everyone = torch.arange(len(scene.gaussians), device=device)[None]
     distance, _, seen = _responses(
-        world, rays, torch.arange(len(rays), device=device)[:, None], everyone
+        scene, rays, torch.arange(len(rays), device=device)[:, None], everyone
     )
     ray, member = seen.nonzero().unbind(1)
     return ray, member, distance[ray, member]
 
 
 def _responses(
-    world: _World, rays: Rays, ray: Int[Tensor, "*#p"], member: Int[Tensor, "*#p"]
+    scene: _Scene, rays: Rays, ray: Int[Tensor, "*#p"], member: Int[Tensor, "*#p"]
 ) -> tuple[Float[Tensor, "*p"], Float[Tensor, "*p"], Bool[Tensor, "*p"]]:
     """τ, α and whether the ray sees the Gaussian at all; indices of one size or of a table."""
-    settings, cloud = world.settings, world.gaussians
-    mean, shine = _at_time(world, rays, ray, member)
+    settings, cloud = scene.settings, scene.gaussians
+    mean, shine = _at_time(scene, rays, ray, member)
     distance, squared = closest(
-        world.whiten[member], rays.origins[ray] - mean, rays.directions[ray]
+        scene.whiten[member], rays.origins[ray] - mean, rays.directions[ray]
     )
     response = exponent(squared, settings)
     alpha = cloud.opacities[member] * (response + shine).exp()
@@ -165,10 +165,10 @@ def _responses(
 
 
 def _at_time(
-    world: _World, rays: Rays, ray: Int[Tensor, "*#p"], member: Int[Tensor, "*#p"]
+    scene: _Scene, rays: Rays, ray: Int[Tensor, "*#p"], member: Int[Tensor, "*#p"]
 ) -> tuple[Float[Tensor, "*#p 3"], Float[Tensor, "*#p"]]:
     """Means when the rays look, and the logarithms of the pulses; minus infinity is dark."""
-    mean, moving = world.gaussians.means[member], world.moving
+    mean, moving = scene.gaussians.means[member], scene.moving
     if moving is None:
         return mean, mean.new_zeros(())
     since = rays.time_s[ray] - moving.time_centers_s[member]
@@ -187,23 +187,23 @@ def _nearest_first(
 
 
 def _blend(
-    world: _World, rays: Rays, ray: Int[Tensor, " p"], member: Int[Tensor, " p"], longest: int
+    scene: _Scene, rays: Rays, ray: Int[Tensor, " p"], member: Int[Tensor, " p"], longest: int
 ) -> Float[Tensor, "r 8"]:
     """Front to back, until less light is left than the cutoff."""
-    distance, alpha, _ = _responses(world, rays, ray, member)
+    distance, alpha, _ = _responses(scene, rays, ray, member)
     first = torch.searchsorted(ray, torch.arange(len(rays), device=ray.device))
     place = torch.arange(len(ray), device=ray.device) - first[ray]
     padded = alpha.new_zeros(len(rays), longest).index_put((ray, place), alpha)
-    reached = _before(1 - padded.detach()) >= world.settings.dark
+    reached = _before(1 - padded.detach()) >= scene.settings.dark
     padded = torch.where(reached, padded, 0.0)
     before = _before(1 - padded)
     weight, after = (padded * before)[ray, place], (before * (1 - padded))
     halved = ((before > 0.5) & (after <= 0.5))[ray, place]
     hit = (padded > 0)[ray, place]
-    columns = [_colors(world, rays, ray, member) * weight[:, None]]
+    columns = [_colors(scene, rays, ray, member) * weight[:, None]]
     columns += [(weight * distance)[:, None], weight[:, None], torch.zeros_like(weight)[:, None]]
     columns += [torch.where(halved, distance, 0.0)[:, None], hit.to(weight)[:, None]]
-    table = alpha.new_zeros(len(rays), _SEEN).index_add(0, ray, torch.cat(columns, 1))
+    table = alpha.new_zeros(len(rays), _OUTPUT_COLUMNS).index_add(0, ray, torch.cat(columns, 1))
     light = after[:, -1] if longest else torch.ones_like(table[:, 0])
     return torch.cat([table[:, :5], light[:, None], table[:, 6:]], 1)
 
@@ -214,10 +214,10 @@ def _before(passing: Float[Tensor, "r k"]) -> Float[Tensor, "r k"]:
 
 
 def _colors(
-    world: _World, rays: Rays, ray: Int[Tensor, " p"], member: Int[Tensor, " p"]
+    scene: _Scene, rays: Rays, ray: Int[Tensor, " p"], member: Int[Tensor, " p"]
 ) -> Float[Tensor, "p 3"]:
     direction = rays.directions[ray]
-    if world.settings.color_direction == "mean":
-        toward = _at_time(world, rays, ray, member)[0] - rays.origins[ray]
+    if scene.settings.color_direction == "mean":
+        toward = _at_time(scene, rays, ray, member)[0] - rays.origins[ray]
         direction = torch.nn.functional.normalize(toward, dim=1)
-    return harmonics.color(world.gaussians.sh[member], direction)
+    return harmonics.color(scene.gaussians.sh[member], direction)

@@ -1,4 +1,4 @@
-"""What can be asked of the tracer, and what it answers.
+"""Settings and outputs of the tracer.
 
 Axes: ``r`` rays. With D the distance of a ray from a mean in standard deviations, the response is
 exp(-D² / 2) for kernel degree 2 and exp(-D⁴ / 18) for degree 4: both are exp(-4.5) at D = 3
@@ -23,7 +23,7 @@ _DARK_ROOM = 1 + 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TraceSettings:
-    """How rays see Gaussians. Scenes that were fitted with other numbers look different."""
+    """Settings of the tracer. A scene must be traced with the settings it was fitted with."""
 
     kernel_degree: int = 2
     """2 for Gaussians, which rasterisers draw too; 4 for the flatter ones of 3DGRT."""
@@ -39,7 +39,7 @@ class TraceSettings:
     min_response: float | None = None
     """Smaller responses are nothing whatever the opacity; None is no such rule."""
     color_direction: Literal["ray", "mean"] = "ray"
-    """Harmonics are seen along the ray (3DGRT), or from its origin to the mean (as by the
+    """Harmonics are evaluated along the ray (3DGRT), or from its origin to the mean (as by the
     rasteriser)."""
     background: tuple[float, float, float] | Float[Tensor, "3"] = (0.0, 0.0, 0.0)
     """RGB behind the scene; a tensor gets a gradient."""
@@ -86,11 +86,11 @@ _EXPECTED = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TraceOutput:
-    """What was asked for, None for the rest. Rays that are not valid have 0 everywhere."""
+    """The requested outputs, None for the rest. Invalid rays have 0 everywhere."""
 
     rgb: Float[Tensor, "r 3"] | None = None
     distance: Float[Tensor, " r"] | None = None
-    """Expected distance along the ray, Σ w τ / Σ w; 0 where nothing is seen."""
+    """Expected distance along the ray, Σ w τ / Σ w; 0 where nothing is hit."""
     median_distance: Float[Tensor, " r"] | None = None
     """τ of the Gaussian behind which at most half of the light is left; 0 where more is left."""
     alpha: Float[Tensor, " r"] | None = None

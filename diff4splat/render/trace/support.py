@@ -1,4 +1,4 @@
-"""What the compiled tracer can take, and which Gaussians rays can meet.
+"""Inputs that the compiled tracer supports, and validity of Gaussians.
 
 Axes: ``n`` Gaussians.
 """
@@ -10,14 +10,14 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from diff4splat.render.support import usable_gaussians
-from diff4splat.render.trace.moving import MovingCloud, usable_motion
+from diff4splat.render.trace.moving import MovingCloud, valid_motion
 from diff4splat.scene.gaussians import Gaussians
 
 _MOST_GAUSSIANS = 1 << 24
 
 
-def refusal(gaussians: Gaussians) -> str | None:
-    """Why the compiled tracer cannot take ``gaussians``, or None."""
+def unsupported_reason(gaussians: Gaussians) -> str | None:
+    """Why the compiled tracer does not support ``gaussians``, or None."""
     means = gaussians.means
     if means.device.type != "cpu":
         return f"expected CPU tensors, got {means.device}"
@@ -30,12 +30,12 @@ def refusal(gaussians: Gaussians) -> str | None:
     return None
 
 
-def usable(
+def valid_gaussians(
     gaussians: Gaussians, moving: MovingCloud | None
 ) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
-    """Which Gaussians can be drawn, and counts of the others by their first bad parameter."""
-    kept, dropped = usable_gaussians(gaussians)
+    """Which Gaussians are valid, and counts of the others by their first invalid parameter."""
+    valid, dropped = usable_gaussians(gaussians)
     if moving is not None:
-        own, more = usable_motion(moving, kept)
-        kept, dropped = kept & own, dropped | more
-    return kept, dropped
+        valid, more = valid_motion(moving, valid)
+        dropped = dropped | more
+    return valid, dropped

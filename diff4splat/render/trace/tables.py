@@ -1,6 +1,6 @@
 """The arrays that pass from kernel to kernel.
 
-Axes: ``n`` Gaussians, ``m`` of them that can be seen at all, ``g`` groups of sixteen of these,
+Axes: ``n`` Gaussians, ``m`` of them that are visible at all, ``g`` groups of sixteen of these,
 ``r`` rays. Shapes and places are float64, because a needle's whitening needs it; what lanes read is
 float32 relative to the tree's anchor or to the frame of a packet.
 """
@@ -14,15 +14,15 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
-MEAN, WHITEN, SPREAD, LEVEL, VELOCITY, CENTER, HURRY = 0, 3, 12, 15, 16, 19, 20
+MEAN, WHITEN, SCALES, LEVEL, VELOCITY, CENTER, INV_TIME_SIGMA = 0, 3, 12, 15, 16, 19, 20
 """Columns of a primitive: mean (3), W row by row (9), scales (3), log2 of the opacity; of one that
 moves also velocity (3), centre and inverse deviation of the pulse."""
-STILL_COLUMNS, MOVING_COLUMNS = 16, 24
+STATIC_COLUMNS, MOVING_COLUMNS = 16, 24
 
 LEAF_MEAN, LEAF_AXES, LEAF_SLACK, LEAF_VELOCITY = 0, 3, 12, 13
 """Rows of a group: means at the anchor's time (3), reach · S Rᵀ row by row (9), what rounding may
 move them by, velocities (3)."""
-STILL_ROWS, MOVING_ROWS = 13, 16
+STATIC_ROWS, MOVING_ROWS = 13, 16
 NODE_ROWS = 6
 """Lower corners (3) and upper corners (3) of sixteen children."""
 
@@ -36,7 +36,7 @@ class Cloud(NamedTuple):
     opacities: Floats
 
 
-class Motion(NamedTuple):
+class MotionArrays(NamedTuple):
     """What moves them; empty arrays where nothing does."""
 
     velocities: Floats
@@ -44,7 +44,7 @@ class Motion(NamedTuple):
     deviations: Floats
 
 
-class Rules(NamedTuple):
+class TraceRules(NamedTuple):
     """What of `TraceSettings` the kernels need."""
 
     log2_cutoff: float
@@ -61,7 +61,7 @@ class Rules(NamedTuple):
     toward_mean: bool
 
 
-class Bundle(NamedTuple):
+class RayBundle(NamedTuple):
     """Rays, and the packets that they are traced in."""
 
     origins: Floats
@@ -85,8 +85,8 @@ class Tree(NamedTuple):
     anchor: tuple[float, float, float]
 
 
-class World(NamedTuple):
-    """What rays look at."""
+class TraceScene(NamedTuple):
+    """Gaussians and their hierarchy."""
 
     primitives: Doubles
     """n × 16, or 24 if they move."""
@@ -99,12 +99,12 @@ class World(NamedTuple):
     """n × 4 without harmonics, else n × 3 × 16 coefficients of a channel side by side."""
 
 
-class Sight(NamedTuple):
-    """One bundle of rays in one world: all that packets are traced with."""
+class TraceInputs(NamedTuple):
+    """One bundle of rays in one scene: all that packets are traced with."""
 
-    world: World
-    rays: Bundle
-    rules: Rules
+    scene: TraceScene
+    rays: RayBundle
+    rules: TraceRules
     bands: int
     """Harmonics per channel."""
     most_hits: int

@@ -12,4 +12,4 @@ import jaxtyping
 HARNESS = Path(__file__).parents[3] / "benchmarks" / "renderers"
 sys.path[:0] = [str(HARNESS), str(HARNESS.parent)]
 SHAPED = ("ablations", "brute_force", "comparison", "sampling", "scenes", "torch_backward")
-jaxtyping.install_import_hook(SHAPED, "beartype.beartype")
+jaxtyping.install_import_hook(SHAPED, "type_checks.check_types")

@@ -7,7 +7,7 @@ from clip_shards import exact_clip
 
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
-from diff4splat.evaluation.protocol_json import load_protocol
+from diff4splat.evaluation.protocols.protocol_json import load_protocol
 from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.factory import create_networks
 

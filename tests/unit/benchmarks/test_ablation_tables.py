@@ -12,9 +12,9 @@ from ablations.tables import to_json, to_markdown
 from ablations.variants import reduced
 
 from diff4splat.configs.recipes import recipe_by_name
-from diff4splat.evaluation.baselines import BASELINES, NEAREST
 from diff4splat.evaluation.columns import SYSTEM
 from diff4splat.evaluation.records import ItemResult, Score
+from diff4splat.evaluation.systems.baselines import BASELINES, NEAREST
 
 BASE = reduced(recipe_by_name("small"), {"static-low": 300, "motion": 100, "dynamic": 200})
 COSTS = (

@@ -11,8 +11,8 @@ from oracles_clips import make_clip
 
 from diff4splat.data.clip_folder import ClipFolder, Selection
 from diff4splat.data.clip_part import ClipPart
+from diff4splat.data.codecs.encode import Coding
 from diff4splat.data.licenses import commercial_ok
-from diff4splat.data.members.encode import Coding
 from diff4splat.data.shard_reader import ShardReader
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import InputError

@@ -17,7 +17,7 @@ from PIL import Image
 
 from diff4splat.data.clip import Clip, Tracks
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.data.members.encode import Coding, Member, encode_clip
+from diff4splat.data.codecs.encode import Coding, Member, encode_clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import InputError
 

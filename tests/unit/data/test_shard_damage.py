@@ -15,7 +15,7 @@ from oracles_clips import make_clip
 from PIL import Image
 
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.data.members.encode import EncodedClip, Member, encode_clip
+from diff4splat.data.codecs.encode import EncodedClip, Member, encode_clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
 

@@ -8,10 +8,10 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diff4splat.data.codecs.encode import EncodedClip, Member
 from diff4splat.data.entry import ClipEntry
 from diff4splat.data.json_fields import IDENTIFIER
 from diff4splat.data.manifest import read_manifest
-from diff4splat.data.members.encode import EncodedClip, Member
 from diff4splat.data.shard_reader import ShardReader
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 

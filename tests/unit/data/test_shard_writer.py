@@ -11,8 +11,8 @@ from oracles_clip_equality import first_difference
 from oracles_clips import make_clip
 
 from diff4splat.data.clip_folder import ClipFolder
+from diff4splat.data.codecs.encode import Coding, EncodedClip, encode_clip
 from diff4splat.data.manifest import Manifest, write_manifest
-from diff4splat.data.members.encode import Coding, EncodedClip, encode_clip
 from diff4splat.data.shard_file import ShardFile
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import ConfigError, FileFormatError, InputError, OutputError

@@ -4,7 +4,7 @@ import pytest
 
 from diff4splat.error_time import camera_knobs
 from diff4splat.error_time.camera_knobs import TimeSteps, turning_scene
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 
 
 @pytest.fixture(autouse=True)
@@ -16,7 +16,7 @@ def _few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(camera_knobs, "_CONVERGED", 512)
 
 
-def errors(knob: Knob, settings: tuple) -> list[float]:
+def errors(knob: ApproximationSetting, settings: tuple) -> list[float]:
     exact = knob.run(knob.reference)
     return [knob.error(knob.run(setting), exact) for setting in settings]
 

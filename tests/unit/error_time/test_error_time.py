@@ -12,7 +12,7 @@ from PIL import Image
 from diff4splat.error_time import error_plot
 from diff4splat.error_time import report as error_time
 from diff4splat.error_time.error_plot import save_error_time_plot
-from diff4splat.error_time.knobs import Knob, KnobRegistry
+from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 from diff4splat.error_time.sweep import Measurement, SweepResult
 from diff4splat.error_time.tables import this_machine, to_json, to_markdown
 from diff4splat.errors import ConfigError, InputError, MissingExtraError, OutputError
@@ -22,7 +22,7 @@ from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import Phases
 
 
-def knob(name: str = "digits", **changes: object) -> Knob:
+def knob(name: str = "digits", **changes: object) -> ApproximationSetting:
     values: dict[str, object] = {
         "name": name,
         "summary": "rounding pi",
@@ -33,7 +33,7 @@ def knob(name: str = "digits", **changes: object) -> Knob:
         "run": lambda digits: torch.tensor(round(torch.pi, digits), dtype=torch.float64),
         "error": lambda result, reference: float((result - reference).abs()),
     }
-    return Knob(**{**values, **changes})
+    return ApproximationSetting(**{**values, **changes})
 
 
 def measured(errors: list[float], seconds: list[float] | None = None, **changes) -> SweepResult:

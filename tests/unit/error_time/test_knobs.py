@@ -1,11 +1,11 @@
 import pytest
 import torch
 
-from diff4splat.error_time.knobs import Knob, KnobRegistry
+from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 from diff4splat.errors import ConfigError
 
 
-def knob(name: str = "digits", **changes: object) -> Knob:
+def knob(name: str = "digits", **changes: object) -> ApproximationSetting:
     values: dict[str, object] = {
         "name": name,
         "summary": "rounding pi",
@@ -16,7 +16,7 @@ def knob(name: str = "digits", **changes: object) -> Knob:
         "run": lambda digits: torch.tensor(round(torch.pi, digits), dtype=torch.float64),
         "error": lambda result, reference: float((result - reference).abs()),
     }
-    return Knob(**{**values, **changes})
+    return ApproximationSetting(**{**values, **changes})
 
 
 def test_keeps_registration_order() -> None:

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from diff4splat.error_time import render_knobs
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.error_time.render_knobs import Arithmetic, Dilation, averaged_picture
 from diff4splat.error_time.scene_knobs import rmse
 from diff4splat.error_time.sweep import sweep
@@ -30,7 +30,7 @@ def _few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(render_knobs, "SIZE_PX", (48, 64))
 
 
-def errors_of(knob: Knob) -> list[float]:
+def errors_of(knob: ApproximationSetting) -> list[float]:
     return [row.error for row in sweep(knob, 1).rows]
 
 

@@ -6,7 +6,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diff4splat.error_time.knobs import Knob
+from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.error_time.sweep import Measurement, SweepResult, steps_of, sweep
 from diff4splat.errors import ConfigError
 
@@ -27,8 +27,8 @@ class Laboratory:
         return self.now
 
 
-def knob(run: Callable, settings: tuple, reference: object = 0) -> Knob:
-    return Knob(
+def knob(run: Callable, settings: tuple, reference: object = 0) -> ApproximationSetting:
+    return ApproximationSetting(
         name="toy",
         summary="something",
         error_unit="distance",
@@ -74,7 +74,7 @@ def test_a_result_with_nan_is_as_wrong_as_can_be() -> None:
 
 
 def test_labels_and_series_come_from_the_knob() -> None:
-    made = Knob(
+    made = ApproximationSetting(
         name="toy",
         summary="something",
         error_unit="distance",

@@ -13,14 +13,14 @@ from PIL import Image
 
 from diff4splat.cli.evaluate import Evaluate
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.evaluation.protocol_json import (
+from diff4splat.evaluation.protocols.protocol_json import (
     LoadedProtocol,
     protocol_json,
     protocol_names,
 )
-from diff4splat.evaluation.sample import make_case
-from diff4splat.evaluation.sources import ListedClips
-from diff4splat.evaluation.systems import Generator
+from diff4splat.evaluation.protocols.sample import make_sample
+from diff4splat.evaluation.protocols.sources import ListedClips
+from diff4splat.evaluation.systems.evaluated_system import Generator
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 
@@ -42,7 +42,7 @@ def clips(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ray-cast clips instead of worlds, which take seconds each."""
     made = [make_clip(FRAMES, SIZE, seed=seed, tracks=64) for seed in range(2)]
     opening = SimpleNamespace(open_clips=lambda loaded: ListedClips(made))
-    monkeypatch.setitem(sys.modules, "diff4splat.evaluation.datasets", opening)
+    monkeypatch.setitem(sys.modules, "diff4splat.evaluation.protocols.datasets", opening)
 
 
 def test_an_untrained_model_is_measured_and_marked(
@@ -90,7 +90,9 @@ def test_reconstruction_sees_the_whole_input_video(
         seen.append((clip.frames, len(clip.views)))
         return wall_and_patch()
 
-    monkeypatch.setattr("diff4splat.evaluation.systems.reconstruct_clip", reconstruct_clip)
+    monkeypatch.setattr(
+        "diff4splat.evaluation.systems.evaluated_system.reconstruct_clip", reconstruct_clip
+    )
     Evaluate(
         model="test", protocol=str(protocol_file), task="reconstruction", out=tmp_path / "out"
     ).run()
@@ -107,7 +109,7 @@ def test_another_size_is_asked_of_the_clips_too(
         return ListedClips([make_clip(FRAMES, (16, 16), seed=s, tracks=64) for s in range(2)])
 
     opening = SimpleNamespace(open_clips=clips)
-    monkeypatch.setitem(sys.modules, "diff4splat.evaluation.datasets", opening)
+    monkeypatch.setitem(sys.modules, "diff4splat.evaluation.protocols.datasets", opening)
     out = tmp_path / "out"
     wanted = Evaluate(model="test", protocol=str(protocol_file), size=16, out=out, items=1, steps=1)
     wanted.run()
@@ -146,8 +148,8 @@ def test_the_generator_follows_the_clips_cameras_and_caption(
     monkeypatch.setattr(Diff4SplatPipeline, "__call__", listen)
     pipeline = Diff4SplatPipeline.from_pretrained("test")
     tiny = tiny_protocol(2)
-    case = make_case(make_clip(FRAMES, SIZE), replace(tiny, size_px=SIZE), "generation")
-    Generator(pipeline=pipeline, settings=GenerationSettings(steps=2)).answer(case, 7)
+    case = make_sample(make_clip(FRAMES, SIZE), replace(tiny, size_px=SIZE), "generation")
+    Generator(pipeline=pipeline, settings=GenerationSettings(steps=2)).predict(case, 7)
     image, path, prompt, seed = told[0]
     assert (prompt, seed) == ("a box and a ball before a wall", 7)
     assert image.rgb.shape == (*SIZE, 3)

@@ -27,6 +27,7 @@ from diff4splat.scene.motion.hexplane.planes import HexPlaneSize
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 
+pytestmark = pytest.mark.usefixtures("module_as_shipped")
 SETTINGS = FitSettings(
     coarse_steps=40,
     fine_steps=80,

@@ -18,8 +18,8 @@ from oracles_flow import (
 )
 
 from diff4splat.errors import ConfigError, ShapeError
+from diff4splat.flow.analytic_mixture import GaussianMixture, random_mixture
 from diff4splat.flow.levels import log_snr_levels, make_levels, uniform_levels
-from diff4splat.flow.mixture import GaussianMixture, random_mixture
 from diff4splat.flow.samplers import SAMPLERS, Sampler, find_sampler, integrate
 
 samplers = pytest.mark.parametrize("sampler", SAMPLERS.values(), ids=SAMPLERS)
@@ -69,22 +69,23 @@ def test_reaches_its_order_on_gaussian_data(sampler: Sampler, std: float) -> Non
 
 
 @samplers
-@pytest.mark.parametrize("steps", [1, 2, 7])
 @pytest.mark.parametrize("schedule", ["uniform", "log_snr"])
-def test_a_straight_path_is_exact(sampler: Sampler, steps: int, schedule: str) -> None:
+def test_a_straight_path_is_exact(sampler: Sampler, schedule: str) -> None:
     clean, noise = seeded_normal(2, 3, 4), seeded_normal(2, 3, 4, seed=1)
-    got = integrate(sampler, lambda x, level: noise - clean, noise, make_levels(schedule, steps))
-    torch.testing.assert_close(got, clean, rtol=0, atol=1e-12)
+    for steps in (1, 2, 7):
+        levels = make_levels(schedule, steps)
+        got = integrate(sampler, lambda x, level: noise - clean, noise, levels)
+        torch.testing.assert_close(got, clean, rtol=0, atol=1e-12)
 
 
 @samplers
-@pytest.mark.parametrize("steps", [1, 2, 9])
 @pytest.mark.parametrize("schedule", ["uniform", "log_snr"])
-def test_data_in_one_point_is_exact(sampler: Sampler, steps: int, schedule: str) -> None:
+def test_data_in_one_point_is_exact(sampler: Sampler, schedule: str) -> None:
     point, start = seeded_normal(1, 3), seeded_normal(1, 3, seed=1)
-    levels = make_levels(schedule, steps, shift=3.0)
-    got = integrate(sampler, lambda x, level: (x - point) / level, start, levels)
-    torch.testing.assert_close(got, point, rtol=0, atol=1e-10)
+    for steps in (1, 2, 9):
+        levels = make_levels(schedule, steps, shift=3.0)
+        got = integrate(sampler, lambda x, level: (x - point) / level, start, levels)
+        torch.testing.assert_close(got, point, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("steps", [2, 5])

@@ -12,7 +12,7 @@ from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
-from diff4splat.io.scene_file import load_scene, save_scene
+from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -101,7 +101,7 @@ def test_gaussians_that_hardly_move_store_no_keys(
     trimmed = pipeline(picture, "forward", settings=generous, log=log)
     strict = pipeline(picture, "forward", settings=replace(QUICK, still_px=0.0))
     assert len(trimmed.motion.moving_index) < len(strict.motion.moving_index)
-    assert "key times of still Gaussians" in {omission.what for omission in log.omissions}
+    assert "key times of still Gaussians" in {omission.what for omission in log.skipped}
 
 
 def test_a_prompt_changes_the_scene_and_builds_the_text_encoder(
@@ -113,8 +113,8 @@ def test_a_prompt_changes_the_scene_and_builds_the_text_encoder(
     plain = pipeline(picture, "arc", settings=QUICK, log=plain_log)
     told = pipeline(picture, "arc", "a red ball rolls", settings=QUICK, log=log)
     assert not torch.equal(plain.gaussians.sh[:50], told.gaussians.sh[:50])
-    assert "text encoder" in {omission.what for omission in plain_log.omissions}
-    assert "text encoder" not in {omission.what for omission in log.omissions}
+    assert "text encoder" in {omission.what for omission in plain_log.skipped}
+    assert "text encoder" not in {omission.what for omission in log.skipped}
     assert told.provenance.prompt == "a red ball rolls"
 
 
@@ -168,7 +168,7 @@ def test_models_that_cannot_be_had_are_refused() -> None:
 def test_a_single_camera_and_a_file_name_are_enough(
     pipeline: Diff4SplatPipeline, picture: InputImage, tmp_path: Path
 ) -> None:
-    from diff4splat.io.images import write_png
+    from diff4splat.io.photos.images import write_png
 
     write_png(torch.rand(40, 60, 3), tmp_path / "photo.png")
     scene = pipeline(tmp_path / "photo.png", "static", settings=QUICK)

@@ -7,25 +7,23 @@ import torch
 
 from diff4splat.errors import ConfigError
 from diff4splat.generation.static_pruning import (
+    deformation_threshold_px,
     largest_displacement_px,
     prune_static_tracks,
-    static_threshold_px,
 )
 from diff4splat.geometry import quaternion
-from diff4splat.geometry.camera import Camera, pinhole, project
+from diff4splat.geometry.camera import pinhole, project
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.static import StaticMotion
-from diff4splat.scene.scene import Provenance, Scene
 
 COUNT = 200
 CAMERA = pinhole(200.0, (200, 200))
 
 
-def moving_scene(strength: float) -> Scene:
+def moving_set(strength: float) -> tuple[Gaussians, KeyframeMotion]:
     """Gaussians of many sizes and depths whose motions differ by five orders of magnitude."""
     share = torch.logspace(-5, 0, COUNT)[None, :, None] * strength
     small_turns = torch.cat([torch.ones(3, COUNT, 1), share * torch.randn(3, COUNT, 3)], -1)
@@ -43,10 +41,7 @@ def moving_scene(strength: float) -> Scene:
         rotations=quaternion.normalize(small_turns),
         log_scale_offsets=share * torch.randn(3, COUNT, 3),
     )
-    path = CameraPath(cameras=CAMERA.with_pose(torch.eye(4)[None]), times_s=torch.zeros(1))
-    return Scene(
-        gaussians=gaussians, motion=motion, path=path, provenance=Provenance(generator="test")
-    )
+    return gaussians, motion
 
 
 def rims(gaussians: Gaussians) -> torch.Tensor:
@@ -56,74 +51,72 @@ def rims(gaussians: Gaussians) -> torch.Tensor:
     return torch.cat([gaussians.means + ends, gaussians.means - ends])
 
 
-def moved_px(scene: Scene, camera: Camera) -> torch.Tensor:
-    """How far the centre and the rim of each Gaussian really go on the picture, at any key."""
+def displacement_px(gaussians: Gaussians, motion: KeyframeMotion) -> torch.Tensor:
+    """How far centre and rim of each Gaussian move in the image, over all keys."""
     farthest = torch.zeros(COUNT)
-    before = rims(scene.gaussians)
+    before = rims(gaussians)
+    focal_per_depth = CAMERA.focal_px.max() / gaussians.means[:, 2]
     for time_s in (0.0, 1.0, 2.0):
-        after = rims(scene.state_at(time_s))
-        focal_per_depth = camera.focal_px.max() / scene.gaussians.means[:, 2]
+        after = rims(motion.state_at(gaussians, time_s))
         farthest = torch.maximum(farthest, (after - before).norm(dim=-1).amax(0) * focal_per_depth)
     return farthest
 
 
 @pytest.mark.parametrize("strength", [0.1, 1.0])
 def test_the_bound_holds_and_is_not_wasteful(strength: float) -> None:
-    scene = moving_scene(strength)
-    bound, real = largest_displacement_px(scene, CAMERA), moved_px(scene, CAMERA)
+    gaussians, motion = moving_set(strength)
+    bound = largest_displacement_px(gaussians, motion, CAMERA)
+    real = displacement_px(gaussians, motion)
     assert bool((bound >= real * 0.999).all())
     assert float((bound / real).median()) < 5
 
 
-def test_what_is_dropped_moved_by_less_than_promised() -> None:
-    scene, log = moving_scene(1.0), RunLog()
-    trimmed = prune_static_tracks(scene, CAMERA, 0.5, log)
+def test_dropped_tracks_moved_by_at_most_the_threshold() -> None:
+    gaussians, motion = moving_set(1.0)
+    log = RunLog()
+    pruned = prune_static_tracks(gaussians, motion, CAMERA, 0.5, log)
     dropped = torch.ones(COUNT, dtype=torch.bool)
-    dropped[trimmed.motion.moving_index] = False
+    dropped[pruned.moving_index] = False
     assert 20 < int(dropped.sum()) < COUNT - 20
-    assert float(moved_px(scene, CAMERA)[dropped].max()) <= 0.5
-    (omission,) = log.omissions
+    assert float(displacement_px(gaussians, motion)[dropped].max()) <= 0.5
+    (omission,) = log.skipped
     assert omission.error == 0.5
-    pixels, _ = project(CAMERA, trimmed.state_at(1.0).means[dropped])
-    torch.testing.assert_close(pixels, project(CAMERA, scene.gaussians.means[dropped])[0])
+    pixels, _ = project(CAMERA, pruned.state_at(gaussians, 1.0).means[dropped])
+    torch.testing.assert_close(pixels, project(CAMERA, gaussians.means[dropped])[0])
 
 
-def test_nothing_left_to_move_is_a_static_motion_and_nothing_to_drop_is_the_same_scene() -> None:
-    scene = moving_scene(1.0)
-    assert isinstance(prune_static_tracks(scene, CAMERA, 1e9, RunLog()).motion, StaticMotion)
-    busy = replace(scene, motion=moving_scene(50.0).motion)
-    tiny = prune_static_tracks(busy, CAMERA, 0.0, RunLog())
-    assert tiny is busy
-    still = replace(scene, motion=StaticMotion())
-    assert prune_static_tracks(still, CAMERA, 1.0, RunLog()) is still
+def test_without_any_track_the_motion_is_static_and_with_all_it_is_the_same() -> None:
+    gaussians, motion = moving_set(1.0)
+    pruned = prune_static_tracks(gaussians, motion, CAMERA, 1e9, RunLog())
+    assert isinstance(pruned, StaticMotion) and pruned.time_range_s == (0.0, 2.0)
+    busy = moving_set(50.0)[1]
+    assert prune_static_tracks(gaussians, busy, CAMERA, 0.0, RunLog()) is busy
+    still = StaticMotion()
+    assert prune_static_tracks(gaussians, still, CAMERA, 1.0, RunLog()) is still
 
 
 def test_gaussians_behind_the_camera_and_nan_keep_their_tracks() -> None:
-    scene = moving_scene(1.0)
-    behind = scene.gaussians.means.clone()
+    gaussians, motion = moving_set(1.0)
+    behind, offsets = gaussians.means.clone(), motion.offsets.clone()
     behind[:, 2] = -1
-    offsets = scene.motion.offsets.clone()
     offsets[0, 0, 0] = float("nan")
-    odd = replace(
-        scene,
-        gaussians=replace(scene.gaussians, means=behind),
-        motion=replace(scene.motion, offsets=offsets),
-    )
-    assert 0 in prune_static_tracks(odd, CAMERA, 0.05, RunLog()).motion.moving_index.tolist()
+    gaussians, motion = replace(gaussians, means=behind), replace(motion, offsets=offsets)
+    assert 0 in prune_static_tracks(gaussians, motion, CAMERA, 0.05, RunLog()).moving_index.tolist()
 
 
 @pytest.mark.parametrize(
-    ("noise_px", "asked_px", "want_px"), [(0.0, 0.1, 0.1), (2.0, 0.1, 8.0), (2.0, 9.0, 9.0)]
+    ("of_model", "asked", "expected"), [(0.0, 0.1, 0.1), (2.0, 0.1, 8.0), (2.0, 9.0, 9.0)]
 )
-def test_what_a_model_cannot_tell_from_nothing_stands_still(
-    noise_px: float, asked_px: float, want_px: float
+def test_the_threshold_of_a_model_counts_in_pixels_of_its_size(
+    of_model: float, asked: float, expected: float
 ) -> None:
     config = tiny_size()
-    config = replace(config, deformation=replace(config.deformation, noise_px=noise_px))
+    deformation = replace(config.deformation, static_threshold_px=of_model)
+    config = replace(config, deformation=deformation)
     camera = pinhole(100.0, (64, 4 * config.size_px[1]))
-    assert static_threshold_px(config, camera, asked_px) == want_px
+    assert deformation_threshold_px(config, camera, asked) == expected
 
 
-def test_noise_must_be_a_number_of_pixels() -> None:
-    with pytest.raises(ConfigError, match="noise_px: expected a number from 0 on, got -1"):
-        replace(tiny_size().deformation, noise_px=-1.0)
+def test_a_threshold_must_be_a_number_of_pixels() -> None:
+    with pytest.raises(ConfigError, match="static_threshold_px: expected a number from 0 on"):
+        replace(tiny_size().deformation, static_threshold_px=-1.0)

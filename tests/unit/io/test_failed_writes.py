@@ -15,9 +15,9 @@ import torch
 from diff4splat.errors import OutputError
 from diff4splat.io import exr
 from diff4splat.io.exr import write_depth_exr
-from diff4splat.io.images import write_png
-from diff4splat.io.ply import write_ply, write_ply_sequence
-from diff4splat.io.scene_file import save_scene
+from diff4splat.io.photos.images import write_png
+from diff4splat.io.ply.ply_file import write_ply, write_ply_sequence
+from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.io.video import write_video
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
@@ -117,7 +117,9 @@ def test_trouble_in_the_middle_of_the_bytes(
 
 def test_trouble_in_the_middle_of_a_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a").write_text("precious")
-    monkeypatch.setattr("diff4splat.io.tensor_file._header", raising(KeyboardInterrupt()))
+    monkeypatch.setattr(
+        "diff4splat.io.scene_files.tensor_file._header", raising(KeyboardInterrupt())
+    )
     with pytest.raises(KeyboardInterrupt):
         save_scene(oracles_io.scene(), tmp_path / "a")
     assert_untouched(tmp_path / "a")

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from diff4splat.errors import FileFormatError, InputError
-from diff4splat.io.existing import require_file
-from diff4splat.io.images import read_photo, write_png
+from diff4splat.io.photos.images import read_photo, write_png
 from diff4splat.io.pixels import from_bytes, to_bytes
-from diff4splat.io.quiet import native_stderr_silenced
+from diff4splat.io.require_file import require_file
+from diff4splat.io.silence_stderr import silence_native_stderr
 
 
 def test_every_level_survives() -> None:
@@ -48,9 +48,9 @@ def test_png_is_exact_and_always_the_same(tmp_path: Path) -> None:
 
 def test_native_messages_are_silenced_only_inside(capfd: pytest.CaptureFixture[str]) -> None:
     os.write(2, b"before ")
-    with native_stderr_silenced():
+    with silence_native_stderr():
         os.write(2, b"inside ")
-    with pytest.raises(ValueError, match="x"), native_stderr_silenced():
+    with pytest.raises(ValueError, match="x"), silence_native_stderr():
         raise ValueError("x")
     os.write(2, b"after")
     assert capfd.readouterr().err == "before after"
@@ -60,7 +60,7 @@ def test_silence_where_there_is_no_stderr_at_all() -> None:
     kept = os.dup(2)
     try:
         os.close(2)
-        with native_stderr_silenced():
+        with silence_native_stderr():
             entered = True
     finally:
         os.dup2(kept, 2)

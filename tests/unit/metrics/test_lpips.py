@@ -5,19 +5,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diff4splat.errors import ShapeError
+from diff4splat.metrics.features.backbones import ALEXNET, VGG16, Backbone, Convolution, MaxPool
 from diff4splat.metrics.features.lpips import Lpips
 from diff4splat.metrics.features.lpips_weights import expected_shapes
-from diff4splat.metrics.features.trunks import ALEXNET, VGG16, Convolution, MaxPool, Trunk
 
 F64 = torch.float64
-TINY = Trunk(
+TINY = Backbone(
     name="tiny",
     slices=((Convolution(0, 3, 4),), (MaxPool(2), Convolution(3, 4, 2))),
     least_px=2,
 )
 
 
-def random_weights(trunk: Trunk, dtype: torch.dtype = F64) -> dict[str, torch.Tensor]:
+def random_weights(trunk: Backbone, dtype: torch.dtype = F64) -> dict[str, torch.Tensor]:
     """Of the size that keeps activations near 1; heads above 0, as the published ones."""
     weights = {}
     for key, shape in expected_shapes(trunk).items():

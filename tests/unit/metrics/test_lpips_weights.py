@@ -7,11 +7,11 @@ import torch
 from safetensors.torch import save_file
 
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError
+from diff4splat.metrics.features.backbones import ALEXNET, VGG16
 from diff4splat.metrics.features.gradient_pyramid import GradientPyramidFeatures
 from diff4splat.metrics.features.load import load_features
 from diff4splat.metrics.features.lpips_weights import expected_shapes
 from diff4splat.metrics.features.protocol import PerceptualFeatures
-from diff4splat.metrics.features.trunks import ALEXNET, VGG16
 
 Weights = dict[str, torch.Tensor]
 

@@ -13,13 +13,13 @@ from diff4splat.geometry.lenses.build import equirectangular_camera, fisheye_cam
 from diff4splat.geometry.lenses.equirectangular import Equirectangular
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
-from diff4splat.io.camera_record import read_camera_record
+from diff4splat.io.cameras.camera_record import read_camera_record
 from diff4splat.io.exr import read_depth_exr
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.outputs.camera_dataset import writer
 from diff4splat.outputs.camera_dataset.sequences import EFFECTS, EffectChoice, effect_sequences
 from diff4splat.outputs.camera_dataset.writer import DatasetJob, write_camera_dataset
-from diff4splat.outputs.photographs import geometry_kind, needs_rays
+from diff4splat.outputs.photo_sequence import geometry_kind, needs_rays
 from diff4splat.paths.physical_path import PhysicalPath, filmed
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
@@ -85,14 +85,14 @@ def test_the_same_pictures_come_of_what_the_file_says(
     for index, taken in enumerate(own.frames):
         photo = photograph(
             scene,
-            own.filmed.camera(index),
-            own.filmed.time_s(index),
+            own.physical_path.camera(index),
+            own.physical_path.time_s(index),
             outputs=("rgb", own.geometry),
             settings=own.settings,
         )
         write_png(photo.rgb, tmp_path / "again.png")
         again = (tmp_path / "again.png").read_bytes()
-        assert again == (folder / name / taken.picture).read_bytes()
+        assert again == (folder / name / taken.image).read_bytes()
         depth, _ = read_depth_exr(folder / name / taken.geometry)
         assert torch.equal(depth[0], photo.depth)
 
@@ -101,12 +101,12 @@ def test_the_file_holds_the_cameras_that_were_asked_for(folder: Path) -> None:
     asked = effect_sequences(choice(filmed_scene()))
     for name, want in asked.items():
         own = read_camera_record(folder / name / "camera.json")
-        assert torch.equal(own.filmed.path.times_s, want.path.times_s)
-        assert torch.equal(own.filmed.track.world_from_camera, want.track.world_from_camera)
-        assert torch.equal(own.filmed.path.cameras.focal_px, want.path.cameras.focal_px)
-        assert own.filmed.optics.aperture == want.optics.aperture
-        assert own.filmed.optics.shutter == want.optics.shutter
-        assert own.filmed.optics.exposure_s == want.optics.exposure_s
+        assert torch.equal(own.physical_path.path.times_s, want.path.times_s)
+        assert torch.equal(own.physical_path.track.world_from_camera, want.track.world_from_camera)
+        assert torch.equal(own.physical_path.path.cameras.focal_px, want.path.cameras.focal_px)
+        assert own.physical_path.optics.aperture == want.optics.aperture
+        assert own.physical_path.optics.shutter == want.optics.shutter
+        assert own.physical_path.optics.exposure_s == want.optics.exposure_s
     combined = asked["combined"].optics
     assert None not in (combined.aperture, combined.shutter)
     assert combined.exposure_s > 0

@@ -63,9 +63,9 @@ def test_an_orbit_in_words() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(PRESETS) - {"orbit"}))
-@pytest.mark.parametrize("frames", [1, 2, 6, 7, 9, 41])
-def test_presets_at_their_defaults_warn_of_nothing(name: str, frames: int) -> None:
-    assert summarize(_built(name, frames), near_depth=2.0).warnings == ()
+def test_presets_at_their_defaults_warn_of_nothing(name: str) -> None:
+    for frames in (1, 2, 6, 7, 9, 41):
+        assert summarize(_built(name, frames), near_depth=2.0).warnings == ()
 
 
 def test_one_frame() -> None:

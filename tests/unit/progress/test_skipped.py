@@ -4,7 +4,7 @@ import math
 import pytest
 
 from diff4splat.errors import ConfigError
-from diff4splat.progress.skipped import Omissions, SkippedWork
+from diff4splat.progress.skipped import SkippedWork, SkippedWorkList
 
 TEXT = SkippedWork(what="text encoder", why="no prompt given", saved="12,345 parameters")
 MOTION = SkippedWork(what="deformation", why="nothing moves", saved="49 evaluations", error=2.5e-4)
@@ -16,7 +16,7 @@ def test_reads_as_one_line() -> None:
 
 
 def test_keeps_the_order_and_counts_repeats_once() -> None:
-    omissions = Omissions()
+    omissions = SkippedWorkList()
     for record in (MOTION, TEXT, MOTION):
         omissions.add(record)
     assert list(omissions) == [MOTION, TEXT]
@@ -24,7 +24,7 @@ def test_keeps_the_order_and_counts_repeats_once() -> None:
 
 
 def test_survives_json() -> None:
-    omissions = Omissions()
+    omissions = SkippedWorkList()
     omissions.add(MOTION)
     assert json.loads(json.dumps(omissions.to_json())) == [
         {
@@ -34,12 +34,12 @@ def test_survives_json() -> None:
             "error": 2.5e-4,
         }
     ]
-    assert Omissions().to_json() == []
+    assert SkippedWorkList().to_json() == []
 
 
 def test_collections_are_independent() -> None:
-    Omissions().add(TEXT)
-    assert len(Omissions()) == 0
+    SkippedWorkList().add(TEXT)
+    assert len(SkippedWorkList()) == 0
 
 
 @pytest.mark.parametrize("error", [-1.0, math.nan, math.inf])

@@ -267,12 +267,14 @@ def picky(monkeypatch: pytest.MonkeyPatch) -> RenderOutput:
     """A back end before all others that only does float32; what it answers."""
     answer = RenderOutput(dropped_nonfinite=7)
 
-    def refusal(job: object) -> str | None:
+    def unsupported_reason(job: object) -> str | None:
         dtype = job.gaussians.means.dtype
         return None if dtype == torch.float32 else f"expected float32, got {dtype}"
 
     monkeypatch.setitem(
-        sys.modules, "picky", SimpleNamespace(refusal=refusal, render=lambda job: answer)
+        sys.modules,
+        "picky",
+        SimpleNamespace(unsupported_reason=unsupported_reason, render=lambda job: answer),
     )
     monkeypatch.setattr(backends, "BACKENDS", {"picky": "picky", **backends.BACKENDS})
     return answer

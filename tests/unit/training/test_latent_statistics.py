@@ -8,7 +8,7 @@ import torch
 from clip_shards import reading, write_shards
 
 from diff4splat.errors import CheckpointError, FileFormatError, InputError
-from diff4splat.io.tensor_file import TensorFile, write_tensors
+from diff4splat.io.scene_files.tensor_file import TensorFile, write_tensors
 from diff4splat.models.factory import create_networks
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.training.batches.samples import ClipSamples

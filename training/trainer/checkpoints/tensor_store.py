@@ -88,7 +88,7 @@ def _storable(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 @contextmanager
 def _alone_is_fine() -> Iterator[None]:
-    """DCP warns when there is one process, even if told so."""
+    """DCP warns with a single process, even when asked not to."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="torch.distributed is disabled", module="torch")
         yield

@@ -8,7 +8,7 @@ from typing import Any
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.io.images import write_png
+from diff4splat.io.photos.images import write_png
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.trainer.logs.run_files import PANELS, TENSORBOARD, EventLog, finite
 from diff4splat.training.trainer.logs.tensorboard_logger import TensorboardLogger

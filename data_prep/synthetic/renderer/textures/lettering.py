@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.renderer.compiled import shared
 from diff4splat.data_prep.synthetic.renderer.numerics import blend, clamp, clamped, fading
 from diff4splat.data_prep.synthetic.renderer.textures.noise import flat_octaves, fraction, hashed
+from diff4splat.kernels.jit import shared
 
 _LETTERS = """
 01110 10001 10001 11111 10001 10001 10001  11110 10001 10001 11110 10001 10001 11110

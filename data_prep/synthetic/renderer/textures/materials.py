@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.renderer.compiled import shared
 from diff4splat.data_prep.synthetic.renderer.textures import natural_noise as natural
 from diff4splat.data_prep.synthetic.renderer.textures import regular as made
 from diff4splat.data_prep.synthetic.renderer.textures.lettering import lettering
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import TriangleBuffer
 from diff4splat.data_prep.synthetic.world import Texture
 from diff4splat.errors import ConfigError
+from diff4splat.kernels.jit import shared
 
 FAMILIES = (
     "plain", "noise", "wood", "brick", "checker", "leaves", "fabric", "marble", "lettering",

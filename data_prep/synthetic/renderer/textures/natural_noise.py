@@ -6,7 +6,6 @@ Every function takes a point and the footprint of a sample, both in features, an
 
 import math
 
-from diff4splat.data_prep.synthetic.renderer.compiled import shared
 from diff4splat.data_prep.synthetic.renderer.numerics import clamp, fading, ramp, step, wave
 from diff4splat.data_prep.synthetic.renderer.textures.noise import (
     cells,
@@ -17,6 +16,7 @@ from diff4splat.data_prep.synthetic.renderer.textures.noise import (
     noise,
     octaves,
 )
+from diff4splat.kernels.jit import shared
 
 
 @shared

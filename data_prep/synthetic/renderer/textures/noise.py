@@ -7,8 +7,8 @@ that fall like 1/f (Field 1987): octaves of equal strength.
 
 import math
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, shared
 from diff4splat.data_prep.synthetic.renderer.numerics import clamp, clamped
+from diff4splat.kernels.jit import inlined, shared
 
 _X, _Y, _Z = 0x1E3779B97F4A7C15, 0x42B2AE3D27D4EB4F, 0x165667B19E3779F9
 _MIX, _AGAIN = 0x3F58476D1CE4E5B9, 0x14D049BB133111EB

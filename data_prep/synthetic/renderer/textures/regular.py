@@ -6,9 +6,9 @@ Every function takes a point and the footprint of a sample, both in features, an
 
 import math
 
-from diff4splat.data_prep.synthetic.renderer.compiled import inlined, shared
 from diff4splat.data_prep.synthetic.renderer.numerics import clamp, clamped, fading, step, wave
 from diff4splat.data_prep.synthetic.renderer.textures.noise import flat_octaves, fraction, hashed
+from diff4splat.kernels.jit import inlined, shared
 
 
 @inlined

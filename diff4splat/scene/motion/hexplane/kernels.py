@@ -15,8 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diff4splat.scene.motion.hexplane.jit import device, kernel
-from diff4splat.scene.motion.hexplane.lanes import load, store, total, zeros
+from diff4splat.kernels.jit import contracted
+from diff4splat.kernels.simd16 import fill, total
+from diff4splat.kernels.simd_memory import load, store
+from diff4splat.scene.motion.hexplane.jit import kernel
 
 Floats = NDArray[np.float32]
 
@@ -52,7 +54,7 @@ class Shape(NamedTuple):
     """Where the first channel is written."""
 
 
-@device
+@contracted
 def _place(unit, nodes):
     """Lower node, step to the upper one, its weight, and how fast the point moves the weight."""
     last = np.float32(nodes - 1)
@@ -64,7 +66,7 @@ def _place(unit, nodes):
     return lower, min(1, nodes - 1), position - np.float32(lower), last if inside else np.float32(0)
 
 
-@device
+@contracted
 def _corners(plane, start, right, down, column, row):
     """Value at a place, and its slopes along columns and rows."""
     a, c = load(plane, start), load(plane, start + down)
@@ -73,7 +75,7 @@ def _corners(plane, start, right, down, column, row):
     return low + (high - low) * row, top + (bottom - top) * row, high - low
 
 
-@device
+@contracted
 def _ends(line, start, right, weight):
     """Value at a place, and its slope."""
     a = load(line, start)
@@ -81,12 +83,12 @@ def _ends(line, start, right, weight):
     return a + slope * weight, slope
 
 
-@device
+@contracted
 def _add(array, place, value):
     store(array, place, load(array, place) + value)
 
 
-@device
+@contracted
 def _add_corners(plane, start, right, down, column, row, value):
     below = value * row
     above = value - below
@@ -96,13 +98,13 @@ def _add_corners(plane, start, right, down, column, row, value):
     _add(plane, start + down + right, below * column)
 
 
-@device
+@contracted
 def _add_ends(line, start, right, weight, value):
     _add(line, start, value - value * weight)
     _add(line, start + right, value * weight)
 
 
-@device
+@contracted
 def _slope(values, scale):
     # Not only a product: a point that is no number lies on no slope.
     return total(values) * scale if scale > 0 else np.float32(0)
@@ -149,8 +151,8 @@ def accumulate(unit, planes, shape, incoming, out, to_unit):
         xy, xy_x, xy_y = _corners(planes.xy, at_xy, right_x, down_xy, wx, wy)
         xz, xz_x, xz_z = _corners(planes.xz, at_xz, right_x, down_xz, wx, wz)
         yz, yz_y, yz_z = _corners(planes.yz, at_yz, right_y, down_yz, wy, wz)
-        still, moved = xy * xz * yz, zeros()
-        to_x, to_y, to_z = zeros(), zeros(), zeros()
+        still, moved = xy * xz * yz, fill(np.float32(0))
+        to_x, to_y, to_z = fill(np.float32(0)), fill(np.float32(0)), fill(np.float32(0))
         for time in range(shape.times):
             line_x, line_y = time * wide_x + at_x, time * wide_y + at_y
             line_z = time * wide_z + at_z

@@ -32,7 +32,7 @@ def features(
     """Concatenated features of all levels; ``unit`` and ``rows`` run from 0 to 1 over the nodes."""
     tables = [table for level in levels for table in at_times(level, rows)]
     if _compiles(unit, tables):
-        from diff4splat.scene.motion.hexplane import compiled
+        from diff4splat.scene.motion.hexplane import compiled_features as compiled
 
         return compiled.features(unit, tables)
     return plain_features(unit, tables)

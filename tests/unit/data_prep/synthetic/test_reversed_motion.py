@@ -9,6 +9,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diff4splat.captions.grammar import parse_caption
+from diff4splat.captions.vocabulary import OPPOSITE
 from diff4splat.data_prep.synthetic.actors import (
     REVERSED_SHARES,
     camera_direction,
@@ -16,8 +18,6 @@ from diff4splat.data_prep.synthetic.actors import (
     freeze,
     reversed_motion,
 )
-from diff4splat.data_prep.synthetic.captions.grammar import parse_caption
-from diff4splat.data_prep.synthetic.captions.vocabulary import OPPOSITE
 from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
 from diff4splat.data_prep.synthetic.layout.props import shape_of_size
 from diff4splat.data_prep.synthetic.motions.context import PartPositions
@@ -134,8 +134,8 @@ def test_in_frozen_worlds_nothing_moves_and_the_caption_says_so(index: int) -> N
     assert not any(note.motion for note in world.note.objects)
     facts = parse_caption(world.note.caption)
     assert not facts.events and "nothing moves" in world.note.caption
-    told = {event.thing for event in parse_caption(plain.note.caption).events}
-    assert set(facts.standing) & told
+    told = {event.subject for event in parse_caption(plain.note.caption).events}
+    assert set(facts.static_objects) & told
 
 
 def test_frozen_things_stand_as_the_first_frame_shows_them() -> None:

@@ -6,6 +6,7 @@ from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.facets import box, ear_clipped, extruded
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.shapes.revolve import ball, rod, superquadric
+from diff4splat.data_prep.synthetic.shapes.shape import Shape
 from diff4splat.data_prep.synthetic.shapes.surface import Surface, signed_volume, vertex_normals
 from diff4splat.data_prep.synthetic.shapes.sweep import lump, torus, tube
 
@@ -27,9 +28,12 @@ def edge_balance(piece: Surface) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-@pytest.mark.parametrize("seed", [0, 1])
-def test_every_family_is_well_made(name: str, seed: int) -> None:
-    shape = FAMILIES[name].make(Rng("shape", seed)).of_height(1.0)
+def test_every_family_is_well_made(name: str) -> None:
+    for seed in range(2):
+        assert_well_made(FAMILIES[name].make(Rng("shape", seed)).of_height(1.0))
+
+
+def assert_well_made(shape: Shape) -> None:
     assert shape.height == pytest.approx(1.0)
     assert shape.bounds[1][1] == pytest.approx(0.0, abs=1e-9)
     assert 0.1 < shape.radius < 8
@@ -45,11 +49,14 @@ def test_every_family_is_well_made(name: str, seed: int) -> None:
             assert signed_volume(piece) > 0
 
 
-@pytest.mark.parametrize("name", sorted(set(FAMILIES) - {"flag", "towel", "banner"}))
-def test_bodies_are_closed_and_consistent(name: str) -> None:
-    for part in FAMILIES[name].make(Rng("closed")).parts:
-        if part.role not in OPEN_ROLES:
-            assert edge_balance(part.surface)[0] == 0, part.role
+def test_bodies_are_closed_and_consistent() -> None:
+    leaking = [
+        (name, part.role)
+        for name in FAMILIES.keys() - {"flag", "towel", "banner"}
+        for part in FAMILIES[name].make(Rng("closed")).parts
+        if part.role not in OPEN_ROLES and edge_balance(part.surface)[0] != 0
+    ]
+    assert not leaking
 
 
 def test_no_triangle_is_degenerate() -> None:

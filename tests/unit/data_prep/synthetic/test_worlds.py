@@ -3,8 +3,8 @@ import pytest
 import torch
 from made_worlds import COUNT, SPLITS, made_world
 
+from diff4splat.captions.grammar import parse_caption
 from diff4splat.data_prep.synthetic.actors import camera_direction
-from diff4splat.data_prep.synthetic.captions.grammar import parse_caption
 from diff4splat.data_prep.synthetic.splits import load_split
 from diff4splat.data_prep.synthetic.world import World, WorldObject
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world

@@ -1,11 +1,13 @@
 """Cameras among the numbers of a fit: they start where the capture says, and stay sound."""
 
 import math
+from functools import cache
 
 import pytest
 import torch
 from traced_fits import photographed, said, scene
 
+from diff4splat.data.capture.capture import Capture
 from diff4splat.errors import ConfigError
 from diff4splat.fitting.optics import coefficients
 from diff4splat.fitting.optics.camera_model import differs_from_pinhole
@@ -26,12 +28,18 @@ EVERYTHING = Optics(
     aperture=Aperture(radius=0.1, focus_distance=2.0),
     shutter=Shutter(readout_s=0.05),
 )
-CAPTURE = photographed(scene(), Optics(lens=FISHEYE))
+
+
+@cache
+def capture() -> Capture:
+    return photographed(scene(), Optics(lens=FISHEYE))
+
+
 NAMES = ("lens", "focus", "aperture", "readout", "focal")
 
 
 def learned(optics: Optics, names: tuple[str, ...]) -> tuple[LearnedOptics, ParameterTable]:
-    parts = LearnedOptics(said(CAPTURE, optics), names)
+    parts = LearnedOptics(said(capture(), optics), names)
     return parts, ParameterTable({"means": torch.zeros(1, 3)}, parts.shared())
 
 
@@ -51,7 +59,7 @@ def test_only_a_camera_that_is_learning_has_gradients():
     parts, table = learned(EVERYTHING, NAMES)
     assert not parts.model(table, learning=False).optics.aperture.radius.requires_grad
     model = parts.model(table)
-    pixel = model.camera(CAPTURE, 0).camera.focal_px.sum()
+    pixel = model.camera(capture(), 0).camera.focal_px.sum()
     total = model.optics.lens.coefficients.sum() + model.optics.shutter.readout_s + pixel
     total.backward()
     assert all(table[name].grad is not None for name in ("camera_lens", "camera_focal"))

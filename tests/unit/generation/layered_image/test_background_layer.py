@@ -1,41 +1,34 @@
-"""The layer behind the pixels of one picture."""
-
-import math
+"""The layer behind the pixels of an image."""
 
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from image_layers import FAR_RANGES, FOCAL_PX, is_finite, random_depth, random_rgb
+from torch import Tensor
 
 from diff4splat.generation.layered_image.background_layer import (
-    AROUND,
     BEHIND,
+    COLOR_SIGMA_PX,
     FOOTPRINT_PX,
-    BackgroundLayer,
+    SAME_SURFACE,
+    WINDOW,
     background_layer,
 )
-from diff4splat.geometry.camera import Camera, project
+from diff4splat.generation.layered_image.gaussians import layer_gaussians
+from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
+from diff4splat.geometry.camera import pinhole
 from diff4splat.render.api import render
-from diff4splat.scene.harmonics import color_from_dc
 
-SIDE = 16
-FOCAL_PX = 20.0
+SIDE, REACH = 16, WINDOW // 2
 
 
-def camera(side: int = SIDE) -> Camera:
-    return Camera(
-        focal_px=torch.full((2,), FOCAL_PX),
-        center_px=torch.full((2,), side / 2),
-        world_from_camera=torch.eye(4),
-        size_px=(side, side),
-    )
+def behind(rgb: Tensor, depth: Tensor, displacement: Tensor | None = None) -> ImageLayer:
+    camera = pinhole(FOCAL_PX, (depth.shape[0], depth.shape[1])).to(depth.dtype)
+    return background_layer(rgb, depth, camera, displacement)
 
 
-def colors(layer: BackgroundLayer) -> torch.Tensor:
-    return color_from_dc(layer.gaussians.sh[:, 0]).view(SIDE, SIDE, 3)
-
-
-def halves() -> tuple[torch.Tensor, torch.Tensor]:
+def halves() -> tuple[Tensor, Tensor]:
     """Red and near on the left, blue and far on the right."""
     depth = torch.full((SIDE, SIDE), 8.0)
     depth[:, : SIDE // 2] = 2.0
@@ -45,80 +38,101 @@ def halves() -> tuple[torch.Tensor, torch.Tensor]:
     return rgb, depth
 
 
-def test_on_one_surface_it_has_the_pixels_colours_behind_them() -> None:
-    rgb, depth = torch.rand(SIDE, SIDE, 3), torch.full((SIDE, SIDE), 3.0)
-    layer = background_layer(rgb, depth, camera())
-    torch.testing.assert_close(colors(layer), rgb, atol=1e-6, rtol=0)
-    pixels, z = project(camera(), layer.gaussians.means)
-    torch.testing.assert_close(z, torch.full_like(z, 3.0 * BEHIND))
-    rows, columns = torch.meshgrid(torch.arange(SIDE), torch.arange(SIDE), indexing="ij")
-    centers = torch.stack([columns, rows], -1).flatten(0, 1) + 0.5
-    torch.testing.assert_close(pixels, centers, atol=1e-4, rtol=0)
-    assert layer.cells.tolist() == list(range(SIDE * SIDE))
-    width = FOOTPRINT_PX * 3.0 * BEHIND / FOCAL_PX
+def oracle(rgb: Tensor, depth: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Colour, depth and whether the pixel lies on the far side, one pixel at a time."""
+    height, width = depth.shape
+    color, far = torch.zeros_like(rgb), torch.zeros_like(depth)
+    holds = torch.zeros(height, width, dtype=torch.bool)
+    for row in range(height):
+        for column in range(width):
+            near = []
+            for down in range(-REACH, REACH + 1):
+                for right in range(-REACH, REACH + 1):
+                    i = min(max(row + down, 0), height - 1)
+                    j = min(max(column + right, 0), width - 1)
+                    near.append((depth[i, j], rgb[i, j], down * down + right * right))
+            far[row, column] = max(z for z, _, _ in near)
+            holds[row, column] = (far[row, column] / depth[row, column]).log() < SAME_SURFACE
+            total, mean = 0.0, torch.zeros(3, dtype=rgb.dtype)
+            for z, value, squared in near:
+                if (far[row, column] / z).log() < SAME_SURFACE:
+                    share = torch.exp(torch.tensor(-squared / (2 * COLOR_SIGMA_PX**2)).double())
+                    total, mean = total + share, mean + share * value
+            color[row, column] = rgb[row, column] if holds[row, column] else mean / total
+    return color, far, holds
+
+
+def test_it_agrees_with_plain_loops() -> None:
+    rgb, depth = random_rgb(6, 8).double(), random_depth(6, 8, (1.0, 2.0)).double()
+    layer, (color, far, holds) = behind(rgb, depth), oracle(rgb, depth)
+    torch.testing.assert_close(layer.rgb, color)
+    torch.testing.assert_close(layer.depth, BEHIND * far)
+    pixels = torch.arange(48).view(6, 8)
+    assert torch.equal(layer.pixel_index, torch.where(holds, pixels, NO_PIXEL))
+    assert bool(holds.any()) and not bool(holds.all())
+
+
+def test_on_one_surface_it_has_the_colours_of_its_pixels() -> None:
+    rgb = random_rgb(SIDE, SIDE)
+    layer = behind(rgb, torch.full((SIDE, SIDE), 3.0))
+    assert torch.equal(layer.rgb, rgb)
+    torch.testing.assert_close(layer.depth, torch.full((SIDE, SIDE), 3.0 * BEHIND))
+    assert layer.pixel_index.flatten().tolist() == list(range(SIDE * SIDE))
+    assert bool(layer.mask.all()) and not layer.in_image
+    scales = layer_gaussians(layer).scales
     torch.testing.assert_close(
-        layer.gaussians.scales, torch.full_like(layer.gaussians.scales, width)
+        scales, torch.full_like(scales, FOOTPRINT_PX * 3 * BEHIND / FOCAL_PX)
     )
 
 
-def test_before_an_edge_it_belongs_to_what_lies_behind_and_stands() -> None:
+def test_in_front_of_an_edge_it_belongs_to_the_far_side_and_is_static() -> None:
     rgb, depth = halves()
-    layer = background_layer(rgb, depth, camera())
-    edge, reach = SIDE // 2, AROUND // 2
-    z = project(camera(), layer.gaussians.means)[1].view(SIDE, SIDE)
-    near, far = z[:, : edge - reach], z[:, edge - reach :]
+    layer = behind(rgb, depth, torch.ones(2, SIDE, SIDE, 3))
+    edge = SIDE // 2
+    near, far = layer.depth[:, : edge - REACH], layer.depth[:, edge - REACH :]
     torch.testing.assert_close(near, torch.full_like(near, 2.0 * BEHIND))
     torch.testing.assert_close(far, torch.full_like(far, 8.0 * BEHIND))
-    blue = torch.tensor([0.0, 0.0, 1.0]).expand(SIDE, SIDE - edge + reach, 3)
-    torch.testing.assert_close(colors(layer)[:, edge - reach :], blue, atol=1e-6, rtol=0)
-    stands = layer.cells.view(SIDE, SIDE) == SIDE * SIDE
-    assert stands[:, edge - reach : edge].all()
-    assert not stands[:, : edge - reach].any() and not stands[:, edge:].any()
+    blue = torch.tensor([0.0, 0.0, 1.0]).expand(SIDE, SIDE - edge + REACH, 3)
+    torch.testing.assert_close(layer.rgb[:, edge - REACH :], blue, atol=1e-6, rtol=0)
+    other = torch.zeros(SIDE, SIDE, dtype=torch.bool)
+    other[:, edge - REACH : edge] = True
+    assert torch.equal(layer.pixel_index == NO_PIXEL, other)
+    assert not layer.displacement[:, other].any() and bool(
+        (layer.displacement[:, ~other] == 1).all()
+    )
 
 
-def test_nothing_of_it_stands_before_a_pixel_near_it() -> None:
-    generator = torch.Generator().manual_seed(0)
-    depth = torch.rand(SIDE, SIDE, generator=generator) * 20 + 1
-    layer = background_layer(torch.rand(SIDE, SIDE, 3), depth, camera())
-    z = project(camera(), layer.gaussians.means)[1].view(1, SIDE, SIDE)
-    farthest = torch.nn.functional.max_pool2d(depth[None], AROUND, 1, AROUND // 2)
-    assert bool((z > farthest).all())
+def test_it_lies_behind_all_pixels_near_it() -> None:
+    depth = random_depth(SIDE, SIDE, (1.0, 20.0))
+    layer = behind(random_rgb(SIDE, SIDE), depth)
+    farthest = torch.nn.functional.max_pool2d(depth[None], WINDOW, 1, REACH)[0]
+    assert bool((layer.depth > farthest).all())
 
 
 def test_a_slanted_floor_is_one_surface() -> None:
     rows = torch.arange(SIDE) + 0.5
     depth = (20 / (rows + 30)).view(-1, 1).expand(SIDE, SIDE).contiguous()
-    layer = background_layer(torch.rand(SIDE, SIDE, 3), depth, camera())
-    assert layer.cells.tolist() == list(range(SIDE * SIDE))
+    assert bool((behind(random_rgb(SIDE, SIDE), depth).pixel_index != NO_PIXEL).all())
 
 
-@given(st.sampled_from((1e-3, 1.0, 1e4)), st.integers(0, 5), st.integers(1, 9))
-def test_any_depth_and_size_is_finite(unit: float, seed: int, side: int) -> None:
-    generator = torch.Generator().manual_seed(seed)
-    depth = unit * (0.01 + 100 * torch.rand(side, side, generator=generator))
-    layer = background_layer(torch.rand(side, side, 3), depth, camera(side))
-    for value in (layer.gaussians.means, layer.gaussians.scales, layer.gaussians.sh):
-        assert bool(value.isfinite().all())
-    assert bool((layer.gaussians.scales > 0).all())
+@given(st.sampled_from(FAR_RANGES), st.integers(0, 5), st.integers(1, 9), st.integers(1, 9))
+def test_any_depth_and_size_is_finite(
+    limits: tuple[float, float], seed: int, height: int, width: int
+) -> None:
+    depth = random_depth(height, width, limits, seed)
+    layer = behind(random_rgb(height, width), depth, torch.randn(2, height, width, 3))
+    assert is_finite(layer) and float(layer.rgb.min()) >= 0 and float(layer.rgb.max()) <= 1 + 1e-6
 
 
 def test_it_shows_no_black_where_small_pixels_part() -> None:
-    rgb, depth = torch.full((SIDE, SIDE, 3), 0.8), torch.full((SIDE, SIDE), 4.0)
-    seen = render(background_layer(rgb, depth, camera()).gaussians, camera()).rgb
-    inner = seen[3:-3, 3:-3]
+    layer = behind(torch.full((SIDE, SIDE, 3), 0.8), torch.full((SIDE, SIDE), 4.0))
+    inner = render(layer_gaussians(layer), layer.camera).rgb[3:-3, 3:-3]
     torch.testing.assert_close(inner, torch.full_like(inner, 0.8), atol=0.01, rtol=0)
-
-
-def test_no_gradient_passes() -> None:
-    rgb, depth = halves()
-    layer = background_layer(rgb.requires_grad_(), depth.requires_grad_(), camera())
-    assert not layer.gaussians.means.requires_grad
-    assert not layer.gaussians.sh.requires_grad
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_precision_is_that_of_the_depth(dtype: torch.dtype) -> None:
     rgb, depth = (part.to(dtype) for part in halves())
-    layer = background_layer(rgb, depth, camera().to(dtype))
-    assert layer.gaussians.means.dtype == dtype
-    assert math.isfinite(float(layer.gaussians.means.sum()))
+    layer = behind(rgb, depth)
+    assert layer.depth.dtype == layer.rgb.dtype == dtype
+    assert layer.displacement is None

@@ -1,131 +1,134 @@
-"""The layer behind what goes takes the colours of what stands around it."""
+"""Hidden layers behind what moves take the colours of static pixels around it."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
+import pytest
 import torch
+from image_layers import input_image, layer
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.layered_image.border_extension import border_extension
 from diff4splat.generation.layered_image.disocclusion import (
     GROWN_PX,
     fill_from_neighbours,
-    inpaint_disoccluded,
+    grown,
+    inpaint_background,
+    inpaint_border,
 )
-from diff4splat.generation.reconstruction import Canonical
-from diff4splat.geometry.camera import pinhole, project
-from diff4splat.geometry.depth import distance_from_depth
-from diff4splat.geometry.rays import world_rays
-from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
-from diff4splat.scene.gaussians import Gaussians, concatenate
-from diff4splat.scene.harmonics import color_from_dc, dc_from_color
+from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
+from diff4splat.models.blocks.conv_block import CELL_PX
 
-SIDE = 24
-PIXELS = SIDE * SIDE
-GREEN, BLUE, RED = torch.eye(3)[[1, 2, 0]]
+SIDE, MARGIN = 24, 2
+RED, GREEN, BLUE = torch.eye(3)
 
 
-def picture() -> InputImage:
-    """A blue thing in the middle of green."""
-    rgb = GREEN.expand(SIDE, SIDE, 3).clone()
-    rgb[thing()] = BLUE
-    return InputImage(rgb=rgb, camera=pinhole(20.0, (SIDE, SIDE)), focal_source="test")
-
-
-def thing() -> Tensor:
+def box() -> Tensor:
     mask = torch.zeros(SIDE, SIDE, dtype=torch.bool)
     mask[8:16, 8:16] = True
     return mask
 
 
-def layer(depth: float, color: Tensor) -> Gaussians:
-    origins, directions = world_rays(picture().camera)
-    away = distance_from_depth(picture().camera, torch.full((SIDE, SIDE), depth))
-    return plain((origins + away[..., None] * directions).flatten(0, 1), color)
+def image() -> Tensor:
+    """A blue box in front of green."""
+    rgb = GREEN.expand(SIDE, SIDE, 3).clone()
+    rgb[box()] = BLUE
+    return rgb
 
 
-def plain(means: Tensor, color: Tensor) -> Gaussians:
-    count = len(means)
-    return Gaussians(
-        means=means,
-        quats=torch.tensor([[1.0, 0.0, 0.0, 0.0]]).expand(count, 4),
-        scales=torch.full((count, 3), 0.1),
-        opacities=torch.full((count,), 0.9),
-        sh=torch.cat([dc_from_color(color).expand(count, 1, 3), torch.full((count, 3, 3), 0.1)], 1),
-    )
+def background(moving_with_pixel: Tensor | None = None) -> ImageLayer:
+    """Red; of the far side, but for cells that move with their pixel."""
+    pixels = torch.arange(SIDE * SIDE).view(SIDE, SIDE)
+    far = torch.full_like(pixels, NO_PIXEL)
+    index = far if moving_with_pixel is None else torch.where(moving_with_pixel, pixels, far)
+    rgb = RED.expand(SIDE, SIDE, 3)
+    return layer(torch.full((SIDE, SIDE), 5.0), rgb=rgb, pixel_index=index)
 
 
-def canonical() -> Canonical:
-    """Pixels, their backing, and a red layer behind both that reaches beyond the picture."""
-    outside = torch.tensor([[9.0, 0.0, 6.0], [0.0, 0.0, -6.0], [0.0, 0.0, 0.0]])
-    parts = [layer(4.0, RED), layer(4.2, RED), layer(6.0, RED), plain(outside, RED)]
-    maps = RawGaussianMaps(
-        gaussians=torch.zeros(1, 12, 1, SIDE, SIDE), tokens=torch.zeros(1, 1, 1, 1, 1)
-    )
-    cells = torch.arange(PIXELS)
-    # All go with their pixel, but for those behind the last row.
-    backing = torch.where(cells < PIXELS - SIDE, cells, PIXELS)
-    return Canonical(gaussians=concatenate(parts), cells=cells, maps=maps, backing=backing)
+def border() -> ImageLayer:
+    camera = input_image(image()).camera
+    cells = border_extension(image(), torch.full((SIDE, SIDE), 4.0), camera, MARGIN)
+    return replace(cells, rgb=RED.expand(*cells.depth.shape, 3))
 
 
-def test_only_the_layer_behind_what_goes_changes_and_only_its_colour() -> None:
-    before, after = (
-        canonical().gaussians,
-        inpaint_disoccluded(canonical(), thing(), picture()).gaussians,
-    )
-    for name in ("means", "quats", "scales", "opacities"):
-        assert torch.equal(getattr(after, name), getattr(before, name)), name
-    changed = (after.sh != before.sh).flatten(1).any(1)
-    assert not changed[: 2 * PIXELS].any() and not changed[3 * PIXELS :].any()
-    wanted = torch.zeros(SIDE, SIDE, dtype=torch.bool)
-    wanted[8 - GROWN_PX : 16 + GROWN_PX, 8 - GROWN_PX : 16 + GROWN_PX] = True
-    assert torch.equal(changed[2 * PIXELS : 3 * PIXELS].view(SIDE, SIDE), wanted)
-    colors = color_from_dc(after.sh[changed, 0])
-    torch.testing.assert_close(colors, GREEN.expand(len(colors), 3), atol=1e-5, rtol=0)
-    assert not after.sh[changed, 1:].any()
-    assert bool((project(picture().camera, after.means[changed])[1] > 0).all())
+def only_colours_differ(after: ImageLayer, before: ImageLayer) -> bool:
+    rest = [field.name for field in fields(ImageLayer) if field.name != "rgb"]
+    return all(getattr(after, name) is getattr(before, name) for name in rest)
 
 
-def test_pixels_at_the_border_of_a_thing_lend_no_colour() -> None:
-    mixed = picture().rgb
+def test_behind_a_moving_box_the_far_side_has_the_colours_around_it() -> None:
+    before = background()
+    after = inpaint_background(before, image(), box())
+    area = grown(box())
+    torch.testing.assert_close(after.rgb[area], GREEN.expand(int(area.sum()), 3))
+    assert torch.equal(after.rgb[~area], before.rgb[~area])
+    assert only_colours_differ(after, before)
+
+
+def test_cells_that_move_with_their_pixel_keep_their_colour() -> None:
+    after = inpaint_background(background(box()), image(), box())
+    assert torch.equal(after.rgb[box()], RED.expand(64, 3))
+    rim = grown(box()) & ~box()
+    torch.testing.assert_close(after.rgb[rim], GREEN.expand(int(rim.sum()), 3))
+
+
+def test_mixed_pixels_at_the_rim_give_no_colour() -> None:
+    mixed = image()
     mixed[6:18, 6:18] = 0.5 * (GREEN + BLUE)
-    mixed[thing()] = BLUE
-    before = canonical().gaussians
-    after = inpaint_disoccluded(canonical(), thing(), replace(picture(), rgb=mixed)).gaussians
-    changed = (after.sh != before.sh).flatten(1).any(1)
-    colors = color_from_dc(after.sh[changed, 0])
-    assert len(colors) >= 64
-    torch.testing.assert_close(colors, GREEN.expand(len(colors), 3), atol=1e-5, rtol=0)
+    mixed[box()] = BLUE
+    after = inpaint_background(background(), mixed, box())
+    area = grown(box())
+    torch.testing.assert_close(after.rgb[area], GREEN.expand(int(area.sum()), 3))
 
 
-def test_backing_that_stands_changes_too() -> None:
-    low = torch.zeros_like(thing())
-    low[-4:, 8:16] = True
-    changed = (
-        inpaint_disoccluded(canonical(), low, picture()).gaussians.sh != canonical().gaussians.sh
-    )
-    backing = changed.flatten(1).any(1)[PIXELS : 2 * PIXELS].view(SIDE, SIDE)
-    assert bool(backing[-1, 8 - GROWN_PX : 16 + GROWN_PX].all())
-    assert int(backing.sum()) == 8 + 2 * GROWN_PX
+def test_border_cells_whose_middle_is_behind_the_box_change() -> None:
+    before = border()
+    after = inpaint_border(before, image(), box())
+    area = torch.zeros(before.depth.shape, dtype=torch.bool)
+    middle = slice(CELL_PX // 2, None, CELL_PX)
+    area[MARGIN:-MARGIN, MARGIN:-MARGIN] = grown(box())[middle, middle]
+    assert int(area.sum()) == 9
+    torch.testing.assert_close(after.rgb[area], GREEN.expand(9, 3))
+    assert torch.equal(after.rgb[~area], before.rgb[~area])
+    assert only_colours_differ(after, before)
 
 
-def test_where_nothing_or_everything_goes_nothing_changes() -> None:
-    for moving in (torch.zeros_like(thing()), torch.ones_like(thing())):
-        scene = canonical()
-        assert inpaint_disoccluded(scene, moving, picture()) is scene
+@pytest.mark.parametrize("moving", [torch.zeros, torch.ones])
+def test_where_nothing_or_everything_moves_nothing_changes(moving: object) -> None:
+    mask = moving(SIDE, SIDE, dtype=torch.bool)
+    for before, inpaint in ((background(), inpaint_background), (border(), inpaint_border)):
+        assert inpaint(before, image(), mask) is before
 
 
-def test_colours_come_from_as_near_as_there_are_any() -> None:
-    rgb = torch.zeros(SIDE, SIDE, 3)
-    rgb[:, : SIDE // 2], rgb[:, SIDE // 2 :] = GREEN, BLUE
-    known = torch.ones(SIDE, SIDE, dtype=torch.bool)
-    known[6:18, 1:5] = False
-    found = fill_from_neighbours(rgb, known)
-    assert torch.equal(found[known], rgb[known])
-    torch.testing.assert_close(found, rgb)
+def test_a_mask_grows_by_a_few_pixels_on_every_side() -> None:
+    one = torch.zeros(SIDE, SIDE, dtype=torch.bool)
+    one[10, 4] = one[0, 0] = True
+    wanted = torch.zeros_like(one)
+    wanted[10 - GROWN_PX : 11 + GROWN_PX, 4 - GROWN_PX : 5 + GROWN_PX] = True
+    wanted[: 1 + GROWN_PX, : 1 + GROWN_PX] = True
+    assert torch.equal(grown(one), wanted)
+    assert not grown(torch.zeros_like(one)).any()
 
 
-def test_one_known_pixel_colours_all() -> None:
-    known = torch.zeros(SIDE, SIDE, dtype=torch.bool)
-    known[3, 5] = True
-    found = fill_from_neighbours(BLUE.expand(SIDE, SIDE, 3), known)
-    torch.testing.assert_close(found, BLUE.expand(SIDE, SIDE, 3))
+def oracle(rgb: Tensor, known: Tensor) -> Tensor:
+    """The mean of known pixels in the smallest window of 3, 7, 15, … that has any."""
+    filled = rgb.clone()
+    for row, column in (~known).nonzero().tolist():
+        reach = 1
+        while True:
+            window = (
+                slice(max(row - reach, 0), row + reach + 1),
+                slice(max(column - reach, 0), column + reach + 1),
+            )
+            if bool(known[window].any()):
+                filled[row, column] = rgb[window][known[window]].mean(0)
+                break
+            reach = 2 * reach + 1
+    return filled
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.7, 1.0])
+@pytest.mark.parametrize("size", [(13, 17), (1, 20), (20, 1)])
+def test_unknown_colours_come_from_the_smallest_window(share: float, size: tuple[int, int]) -> None:
+    rgb, known = torch.rand(*size, 3, dtype=torch.float64), torch.rand(size) < share
+    known[0, 0] = True
+    torch.testing.assert_close(fill_from_neighbours(rgb, known), oracle(rgb, known))

@@ -35,24 +35,22 @@ def test_gradcheck(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("value", EXTREMES)
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_extreme_raw_values_have_finite_values_and_gradients(
-    name: str, value: float, dtype: torch.dtype
-) -> None:
+def test_extreme_raw_values_have_finite_values_and_gradients(name: str, dtype: torch.dtype) -> None:
     width, law = LAWS[name]
-    raw = torch.full((2, width), value, dtype=dtype, requires_grad=True)
+    raw = torch.tensor(EXTREMES, dtype=dtype)[:, None].repeat(1, width).requires_grad_()
     out = law(raw)
     out.sum().backward()
     assert torch.isfinite(out).all() and torch.isfinite(raw.grad).all()
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
-def test_half_precision_is_refused(name: str, dtype: torch.dtype) -> None:
+def test_half_precision_is_refused(name: str) -> None:
     width, law = LAWS[name]
-    with pytest.raises(ShapeError, match=r"expected float32 or float64, got torch\.\w*16; convert"):
-        law(torch.zeros(2, width, dtype=dtype))
+    message = r"expected float32 or float64, got torch\.\w*16; convert"
+    for dtype in (torch.float16, torch.bfloat16):
+        with pytest.raises(ShapeError, match=message):
+            law(torch.zeros(2, width, dtype=dtype))
 
 
 @given(base=st.floats(0, 1, width=32))

@@ -15,7 +15,7 @@ from diff4splat.geometry.optics import Optics, Shutter
 from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.physical.intervals import Intervals, choose_intervals
 from diff4splat.render.physical.settings import PhotoSettings
-from diff4splat.render.physical.viewer import viewer_of
+from diff4splat.render.physical.view_cone import view_cone
 from diff4splat.scene.scene import Scene
 
 READOUT = 0.1
@@ -23,8 +23,8 @@ READOUT = 0.1
 
 def chosen(scene: Scene, time_s: float, focal_px: float = 60.0, **settings) -> Intervals:
     camera = physical(focal_px)
-    viewer = viewer_of(camera, time_s)
-    return choose_intervals(scene, camera, time_s, viewer, PhotoSettings(**settings))
+    cone = view_cone(camera, time_s)
+    return choose_intervals(scene, camera, time_s, cone, PhotoSettings(**settings))
 
 
 def physical(focal_px: float = 60.0) -> PhysicalCamera:
@@ -193,7 +193,7 @@ def test_a_camera_that_sees_all_around_sees_what_is_behind() -> None:
     optics = Optics(lens=Equirectangular(), shutter=Shutter(readout_s=READOUT))
     camera = PhysicalCamera(camera=equirectangular_camera((64, 128)), optics=optics)
     made = choose_intervals(
-        replace(scene, gaussians=behind), camera, 0.0, viewer_of(camera, 0.0), PhotoSettings()
+        replace(scene, gaussians=behind), camera, 0.0, view_cone(camera, 0.0), PhotoSettings()
     )
     assert len(made) > 4
 

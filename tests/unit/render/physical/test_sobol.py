@@ -17,7 +17,7 @@ def strata(points: torch.Tensor, parts: int) -> torch.Tensor:
     return (points.double() * parts).long()
 
 
-@pytest.mark.parametrize("bits", range(11))
+@pytest.mark.parametrize("bits", [0, 1, 2, 5, 10])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=str)
 def test_a_block_has_one_point_in_every_stratum_of_every_dimension(
     bits: int, dtype: torch.dtype

@@ -15,9 +15,9 @@ from oracles_raster import LENS, PARAMETERS, cloud, leaves, lens_leaves, wide_ca
 
 from diff4splat.errors import ConfigError
 from diff4splat.render.api import render
-from diff4splat.render.raster import backend, function, jit
+from diff4splat.render.raster import backend, function
 from diff4splat.render.raster.backward import Drawn
-from diff4splat.render.raster.warm import ensure_compiled
+from diff4splat.render.raster.jit import GROUP
 from diff4splat.render.settings import RenderJob, RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
@@ -64,7 +64,7 @@ def test_other_devices_are_refused() -> None:
         flow_gaussians=cloud(5),
         flow_camera=CAMERA,
     )
-    assert backend.refusal(job) == "expected CPU tensors, got meta"
+    assert backend.unsupported_reason(job) == "expected CPU tensors, got meta"
 
 
 def test_what_it_can_do_is_not_refused() -> None:
@@ -151,7 +151,7 @@ class Watched(Drawn):
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     """How many sets of buffers are still alive."""
-    ensure_compiled()
+    GROUP.ensure_compiled()
     references = []
 
     def make(**parts: object) -> Watched:
@@ -266,7 +266,7 @@ def test_a_batch_of_cameras() -> None:
 @pytest.mark.usefixtures("as_shipped")
 def test_whole_numbers_in_the_settings_compile_nothing() -> None:
     rgb(cloud(5))
-    compiled = [len(kernel.signatures) for kernel in jit.KERNELS]
+    compiled = [len(kernel.signatures) for kernel in GROUP.kernels]
     whole = rgb(cloud(5), dilation_px2=1, near_depth=1)
-    assert [len(kernel.signatures) for kernel in jit.KERNELS] == compiled
+    assert [len(kernel.signatures) for kernel in GROUP.kernels] == compiled
     assert torch.equal(whole, rgb(cloud(5), dilation_px2=1.0, near_depth=1.0))

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from diff4splat.render.api import render
 from diff4splat.render.raster import forward
-from diff4splat.render.raster.warm import ensure_compiled
+from diff4splat.render.raster.jit import GROUP
 from diff4splat.render.settings import RenderSettings
 
 OUTPUTS = ("rgb", "depth", "alpha", "median_depth", "features")
@@ -66,7 +66,7 @@ def test_run_after_run() -> None:
 @pytest.fixture
 def regions(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """The regions of tiles that are done, in their order."""
-    ensure_compiled()
+    GROUP.ensure_compiled()
     done, fill = [], forward.fill_region
 
     def watched(*arguments):

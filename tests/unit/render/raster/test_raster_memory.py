@@ -17,8 +17,8 @@ from torch.utils._pytree import tree_leaves
 from diff4splat.render.api import render
 from diff4splat.render.raster import function
 from diff4splat.render.raster.backward import Drawn
-from diff4splat.render.raster.canvas import Canvas
-from diff4splat.render.raster.warm import ensure_compiled
+from diff4splat.render.raster.jit import GROUP
+from diff4splat.render.raster.padded_image import PaddedImage
 from diff4splat.render.settings import RenderSettings
 
 SUPPORT = Path(__file__).parents[3] / "support"
@@ -30,7 +30,7 @@ def arrays_in(thing: object) -> list[np.ndarray]:
     """Every array that ``thing`` holds."""
     if isinstance(thing, np.ndarray):
         return [thing]
-    if isinstance(thing, Canvas):
+    if isinstance(thing, PaddedImage):
         return arrays_in(list(vars(thing).values()))
     if dataclasses.is_dataclass(thing):
         return arrays_in([getattr(thing, field.name) for field in dataclasses.fields(thing)])
@@ -42,7 +42,7 @@ def arrays_in(thing: object) -> list[np.ndarray]:
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> list[Drawn]:
     """What pictures keep for the way back."""
-    ensure_compiled()
+    GROUP.ensure_compiled()
     made = []
 
     def make(**parts: object) -> Drawn:

@@ -12,7 +12,7 @@ from oracles_render import brute_force, random_gaussians, small_camera
 
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.render.api import render
-from diff4splat.render.raster.plan import TILE_SIZES_PX
+from diff4splat.render.raster.raster_settings import TILE_SIZES_PX
 from diff4splat.render.settings import OUTPUTS, RenderOutput, RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 

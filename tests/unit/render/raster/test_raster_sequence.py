@@ -10,7 +10,7 @@ from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render, render_video
-from diff4splat.render.raster.plan import make_plan, make_view
+from diff4splat.render.raster.raster_settings import make_raster_settings, make_view
 from diff4splat.render.raster.sequence import Sequence
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
@@ -156,7 +156,7 @@ def test_a_frame_that_was_given_away_does_not_change() -> None:
 
 
 def sequence(scene: Scene, camera: Camera = CAMERA) -> tuple[Sequence, object]:
-    plan = make_plan(camera, RenderSettings(tile_px=8), colors=True, medians=False)
+    plan = make_raster_settings(camera, RenderSettings(tile_px=8), colors=True, medians=False)
     view = make_view(plan.grid, camera.world_from_camera, camera.focal_px, camera.center_px)
     return Sequence(scene, plan, depths=False), view
 
@@ -182,7 +182,7 @@ def test_rows_do_not_depend_on_the_memory() -> None:
     pictures = []
     for memory_bytes in (1 << 20, 256 << 20):
         settings = RenderSettings(tile_px=8, memory_bytes=memory_bytes)
-        plan = make_plan(CAMERA, settings, colors=True, medians=False)
+        plan = make_raster_settings(CAMERA, settings, colors=True, medians=False)
         view = make_view(plan.grid, CAMERA.world_from_camera, CAMERA.focal_px, CAMERA.center_px)
         drawn = Sequence(many, plan, depths=False)
         for time_s in (0.0, 0.0):
@@ -195,7 +195,7 @@ def test_nothing_is_left_behind_where_lists_did_not_fit_for_a_while() -> None:
     motion = keyed(torch.arange(COUNT))
     grown = torch.tensor([-1.0, 2.0, 2.0, -1.0])[:, None, None].expand(4, COUNT, 3)
     scene = scene_with(replace(motion, log_scale_offsets=grown))
-    plan = make_plan(CAMERA, RenderSettings(tile_px=8), colors=True, medians=False)
+    plan = make_raster_settings(CAMERA, RenderSettings(tile_px=8), colors=True, medians=False)
     plan = replace(plan, pair_limit=1500)
     view = make_view(plan.grid, CAMERA.world_from_camera, CAMERA.focal_px, CAMERA.center_px)
     drawn = Sequence(scene, plan, depths=False)

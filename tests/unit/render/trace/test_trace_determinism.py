@@ -9,9 +9,9 @@ from oracles_trace import MOTION, PARAMETERS, answers, leaves, motion, picture, 
 from torch import Tensor
 
 from diff4splat.render.trace.api import trace
-from diff4splat.render.trace.packets import bundle_rays
 from diff4splat.render.trace.rays import Rays
 from diff4splat.render.trace.settings import TraceSettings
+from diff4splat.render.trace.traversal.packets import bundle_rays
 
 ANSWERS = ("rgb", "distance", "median_distance", "alpha")
 CLOUD = replace(

@@ -130,7 +130,7 @@ def test_clips_that_are_too_short_say_so() -> None:
         sample(make_clip(frames=3))
 
 
-def test_moments_tell_a_branch_what_whole_clips_do() -> None:
+def test_keyframes_give_the_motion_network_the_same_as_full_clips() -> None:
     whole = make_clip(frames=17, static=False, tracks=20)
     data = replace(DATA, input_stride=2)
     moments = sample(
@@ -151,9 +151,9 @@ def test_a_moment_stands_for_the_frames_up_to_it() -> None:
     torch.testing.assert_close(clip.times_s, times_s[wanted])
 
 
-def test_whole_clips_are_not_taken_for_moments() -> None:
+def test_full_clips_are_refused_where_keyframes_are_expected() -> None:
     data = replace(DATA, frames=9, input_stride=2, keyframes_only=True)
-    with pytest.raises(InputError, match="expected 3 moments, got 17 frames"):
+    with pytest.raises(InputError, match="expected 3 keyframes, got 17 frames"):
         sample(make_clip(frames=17), data)
 
 

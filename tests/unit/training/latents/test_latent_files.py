@@ -9,7 +9,12 @@ import torch
 from latent_folders import latent_folder, make_pack
 
 from diff4splat.errors import FileFormatError, InputError
-from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import (
+    TensorFile,
+    read_metadata,
+    read_tensors,
+    write_tensors,
+)
 from diff4splat.training.latents.latent_shards import (
     LatentPack,
     has_pack,

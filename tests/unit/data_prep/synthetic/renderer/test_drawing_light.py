@@ -8,7 +8,7 @@ import pytest
 
 from diff4splat.data_prep.synthetic.renderer.cameras import render_camera
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
-from diff4splat.data_prep.synthetic.renderer.compiled import KERNELS, kernel
+from diff4splat.data_prep.synthetic.renderer.jit import GROUP, kernel
 from diff4splat.data_prep.synthetic.renderer.occlusion import visible_points
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.renderer.shadows import Chart, lit
@@ -30,8 +30,8 @@ def light_on(points, normal, heights, chart, shares):
         shares[at] = lit(x, y, z, normal, heights, chart, 0.0, 1.0, 0.0)
 
 
-KERNELS.remove(bytes_of)
-KERNELS.remove(light_on)
+GROUP.kernels.remove(bytes_of)
+GROUP.kernels.remove(light_on)
 TEXEL_M = 0.1
 
 

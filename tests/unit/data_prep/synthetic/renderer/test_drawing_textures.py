@@ -4,7 +4,7 @@ import numpy as np
 import oracles_drawing as oracle
 import pytest
 
-from diff4splat.data_prep.synthetic.renderer.compiled import KERNELS, kernel
+from diff4splat.data_prep.synthetic.renderer.jit import GROUP, kernel
 from diff4splat.data_prep.synthetic.renderer.textures.lettering import FONT
 from diff4splat.data_prep.synthetic.renderer.textures.materials import (
     FAMILIES,
@@ -26,7 +26,7 @@ def sampled(family, places, footprint, seed, values):
             values[index, at] = found[at]
 
 
-KERNELS.remove(sampled)
+GROUP.kernels.remove(sampled)
 
 
 def values_of(family: str, places: np.ndarray, footprint: float = 0.01, seed: int = 5):

@@ -1,1 +1,0 @@
-"""Captions that are true: colour names, a grammar, its parser, and counterfactual captions."""

@@ -1,0 +1,1 @@
+"""Captions of clips: vocabulary, grammar and parser, mirror images and paraphrases."""

@@ -1,0 +1,42 @@
+"""Paraphrases of captions: synonyms, fewer clauses, or one plain sentence."""
+
+from dataclasses import replace
+
+from diff4splat.captions.grammar import (
+    CaptionFacts,
+    describe,
+    motion_text,
+    parse_caption,
+)
+from diff4splat.errors import InputError
+
+PLAIN_BELOW, SHORT_BELOW, SYNONYMS_BELOW = 0.4, 0.65, 0.85
+"""Thresholds of the draw: a plain sentence; a caption without place and camera; synonyms; at the
+last threshold and above, the caption itself."""
+
+
+def paraphrase(caption: str, draw: float, variant: int) -> str:
+    """Another true caption of the same clip.
+
+    ``draw`` in [0, 1) selects the kind of paraphrase, ``variant`` the synonyms. Captions outside
+    the grammar are returned unchanged.
+    """
+    try:
+        facts = parse_caption(caption)
+    except InputError:
+        return caption
+    if draw < PLAIN_BELOW:
+        return _plain(facts, variant)
+    if draw < SHORT_BELOW:
+        return describe(replace(facts, place="", camera=()), variant)
+    return describe(facts, variant) if draw < SYNONYMS_BELOW else caption
+
+
+def _plain(facts: CaptionFacts, variant: int) -> str:
+    """One sentence about one object, or "nothing moves"."""
+    if not facts.events:
+        return "nothing moves"
+    event = facts.events[variant % len(facts.events)]
+    plain_event = replace(event, motion="slides") if event.direction else event
+    name = f"{event.subject.color} {event.subject.noun}"
+    return f"the {name} {motion_text(plain_event, variant // len(facts.events))}"

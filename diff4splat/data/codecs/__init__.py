@@ -1,0 +1,1 @@
+"""Encoding and decoding of the members of a clip."""

@@ -1,0 +1,1 @@
+"""Comparisons behind consistency_check."""

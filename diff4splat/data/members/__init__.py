@@ -1,1 +1,0 @@
-"""The members of one clip in a shard: how each is written and read."""

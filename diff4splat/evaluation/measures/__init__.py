@@ -1,0 +1,1 @@
+"""Metrics of one item: images, depth, camera steps, point tracks, motion and text."""

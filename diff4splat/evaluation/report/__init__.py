@@ -1,0 +1,1 @@
+"""Summary of results, and the files that show it."""

@@ -1,0 +1,165 @@
+"""Write results as Markdown and JSON.
+
+The same items on the same machine give the same bytes.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from diff4splat import __version__
+from diff4splat.error_time.tables import this_machine
+from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, columns_of
+from diff4splat.evaluation.records import ItemResult
+from diff4splat.evaluation.report.summary import Mean, Summary
+from diff4splat.evaluation.runner import Outcome
+from diff4splat.evaluation.systems.baselines import BASELINES
+
+FORMAT = "diff4splat-evaluation-results 1"
+DIRECTION_ARROWS = {"higher": "↑", "lower": "↓", "neither": ""}
+
+
+def to_json(outcome: Outcome, summary: Summary) -> str:
+    """Protocol, system, table, differences and all items as JSON."""
+    setup = outcome.setup
+    record = {
+        "format": FORMAT,
+        "diff4splat": __version__,
+        "machine": asdict(this_machine()),
+        "task": setup.task,
+        "protocol": setup.protocol.record() | {"digest": setup.protocol.digest},
+        "subject": asdict(setup.system.identity),
+        "features": None if setup.features is None else setup.features.name,
+        "asked": outcome.requested,
+        "subset": outcome.is_subset,
+        "columns": [asdict(column) for column in columns_of(setup.task)],
+        "table": [asdict(cell) for cell in summary.cells],
+        "differences": [asdict(difference) for difference in summary.differences],
+        "skipped": [asdict(skipped) for skipped in summary.skipped],
+        "failures": [asdict(failure) for failure in outcome.failures],
+        "items": [item.to_json() for item in outcome.items],
+    }
+    return json.dumps(record, indent=1, allow_nan=False) + "\n"
+
+
+def to_markdown(outcome: Outcome, summary: Summary) -> str:
+    """Table, protocol, differences, and the best and worst items as Markdown."""
+    columns = _filled(outcome, summary)
+    parts = [
+        _head(outcome),
+        _table(outcome, summary, columns),
+        _differences(summary, columns),
+        _meanings(outcome, columns),
+        _items(outcome, summary),
+        _skipped(outcome, summary),
+    ]
+    return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
+
+
+def _filled(outcome: Outcome, summary: Summary) -> list[Column]:
+    """Columns with at least one value."""
+    keys = {cell.key for cell in summary.cells}
+    return [column for column in columns_of(outcome.setup.task) if column.key in keys]
+
+
+def system_name(outcome: Outcome) -> str:
+    """Name of the system, marked if it is untrained."""
+    identity = outcome.setup.system.identity
+    marks = ["untrained"] if identity.untrained else []
+    return f"{identity.name} ({', '.join(marks)})" if marks else identity.name
+
+
+def _head(outcome: Outcome) -> list[str]:
+    setup, identity = outcome.setup, outcome.setup.system.identity
+    weights = "random" if identity.weights_sha256 == "none" else identity.weights_sha256[:16]
+    total = setup.protocol.items(setup.task)
+    scope = f"{len(outcome.items)} of {outcome.requested} items"
+    if outcome.is_subset:
+        scope += f" (**subset**: the first {outcome.requested} of {total}; not comparable)"
+    lines = [
+        f"# Evaluation: {system_name(outcome)}, {setup.task}",
+        "",
+        f"Protocol {setup.protocol.name}, digest `{setup.protocol.digest}`; {scope}. "
+        f"Weights {weights}, configuration `{identity.fingerprint}`. diff4splat {__version__}.",
+    ]
+    if setup.features is not None and setup.task != "text":
+        lines.append(f"Perceptual distance: {setup.features.name}.")
+    if identity.untrained:
+        lines.append("**Untrained**: the weights are random; this row is a starting point.")
+    return lines
+
+
+def _table(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
+    percent = f"{outcome.setup.protocol.bootstrap.coverage:.0%}"
+    titles = [f"{c.title} {DIRECTION_ARROWS[c.better]}".rstrip() for c in columns]
+    lines = [
+        f"Means over items with {percent} bootstrap intervals.",
+        "",
+        _line(["", *titles]),
+        _line(["---", *["---:"] * len(columns)]),
+    ]
+    for row in (SYSTEM, *BASELINES):
+        means = [summary.cell(row, column.key) for column in columns]
+        if any(mean is not None for mean in means):
+            name = f"**{system_name(outcome)}**" if row == SYSTEM else row
+            lines.append(_line([name, *(_mean(mean) for mean in means)]))
+    return lines
+
+
+def _differences(summary: Summary, columns: Sequence[Column]) -> list[str]:
+    rows = [(c, row) for c in columns if (row := summary.difference(c.key)) is not None]
+    if not rows:
+        return []
+    lines = [
+        "Item by item against the best baseline of each measure; above 0 the system is better.",
+        "",
+        _line(["measure", "best baseline", "difference", "items"]),
+        _line(["---", "---", "---:", "---:"]),
+    ]
+    for column, row in rows:
+        cells = [column.title, row.baseline, _mean(row.mean, sign="+"), str(row.mean.count)]
+        lines.append(_line(cells))
+    return lines
+
+
+def _meanings(outcome: Outcome, columns: Sequence[Column]) -> list[str]:
+    lines = [f"- {column.title}: {column.meaning}." for column in columns]
+    if outcome.setup.task != "text":
+        lines.append("- The best plane is an oracle: it selects its depth with the target images.")
+    return lines
+
+
+def _items(outcome: Outcome, summary: Summary) -> list[str]:
+    key = PRIMARY[outcome.setup.task]
+    title = next(c.title for c in columns_of(outcome.setup.task) if c.key == key)
+    return [f"- {name}: {_item(item, key)} {title}" for name, item in summary.examples()]
+
+
+def _item(item: ItemResult, key: str) -> str:
+    return f"item {item.item} ({item.clip}), {number(item.value(SYSTEM, key))}"
+
+
+def _skipped(outcome: Outcome, summary: Summary) -> list[str]:
+    failed = [f"- failed: item {f.item} ({f.clip}): {f.why}" for f in outcome.failures]
+    skipped = [
+        f"- not measured on {s.items} items: {s.key} of {s.row}: {s.why}" for s in summary.skipped
+    ]
+    return failed + skipped
+
+
+def number(value: float, sign: str = "") -> str:
+    """Four significant digits, in fixed notation where possible."""
+    return f"{value:{sign}.4g}"
+
+
+def _mean(mean: Mean | None, sign: str = "") -> str:
+    if mean is None:
+        return ""
+    if mean.low is None or mean.high is None:
+        return number(mean.value, sign)
+    low, high = number(mean.low, sign), number(mean.high, sign)
+    return f"{number(mean.value, sign)} [{low}, {high}]"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"

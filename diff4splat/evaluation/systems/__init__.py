@@ -1,0 +1,1 @@
+"""Evaluated systems, baselines and their predictions."""

@@ -1,0 +1,1 @@
+"""Cameras, lenses, optics and camera paths as files."""

@@ -1,0 +1,1 @@
+"""Checkpoints of other 4D Gaussian programs."""

@@ -1,0 +1,1 @@
+"""Photographs: read, validate, convert; write PNG."""

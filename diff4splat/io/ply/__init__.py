@@ -1,0 +1,1 @@
+"""Gaussians as INRIA PLY files."""

@@ -1,0 +1,1 @@
+"""The scene file and its parts."""

@@ -1,0 +1,1 @@
+"""Kernel toolkit: compilation, groups compiled ahead of use, SIMD values and threads."""

@@ -1,0 +1,1 @@
+"""Sorted lists of Gaussians per tile, and their blending, forward and backward."""

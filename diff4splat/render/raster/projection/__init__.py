@@ -1,0 +1,1 @@
+"""Gaussians to 2D footprints and colours, forward and backward."""

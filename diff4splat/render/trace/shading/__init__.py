@@ -1,0 +1,1 @@
+"""Colours along rays, forward and backward."""

@@ -1,0 +1,1 @@
+"""Packets of rays through the hierarchy: candidates, intersections and sorted hits."""

@@ -1,0 +1,120 @@
+"""What an image becomes: pixels and infill that it shows, and layers behind both."""
+
+import pytest
+import torch
+from image_layers import FAR_RANGES, input_image, is_finite, random_depth, random_rgb
+from torch import Tensor
+
+from diff4splat.generation.input_image import downsample
+from diff4splat.generation.layered_image.build import (
+    PIXEL_FOOTPRINT_PX,
+    ImageMaps,
+    build_layered_image,
+)
+from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.gaussians import image_gaussians
+from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
+from diff4splat.models.ldrm.plane_prior import OPAQUE
+from diff4splat.render.api import render
+from diff4splat.render.settings import RenderSettings
+
+SIZE_PX, MARGIN, FACTOR = (16, 24), 2, 2
+SMALL = (SIZE_PX[0] // FACTOR, SIZE_PX[1] // FACTOR)
+TIMES_S = torch.linspace(0.0, 1.0, 5)
+
+
+def built(
+    displacement: Tensor | None = None,
+    border_cells: int = MARGIN,
+    limits: tuple[float, float] = (2.0, 9.0),
+) -> LayeredImage:
+    """An image of which networks see a quarter of the pixels."""
+    image = input_image(random_rgb(*SIZE_PX))
+    maps = ImageMaps(depth=random_depth(*SMALL, limits), displacement=displacement)
+    return build_layered_image(downsample(image, FACTOR), image, maps, border_cells)
+
+
+def moving_block() -> Tensor:
+    """Four cells move to the right."""
+    displacement = torch.zeros(3, *SMALL, 3)
+    displacement[1:, 3:5, 4:6, 0] = torch.tensor([0.5, 1.0])[:, None, None]
+    return displacement
+
+
+def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
+    pixels, infill, background, border = built().layers
+    assert [pixels.in_image, infill.in_image, background.in_image, border.in_image] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    assert torch.equal(pixels.rgb, random_rgb(*SIZE_PX))
+    assert (pixels.opacity, pixels.footprint_px) == (OPAQUE, PIXEL_FOOTPRINT_PX)
+    assert pixels.pixel_index.flatten().tolist() == list(range(16 * 24))
+    assert infill.depth.shape == (31, 47)
+    assert background.depth.shape == SMALL
+    assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
+    assert built().shown_count == 31 * 47
+
+
+def test_without_border_cells_there_is_no_border_layer() -> None:
+    assert len(built(border_cells=0).layers) == 3
+
+
+def test_coarse_layers_match_no_pixel_of_a_larger_image() -> None:
+    gathered = image_gaussians(built(), TIMES_S)
+    assert bool((gathered.pixel_index[16 * 24 :] == NO_PIXEL).all())
+    image = input_image(random_rgb(*SIZE_PX))
+    maps = ImageMaps(depth=torch.full(SIZE_PX, 4.0), displacement=None)
+    background = build_layered_image(image, image, maps, MARGIN).layers[2]
+    assert background.pixel_index.flatten().tolist() == list(range(16 * 24))
+
+
+def test_from_the_input_camera_the_extended_layers_hide_nothing() -> None:
+    image, camera = built(), input_image(random_rgb(*SIZE_PX)).camera
+    gaussians = image_gaussians(image, TIMES_S).gaussians
+    views = [
+        render(each, camera, settings=RenderSettings(dilation_px2=0.0)).rgb
+        for each in (gaussians, gaussians.select(slice(image.shown_count)))
+    ]
+    torch.testing.assert_close(views[0], views[1], atol=0.045, rtol=0)
+
+
+def test_what_moves_takes_its_background_with_it_and_leaves_inpainted_colours() -> None:
+    still, moving = built(limits=(4.0, 4.0)), built(moving_block(), limits=(4.0, 4.0))
+    assert bool(moving.layers[0].displacement.any()) and bool(moving.layers[1].displacement.any())
+    background = moving.layers[2]
+    assert torch.equal(background.displacement, moving_block())
+    assert torch.equal(background.rgb, still.layers[2].rgb), "all of it continues its pixel"
+    before, after = still.layers[3], moving.layers[3]
+    area = torch.zeros(after.depth.shape, dtype=torch.bool)
+    area[MARGIN:-MARGIN, MARGIN:-MARGIN] = grown(moving_block().any(-1).any(0))[2::4, 2::4]
+    assert bool(area.any())
+    assert torch.equal((after.rgb != before.rgb).any(-1), area)
+    assert after.displacement is None
+
+
+def test_gaussians_of_displaced_layers_move_and_no_others() -> None:
+    image = built(moving_block())
+    gathered = image_gaussians(image, TIMES_S)
+    moving = torch.zeros(len(gathered.gaussians), dtype=torch.bool)
+    moving[gathered.motion.moving_index] = True
+    border = int(image.layers[3].mask.sum())
+    assert bool(moving[: 16 * 24].any()) and not moving[-border:].any()
+
+
+@pytest.mark.parametrize("limits", FAR_RANGES)
+@pytest.mark.parametrize("motion", ["nothing", "all", "some"])
+def test_no_layer_ever_holds_nan(limits: tuple[float, float], motion: str) -> None:
+    displacement = {
+        "nothing": None,
+        "all": torch.full((3, *SMALL, 3), 0.1),
+        "some": moving_block(),
+    }[motion]
+    image = built(displacement, limits=limits)
+    assert all(map(is_finite, image.layers))
+    gathered = image_gaussians(image, TIMES_S)
+    state = gathered.motion.state_at(gathered.gaussians, 0.6)
+    for name in ("means", "scales", "quats", "opacities", "sh"):
+        assert bool(getattr(state, name).isfinite().all()), name

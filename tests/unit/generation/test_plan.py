@@ -1,0 +1,135 @@
+"""Which networks a request runs, for every kind of request and model, and why others do not."""
+
+from dataclasses import replace
+
+import pytest
+
+from diff4splat.errors import ConfigError
+from diff4splat.generation.plan import (
+    FILL_PARTS,
+    UNTRAINED_FILL,
+    WORSE_FILL,
+    GenerationPlan,
+    RequestFacts,
+    plan_generation,
+)
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.sizes import size_by_name
+from diff4splat.models.factory import PARTS, model_parts, parameter_counts
+from diff4splat.progress.run_log import RunLog
+
+VIDEO = frozenset(FILL_PARTS)
+PRIORS = frozenset({"monocular_depth", "motion_unet", "text_encoder"})
+DEPTH = frozenset({"monocular_depth"})
+TABLE = [
+    # size, trained, request, parts that run
+    ("small", PARTS, {"prompt": True}, PRIORS),
+    ("small", PARTS, {"prompt": False}, DEPTH),
+    ("small", PARTS, {"prompt": True, "still": True}, DEPTH),
+    ("small", PARTS, {"prompt": True, "frames": 1}, DEPTH),
+    ("small", PARTS, {"prompt": True, "fill": "none"}, PRIORS),
+    ("small", PARTS, {"prompt": True, "fill": "video"}, PRIORS | VIDEO),
+    ("small", PARTS, {"prompt": False, "fill": "video"}, DEPTH | VIDEO),
+    (
+        "small",
+        PARTS,
+        {"prompt": True, "fill": "video", "still": True},
+        (DEPTH | VIDEO | {"text_encoder"}) - {"deformation"},
+    ),
+    ("small", (), {"prompt": True}, PRIORS),
+    ("small", (), {"prompt": True, "fill": "video"}, PRIORS | VIDEO),
+    ("small", PRIORS, {"prompt": True}, PRIORS),
+    ("small", DEPTH, {"prompt": True}, DEPTH),
+    ("small", ("vae", "ldrm", "deformation"), {"prompt": True}, frozenset()),
+    ("small", ("text_encoder", "motion_unet"), {"prompt": True}, PRIORS - DEPTH),
+    (
+        "small",
+        (*FILL_PARTS, "text_encoder"),
+        {"prompt": True, "fill": "video"},
+        VIDEO | {"text_encoder"},
+    ),
+    ("test", (), {"prompt": True}, VIDEO | {"text_encoder"}),
+    ("test", (), {"prompt": False}, VIDEO),
+    ("test", (), {"prompt": True, "fill": "none"}, frozenset()),
+    ("test", PARTS, {"prompt": False, "still": True}, VIDEO - {"deformation"}),
+    ("test", ("vae", "ldrm", "deformation"), {"prompt": True}, frozenset()),
+    ("paper", (), {"prompt": True}, VIDEO | {"text_encoder"}),
+    ("paper", PARTS, {"prompt": True, "fill": "none"}, frozenset()),
+]
+STILL = {"prompt": True, "still": True}
+REASONS = [
+    ({"prompt": False}, PARTS, "motion_unet", "no prompt asks for motion", 0.0),
+    ({"prompt": False}, PARTS, "text_encoder", "no prompt", 0.0),
+    (STILL, PARTS, "motion_unet", "nothing may move", 0.0),
+    (
+        {"prompt": True, "still": True},
+        PARTS,
+        "text_encoder",
+        "no network that runs takes text",
+        0.0,
+    ),
+    ({"prompt": True, "frames": 1}, PARTS, "motion_unet", "the camera path has one frame", 0.0),
+    ({"prompt": True}, PARTS, "dit", WORSE_FILL, None),
+    ({"prompt": True, "fill": "none"}, PARTS, "dit", "--fill none", 0.0),
+    ({"prompt": True}, PRIORS, "ldrm", UNTRAINED_FILL, 0.0),
+    ({"prompt": True}, ("vae",), "monocular_depth", "it is not trained", 0.0),
+    (
+        {"prompt": True, "still": True, "fill": "video"},
+        PARTS,
+        "deformation",
+        "nothing may move",
+        0.0,
+    ),
+]
+
+
+def config(name: str = "small") -> ModelConfig:
+    return size_by_name(name)
+
+
+def planned(name: str, trained: tuple[str, ...], request: dict) -> GenerationPlan:
+    return plan_generation(config(name), frozenset(trained), RequestFacts(**request))
+
+
+@pytest.mark.parametrize(("name", "trained", "request_", "parts"), TABLE)
+def test_these_networks_run(
+    name: str, trained: tuple[str, ...], request_: dict, parts: frozenset[str]
+) -> None:
+    plan = planned(name, trained, request_)
+    assert plan.parts == parts
+    skipped = [part.part for part in plan.skipped]
+    assert sorted([*skipped, *plan.parts]) == sorted(model_parts(config(name)))
+    assert plan.fills == ("ldrm" in parts) and plan.moves == ("motion_unet" in parts)
+    assert plan.has_depth == ("monocular_depth" in parts)
+    assert plan.shows_image == ("monocular_depth" in parts or "ldrm" not in parts)
+
+
+@pytest.mark.parametrize(("request_", "trained", "part", "why", "error"), REASONS)
+def test_the_log_says_why_a_network_does_not_run(
+    request_: dict, trained: tuple[str, ...], part: str, why: str, error: float | None
+) -> None:
+    log = RunLog()
+    planned("small", trained, request_).record(config(), log)
+    (entry,) = [entry for entry in log.skipped if entry.what == part]
+    assert (entry.why, entry.error) == (why, error)
+    assert entry.saved == f"{parameter_counts(config())[part]:,} weights neither loaded nor run"
+
+
+def test_a_model_may_fill_by_default() -> None:
+    filling = replace(config(), default_fill="video")
+    plan = plan_generation(filling, PARTS, RequestFacts(prompt=True))
+    assert plan.parts == frozenset(PARTS) and plan.skipped == ()
+    assert not plan_generation(filling, PARTS, RequestFacts(prompt=True, fill="none")).fills
+
+
+@pytest.mark.parametrize("name", ["small", "test"])
+def test_an_untrained_video_model_among_trained_parts_cannot_fill(name: str) -> None:
+    with pytest.raises(ConfigError, match=r"--fill video: .* got deformation, dit untrained"):
+        planned(name, ("vae", "ldrm"), {"prompt": True, "fill": "video"})
+
+
+def test_the_default_never_refuses() -> None:
+    for trained in [(), *((part,) for part in PARTS), PARTS]:
+        for name in ("test", "small", "paper"):
+            for fill in (None, "none"):
+                planned(name, trained, {"prompt": True, "fill": fill})

@@ -1,0 +1,41 @@
+"""The page about the scene file tells the truth, and its reader runs."""
+
+import re
+from pathlib import Path
+
+import oracles_io
+import oracles_spacetime
+import pytest
+
+from diff4splat.io.scene_files.scene_file import save_scene
+from diff4splat.io.scene_files.tensor_file import read_tensors
+
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "scene-format.md"
+
+
+def test_the_printed_reader_runs_and_is_short(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(code.strip().splitlines()) <= 16
+    assert set(re.findall(r"^(?:import|from) (\w+)", code, re.MULTILINE)) == {"json", "safetensors"}
+    save_scene(oracles_io.scene(), tmp_path / "scene.safetensors")
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    said = capsys.readouterr().out
+    assert "2 move; at 0.00 s:" in said
+    assert "4 Gaussians, the first at [-0.25" in said
+
+
+def test_the_tables_name_every_tensor_with_its_shape() -> None:
+    rows = re.findall(
+        r"^\| `(\w+)` \| (\w(?:, \w)*) \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    sizes = {"n": 4, "k": 4, "m": 2, "t": 3, "w": 2, "f": 2}
+    want = {
+        name: tuple(sizes[axis] if axis in sizes else int(axis) for axis in shape.split(", "))
+        for name, shape in rows
+    }
+    files = (oracles_io.GOLDEN, oracles_spacetime.GOLDEN)
+    got = {name: tuple(value.shape) for file in files for name, value in read_tensors(file).items()}
+    assert want == got
