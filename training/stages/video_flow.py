@@ -161,7 +161,7 @@ class VideoFlow:
         losses, vae = self._losses, self._networks.vae
         share = torch.ones_like(vae.latent_std)
         if vae.pca_shortcut is not None:
-            power = vae.pca_shortcut.energy() * vae.latent_std.square()
+            power = vae.pca_shortcut.channel_power() * vae.latent_std.square()
             share = power.pow(losses.channel_power_exponent)
         return share / share.mean()
 
