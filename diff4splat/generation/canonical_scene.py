@@ -105,16 +105,18 @@ def border_gaussians(
     return activate(raw[:, None], own, config)
 
 
-def prune_cells(scene: CanonicalScene, min_opacity: float, log: RunLog) -> CanonicalScene:
+def prune_cells(
+    scene: CanonicalScene, min_opacity: float, log: RunLog, *, may_be_empty: bool = False
+) -> CanonicalScene:
     """Keep Gaussians of at least ``min_opacity`` (Diff4Splat: 0.005), and note what that dropped.
 
     Raises:
-        ConfigError: no Gaussian is left.
+        ConfigError: no Gaussian is left, unless the result ``may_be_empty``.
     """
     opacities, cells = scene.gaussians.opacities, len(scene.cell_index)
     kept = opacities >= min_opacity
     dropped = int((~kept).sum())
-    if dropped == len(kept) and dropped:
+    if dropped == len(kept) and dropped and not may_be_empty:
         raise ConfigError(
             f"--min-opacity: expected a value that leaves some Gaussians, got {min_opacity:g}; "
             "lower it"

@@ -92,7 +92,9 @@ def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill:
         if request.hidden_only:
             config = replace(config, footprint_px=FOOTPRINT_CELLS)
         canonical = reconstruct(raw.maps, grid.base, config, grid.filled)
-        canonical = prune_cells(canonical, request.settings.min_opacity, log)
+        least = request.settings.min_opacity
+        # Where the image is shown, its own Gaussians are left in any case.
+        canonical = prune_cells(canonical, least, log, may_be_empty=request.hidden_only)
     return VideoFill(gaussians=_with_motion(model, request, canonical, log), grid=grid)
 
 

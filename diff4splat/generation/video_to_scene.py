@@ -45,7 +45,9 @@ def scene_from_video(
     settings, log = settings or GenerationSettings(), log or RunLog()
     _require_cameras(video, path)
     model.config.latent_grid(len(video), path.cameras.size_px)
-    model = with_parts(model, RECONSTRUCTION_PARTS)
+    device, model = model_device(model), with_parts(model, RECONSTRUCTION_PARTS)
+    # Parts that are read only now lie on the CPU.
+    model.networks.to(device)
     seen = _encode(model, video, path)
     with log.phases.phase("reconstruct"):
         canonical = video_gaussians(model, seen, log)

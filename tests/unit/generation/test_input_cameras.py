@@ -16,7 +16,7 @@ from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath
 
 
-def picture(known: bool) -> InputImage:
+def input_image(known: bool) -> InputImage:
     camera = pinhole(40.0, (32, 48))
     return InputImage(
         rgb=torch.rand(32, 48, 3), camera=camera, focal_source="test", focal_known=known
@@ -31,17 +31,17 @@ def zooming_path(camera: Camera, focal_px: tuple[float, ...]) -> CameraPath:
 
 
 def test_a_known_lens_stays_and_the_path_keeps_its_zoom() -> None:
-    photo = picture(known=True)
-    same, path = reconcile_intrinsics(photo, zooming_path(photo.camera, (80.0, 80.0, 160.0)))
-    assert same is photo
+    image = input_image(known=True)
+    same, path = reconcile_intrinsics(image, zooming_path(image.camera, (80.0, 80.0, 160.0)))
+    assert same is image
     torch.testing.assert_close(path.cameras.focal_px[:, 0], torch.tensor([40.0, 40.0, 80.0]))
-    torch.testing.assert_close(path.cameras[0].center_px, photo.camera.center_px)
+    torch.testing.assert_close(path.cameras[0].center_px, image.camera.center_px)
 
 
 def test_a_guessed_lens_gives_way_to_the_one_the_path_names() -> None:
-    photo = picture(known=False)
-    path = zooming_path(photo.camera, (80.0, 160.0))
-    changed, same = reconcile_intrinsics(photo, path)
+    image = input_image(known=False)
+    path = zooming_path(image.camera, (80.0, 160.0))
+    changed, same = reconcile_intrinsics(image, path)
     assert same is path
     assert changed.camera.focal_px.tolist() == [80.0, 80.0]
     assert changed.focal_source == "camera path"
@@ -49,10 +49,10 @@ def test_a_guessed_lens_gives_way_to_the_one_the_path_names() -> None:
 
 @pytest.mark.parametrize("known", [True, False])
 def test_agreement_is_left_alone_and_reached_once(known: bool) -> None:
-    photo = picture(known)
-    path = zooming_path(photo.camera, (40.0, 50.0))
-    assert reconcile_intrinsics(photo, path) == (photo, path)
-    once = reconcile_intrinsics(photo, zooming_path(photo.camera, (80.0, 90.0)))
+    image = input_image(known)
+    path = zooming_path(image.camera, (40.0, 50.0))
+    assert reconcile_intrinsics(image, path) == (image, path)
+    once = reconcile_intrinsics(image, zooming_path(image.camera, (80.0, 90.0)))
     twice = reconcile_intrinsics(*once)
     assert twice[0] is once[0]
     assert twice[1] is once[1]

@@ -54,18 +54,18 @@ def test_impossible_fields_of_view_are_refused(fov_deg: float) -> None:
 
 
 @pytest.mark.parametrize("shape", [(300, 500), (300, 560), (520, 300)])
-def test_a_pixel_of_the_model_picture_looks_where_the_photograph_does(
+def test_pixels_keep_their_rays_through_crop_and_resize(
     shape: tuple[int, int],
 ) -> None:
-    """A picture whose colours are its own ray directions still shows them after crop and resize."""
+    """An image whose colours are its own ray directions still shows them after crop and resize."""
     size, focal = shape, 400.0
     directions = camera_rays(pinhole(focal, size))[..., :2]
     rgb = torch.cat([directions / 2 + 0.5, torch.zeros(*size, 1)], -1)
-    picture = prepare_image(rgb, FocalChoice(focal_px=focal, source="test"), 128)
-    seen = (picture.rgb[..., :2] - 0.5) * 2
-    expected = camera_rays(picture.camera)[..., :2]
+    image = prepare_image(rgb, FocalChoice(focal_px=focal, source="test"), 128)
+    seen = (image.rgb[..., :2] - 0.5) * 2
+    expected = camera_rays(image.camera)[..., :2]
     torch.testing.assert_close(seen[2:-2, 2:-2], expected[2:-2, 2:-2], atol=2e-3, rtol=0)
-    across, along = picture.camera.focal_px.tolist()
+    across, along = image.camera.focal_px.tolist()
     assert across == pytest.approx(along, rel=0.01), "pixels stay square"
 
 

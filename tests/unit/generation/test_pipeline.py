@@ -13,6 +13,11 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
+from diff4splat.models.config.sizes import small_size
+from diff4splat.models.factory import PARTS, create_networks
+from diff4splat.models.hub.model import Model, with_parts
+from diff4splat.models.hub.weights import weights_sha256
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -23,7 +28,7 @@ QUICK = GenerationSettings(steps=2)
 
 
 @pytest.fixture
-def picture() -> InputImage:
+def image() -> InputImage:
     return InputImage(
         rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="test"
     )
@@ -36,6 +41,7 @@ def pipeline() -> Diff4SplatPipeline:
 
 def randomize(pipeline: Diff4SplatPipeline, part: str, scale: float = 0.3) -> None:
     """Give the zero-initialised layers of a network random weights, as training would."""
+    pipeline.model = with_parts(pipeline.model, (part,))
     generator = torch.Generator().manual_seed(5)
     for parameter in getattr(pipeline.model.networks, part).parameters():
         if not bool(parameter.any()):
@@ -52,10 +58,10 @@ def assert_same_scene(left: Scene, right: Scene) -> None:
         assert torch.equal(left.state_at(time_s).means, right.state_at(time_s).means)
 
 
-def test_an_untrained_scene_says_so_and_stands_still(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+def test_an_untrained_scene_says_so_and_is_static(
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
-    scene = pipeline(picture, "spiral", settings=QUICK)
+    scene = pipeline(image, "spiral", settings=QUICK)
     assert scene.provenance.untrained
     assert scene.provenance.model == "test"
     assert isinstance(scene.motion, StaticMotion)
@@ -64,25 +70,25 @@ def test_an_untrained_scene_says_so_and_stands_still(
 
 
 def test_equal_seeds_give_equal_bits_and_other_seeds_do_not(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
     for part in ("dit", "ldrm", "deformation"):
         randomize(pipeline, part)
     torch.rand(3)
-    first = pipeline(picture, "arc", seed=1, settings=QUICK)
+    first = pipeline(image, "arc", seed=1, settings=QUICK)
     torch.rand(7)
-    assert_same_scene(first, pipeline(picture, "arc", seed=1, settings=QUICK))
-    other = pipeline(picture, "arc", seed=2, settings=QUICK)
+    assert_same_scene(first, pipeline(image, "arc", seed=1, settings=QUICK))
+    other = pipeline(image, "arc", seed=2, settings=QUICK)
     assert len(other.gaussians) != len(first.gaussians) or not torch.equal(
         other.gaussians.means, first.gaussians.means
     )
 
 
 def test_random_heads_move_and_the_file_keeps_the_motion(
-    pipeline: Diff4SplatPipeline, picture: InputImage, tmp_path: Path
+    pipeline: Diff4SplatPipeline, image: InputImage, tmp_path: Path
 ) -> None:
     randomize(pipeline, "deformation", 0.05)
-    scene = pipeline(picture, "forward", settings=QUICK)
+    scene = pipeline(image, "forward", settings=QUICK)
     assert isinstance(scene.motion, KeyframeMotion)
     assert len(scene.motion.moving_index) > 100
     assert scene.motion.time_range_s == (0.0, 2.0)
@@ -93,33 +99,33 @@ def test_random_heads_move_and_the_file_keeps_the_motion(
 
 
 def test_gaussians_that_hardly_move_store_no_keys(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
     randomize(pipeline, "deformation", 0.05)
     log = RunLog()
-    generous = replace(QUICK, still_px=50.0)
-    trimmed = pipeline(picture, "forward", settings=generous, log=log)
-    strict = pipeline(picture, "forward", settings=replace(QUICK, still_px=0.0))
+    generous = replace(QUICK, static_threshold_px=50.0)
+    trimmed = pipeline(image, "forward", settings=generous, log=log)
+    strict = pipeline(image, "forward", settings=replace(QUICK, static_threshold_px=0.0))
     assert len(trimmed.motion.moving_index) < len(strict.motion.moving_index)
-    assert "key times of still Gaussians" in {omission.what for omission in log.skipped}
+    assert "key times of static Gaussians" in {omission.what for omission in log.skipped}
 
 
-def test_a_prompt_changes_the_scene_and_builds_the_text_encoder(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+def test_a_prompt_changes_the_scene_and_loads_the_text_encoder(
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
     for part in ("dit", "ldrm"):
         randomize(pipeline, part)
     plain_log, log = RunLog(), RunLog()
-    plain = pipeline(picture, "arc", settings=QUICK, log=plain_log)
-    told = pipeline(picture, "arc", "a red ball rolls", settings=QUICK, log=log)
-    assert not torch.equal(plain.gaussians.sh[:50], told.gaussians.sh[:50])
-    assert "text encoder" in {omission.what for omission in plain_log.skipped}
-    assert "text encoder" not in {omission.what for omission in log.skipped}
-    assert told.provenance.prompt == "a red ball rolls"
+    plain = pipeline(image, "arc", settings=QUICK, log=plain_log)
+    prompted = pipeline(image, "arc", "a red ball rolls", settings=QUICK, log=log)
+    assert not torch.equal(plain.gaussians.sh[:50], prompted.gaussians.sh[:50])
+    assert "text_encoder" in {omission.what for omission in plain_log.skipped}
+    assert "text_encoder" not in {omission.what for omission in log.skipped}
+    assert prompted.provenance.prompt == "a red ball rolls"
 
 
 def test_the_image_latent_survives_sampling_unchanged(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
     from diff4splat.generation.video_sampling import sample_video
 
@@ -134,17 +140,17 @@ def test_the_image_latent_survives_sampling_unchanged(
 
 
 def test_saved_and_loaded_pipelines_agree(
-    pipeline: Diff4SplatPipeline, picture: InputImage, tmp_path: Path
+    pipeline: Diff4SplatPipeline, image: InputImage, tmp_path: Path
 ) -> None:
     for part in ("dit", "ldrm"):
         randomize(pipeline, part)
     pipeline.save_pretrained(tmp_path / "model")
     again = Diff4SplatPipeline.from_pretrained(tmp_path / "model")
-    assert again.model.untrained
-    assert len(again.model.weights_sha256) == 64
+    assert again.model.loaded == frozenset()
+    assert len(again.model.weights_sha256()) == 64
     prompt = "waves"
-    expected = pipeline(picture, "arc", prompt, settings=QUICK)
-    assert_same_scene(expected, again(picture, "arc", prompt, settings=QUICK))
+    expected = pipeline(image, "arc", prompt, settings=QUICK)
+    assert_same_scene(expected, again(image, "arc", prompt, settings=QUICK))
 
 
 def test_a_model_folder_without_provenance_counts_as_untrained(
@@ -155,18 +161,18 @@ def test_a_model_folder_without_provenance_counts_as_untrained(
     with pytest.raises(CheckpointError, match="untrained"):
         Diff4SplatPipeline.from_pretrained(tmp_path)
     (tmp_path / "provenance.json").unlink()
-    assert Diff4SplatPipeline.from_pretrained(tmp_path).model.untrained
+    assert Diff4SplatPipeline.from_pretrained(tmp_path).model.trained == frozenset()
 
 
-def test_models_that_cannot_be_had_are_refused() -> None:
+def test_unknown_and_too_large_models_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="expected test, small, paper"):
         Diff4SplatPipeline.from_pretrained("huge")
     with pytest.raises(ConfigError, match="GiB"):
-        Diff4SplatPipeline.from_pretrained("paper")
+        Diff4SplatPipeline.from_pretrained("paper").save_pretrained(tmp_path)
 
 
 def test_a_single_camera_and_a_file_name_are_enough(
-    pipeline: Diff4SplatPipeline, picture: InputImage, tmp_path: Path
+    pipeline: Diff4SplatPipeline, image: InputImage, tmp_path: Path
 ) -> None:
     from diff4splat.io.photos.images import write_png
 
@@ -174,19 +180,19 @@ def test_a_single_camera_and_a_file_name_are_enough(
     scene = pipeline(tmp_path / "photo.png", "static", settings=QUICK)
     assert scene.path.cameras.size_px == (16, 32)
     one = replace(scene.path, cameras=scene.path.cameras[:1], times_s=scene.path.times_s[:1])
-    assert len(pipeline(picture, one, settings=QUICK).path) == 1
+    assert len(pipeline(image, one, settings=QUICK).path) == 1
 
 
-def test_bad_prompts_are_refused(pipeline: Diff4SplatPipeline, picture: InputImage) -> None:
+def test_bad_prompts_are_refused(pipeline: Diff4SplatPipeline, image: InputImage) -> None:
     with pytest.raises(InputError, match="prompt"):
-        pipeline(picture, "static", "", settings=QUICK)
+        pipeline(image, "static", "", settings=QUICK)
 
 
 def test_double_precision_is_taken_and_wrong_sizes_are_named(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
-    exact = replace(picture, rgb=picture.rgb.double(), camera=picture.camera.to(torch.float64))
-    expected = pipeline(picture, "arc", settings=QUICK)
+    exact = replace(image, rgb=image.rgb.double(), camera=image.camera.to(torch.float64))
+    expected = pipeline(image, "arc", settings=QUICK)
     assert_same_scene(pipeline(exact, expected.path.to(torch.float64), settings=QUICK), expected)
     odd = InputImage(rgb=torch.rand(24, 24, 3), camera=pinhole(30.0, (24, 24)), focal_source="test")
     with pytest.raises(InputError, match="multiples of 16"):
@@ -194,22 +200,147 @@ def test_double_precision_is_taken_and_wrong_sizes_are_named(
 
 
 def test_a_path_that_starts_later_is_shown_moving(
-    pipeline: Diff4SplatPipeline, picture: InputImage
+    pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
     randomize(pipeline, "deformation", 0.05)
-    path = pipeline(picture, "arc", settings=QUICK).path
+    path = pipeline(image, "arc", settings=QUICK).path
     later = replace(path, times_s=path.times_s + 5)
-    scene = pipeline(picture, later, settings=QUICK)
+    scene = pipeline(image, later, settings=QUICK)
     assert float(scene.path.times_s[0]) == 0
     assert scene.motion.time_range_s == pytest.approx((0.0, float(scene.path.times_s[-1])))
 
 
-def test_the_text_encoder_is_built_alone_and_the_same_as_with_the_others(
-    pipeline: Diff4SplatPipeline,
-) -> None:
-    from diff4splat.models.factory import create_networks, create_text_encoder
+def priors_model(trained: tuple[str, ...] = PARTS) -> Model:
+    """The ``small`` size with random priors under the claim that parts are trained."""
+    return Model(config=small_size(), trained=frozenset(trained))
 
-    config = pipeline.model.config
-    alone = create_text_encoder(config).state_dict()
-    together = create_networks(config, with_text=True).text_encoder.state_dict()
+
+def refuse_networks(monkeypatch: pytest.MonkeyPatch, model: Model) -> None:
+    def refuse(*arguments: object, **named: object) -> None:
+        raise AssertionError("a network ran")
+
+    for _, part in model.networks.parts():
+        for module in part.modules():
+            monkeypatch.setattr(module, "forward", refuse)
+
+
+def test_networks_load_when_they_are_needed_and_stay(image: InputImage) -> None:
+    pipeline = Diff4SplatPipeline(priors_model())
+    pipeline(image, "arc", settings=QUICK)
+    assert pipeline.model.loaded == {"monocular_depth"}
+    first = pipeline.model.networks.monocular_depth
+    pipeline(image, "arc", "a ball rolls", settings=QUICK)
+    assert pipeline.model.loaded == {"monocular_depth", "motion_unet", "text_encoder"}
+    assert pipeline.model.networks.monocular_depth is first
+
+
+def test_what_was_loaded_before_changes_nothing(image: InputImage) -> None:
+    whole = with_parts(priors_model(), PARTS)
+    for settings in (QUICK, replace(QUICK, fill="video"), replace(QUICK, still=True)):
+        for prompt in (None, "a ball rolls"):
+            scenes = [
+                Diff4SplatPipeline(model)(image, "left", prompt, settings=settings)
+                for model in (priors_model(), whole)
+            ]
+            assert_same_scene(*scenes)
+
+
+def test_a_model_without_trained_priors_shows_the_image_on_a_plane(
+    image: InputImage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    partly = with_parts(priors_model(("vae", "ldrm", "deformation")), PARTS)
+    refuse_networks(monkeypatch, partly)
+    scene = Diff4SplatPipeline(partly)(image, "arc", "waves", settings=QUICK)
+    assert isinstance(scene.motion, StaticMotion)
+    shown = scene.gaussians.means[: 32 * 32, 2]
+    torch.testing.assert_close(shown, torch.full_like(shown, PLANE_DEPTH))
+    assert scene.provenance.prompt == "waves" and not scene.provenance.untrained
+
+
+@pytest.mark.parametrize(
+    ("trained", "untrained"),
+    [((), True), (PARTS, False), (("monocular_depth",), False), (("motion_unet",), True)],
+)
+def test_a_scene_is_untrained_if_a_network_that_ran_is(
+    image: InputImage, trained: tuple[str, ...], untrained: bool
+) -> None:
+    pipeline = Diff4SplatPipeline(priors_model(trained))
+    scene = pipeline(image, "arc", "a ball rolls", settings=QUICK)
+    assert scene.provenance.untrained is untrained
+
+
+def test_the_digest_is_that_of_the_networks_that_ran(
+    pipeline: Diff4SplatPipeline, image: InputImage, tmp_path: Path
+) -> None:
+    assert pipeline(image, "arc", settings=QUICK).provenance.weights_sha256 == "none"
+    pipeline.save_pretrained(tmp_path)
+    again = Diff4SplatPipeline.from_pretrained(tmp_path)
+    video = ("vae", "dit", "ldrm", "deformation")
+    for prompt, parts in ((None, video), ("waves", (*video, "text_encoder"))):
+        scene = again(image, "arc", prompt, settings=QUICK)
+        assert scene.provenance.weights_sha256 == weights_sha256(tmp_path, parts)
+
+
+def test_still_moves_nothing(image: InputImage, pipeline: Diff4SplatPipeline) -> None:
+    randomize(pipeline, "deformation", 0.05)
+    assert isinstance(pipeline(image, "arc", settings=QUICK).motion, KeyframeMotion)
+    still = pipeline(image, "arc", "waves", settings=replace(QUICK, still=True))
+    assert isinstance(still.motion, StaticMotion)
+
+
+def test_the_image_and_the_path_get_one_lens(
+    image: InputImage, pipeline: Diff4SplatPipeline
+) -> None:
+    path = pipeline(image, "arc", settings=QUICK).path
+    zoomed = replace(path.cameras, focal_px=2 * path.cameras.focal_px)
+    path = replace(path, cameras=zoomed)
+    known = pipeline(image, path, settings=QUICK)
+    torch.testing.assert_close(known.path.cameras[0].focal_px, torch.tensor([30.0, 30.0]))
+    guessed = pipeline(replace(image, focal_known=False), path, settings=QUICK)
+    torch.testing.assert_close(guessed.path.cameras[0].focal_px, torch.tensor([60.0, 60.0]))
+    assert not torch.equal(guessed.gaussians.means, known.gaussians.means)
+
+
+def test_requests_are_refused_before_weights_are_read(image: InputImage) -> None:
+    pipeline = Diff4SplatPipeline(priors_model(("vae",)))
+    with pytest.raises(ConfigError, match="--fill video"):
+        pipeline(image, "arc", settings=replace(QUICK, fill="video"))
+    for bad in ("", " ", "x" * 10_000):
+        with pytest.raises(InputError, match="prompt"):
+            pipeline(image, "arc", bad, settings=QUICK)
+    with pytest.raises(ConfigError, match="--seed"):
+        pipeline(image, "arc", seed=-1, settings=QUICK)
+    assert pipeline.model.loaded == frozenset()
+
+
+def test_scenes_come_back_to_the_cpu(image: InputImage, pipeline: Diff4SplatPipeline) -> None:
+    assert pipeline.to("cpu") is pipeline
+    scene = pipeline(image, "arc", settings=QUICK)
+    assert scene.gaussians.means.device == torch.device("cpu")
+
+
+@pytest.mark.parametrize(("fill", "dilation_px2"), [("none", 0.0), ("video", 0.3)])
+def test_the_image_is_drawn_without_dilation(
+    image: InputImage, pipeline: Diff4SplatPipeline, fill: str, dilation_px2: float
+) -> None:
+    scene = pipeline(image, "arc", settings=replace(QUICK, fill=fill))
+    assert scene.dilation_px2 == dilation_px2
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+@pytest.mark.parametrize("fill", ["none", "video"])
+def test_an_image_of_one_colour_gives_a_finite_scene(value: float, fill: str) -> None:
+    flat = InputImage(
+        rgb=torch.full((32, 48, 3), value), camera=pinhole(30.0, (32, 48)), focal_source="test"
+    )
+    settings = replace(QUICK, fill=fill)
+    scene = Diff4SplatPipeline(priors_model())(flat, "left", "waves", settings=settings)
+    for field in fields(Gaussians):
+        assert bool(getattr(scene.gaussians, field.name).isfinite().all()), field.name
+
+
+def test_a_network_has_the_same_weights_alone_and_with_others() -> None:
+    config = small_size()
+    alone = create_networks(config, parts=("text_encoder",)).text_encoder.state_dict()
+    together = create_networks(config).text_encoder.state_dict()
     assert all(torch.equal(alone[key], together[key]) for key in together)

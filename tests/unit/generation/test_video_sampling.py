@@ -1,4 +1,4 @@
-"""What the video model is asked while the solver runs, seen through a stand-in."""
+"""Which passes of the video model the solver runs, recorded by a stand-in."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ STEPS = 8
 
 
 class RecordingDit(VideoDiT):
-    """Answers with its input and remembers what it was asked."""
+    """Returns its input and records every call."""
 
     def __init__(self) -> None:
         super().__init__(size_by_name("test"))

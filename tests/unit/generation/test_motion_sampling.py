@@ -1,0 +1,117 @@
+"""The motion prior's sample: what moves, seeds and guidance."""
+
+import pytest
+import torch
+from image_layers import input_image, random_rgb
+
+from diff4splat.flow.guidance import CallCount, Guidance
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.motion_sampling import (
+    MotionRequest,
+    MotionSample,
+    bilateral_smooth,
+    sample_motion,
+)
+from diff4splat.generation.settings import GenerationSettings, MotionSettings
+from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.motion_unet.unet import MotionUNet
+
+SIDE_PX = 32
+
+
+@pytest.fixture
+def network() -> MotionUNet:
+    """Fresh, but for what every test sets itself."""
+    return MotionUNet(8, 1, tiny_size().text)
+
+
+def moves_right(network: MotionUNet, units: float) -> MotionUNet:
+    """Everything moves to the right, for sure."""
+    with torch.no_grad():
+        network.motion_head.bias[0] = units
+        network.mask_head.bias.fill_(5.0)
+    return network
+
+
+def request(text: bool = False, seed: int = 0, **changes: object) -> MotionRequest:
+    torch.manual_seed(3)
+    states = torch.randn(1, 4, tiny_size().text.width) if text else None
+    settings = GenerationSettings(motion=MotionSettings(**changes))
+    return MotionRequest(text=states, seed=seed, settings=settings)
+
+
+def image() -> InputImage:
+    return input_image(random_rgb(SIDE_PX, SIDE_PX))
+
+
+def sample_of(probability: torch.Tensor) -> MotionSample:
+    return MotionSample(field=torch.zeros(3, 2, 1, 1), probability=probability, calls=CallCount())
+
+
+def test_the_most_probable_moves_where_nothing_is_probable() -> None:
+    probability = torch.tensor([[0.05, 0.2], [0.3, 0.14]])
+    sample = sample_of(probability)
+    assert sample.mask(0.5).tolist() == [[False, True], [True, False]]
+    assert sample.mask(0.1).tolist() == [[False, True], [True, True]]
+    assert not sample_of(0 * probability).mask(0.3).any()
+    assert bool(sample_of(probability + 0.6).mask(0.5).all())
+
+
+@pytest.mark.parametrize(("second", "moves"), [(0.39, False), (0.41, True)])
+def test_a_component_moves_where_some_of_it_is_probable(second: float, moves: bool) -> None:
+    probability = torch.full((6, 9), 0.2)
+    probability[1:3, 1:4] = torch.tensor([[0.4, 0.5, 0.35], [0.4, 0.95, 0.4]])
+    probability[2:5, 6:8] = torch.tensor([[0.35, 0.31], [0.38, second], [0.29, 0.35]])
+    wanted = probability > 0.3
+    wanted[:, 5:] &= moves
+    assert torch.equal(sample_of(probability).mask(0.3), wanted)
+
+
+def test_the_most_probable_component_moves_whole() -> None:
+    probability = torch.zeros(6, 9)
+    probability[1:3, 1:4], probability[1, 1], probability[4:, 6:] = 0.32, 0.38, 0.36
+    wanted = torch.zeros(6, 9, dtype=torch.bool)
+    wanted[1:3, 1:4] = True
+    assert torch.equal(sample_of(probability).mask(0.3), wanted)
+
+
+@torch.no_grad()
+def test_motion_starts_at_zero_and_ends_at_the_prediction(network: MotionUNet) -> None:
+    sample = sample_motion(moves_right(network, 2.0), image(), 3, request())
+    assert sample.field.shape == (3, 3, SIDE_PX // 4, SIDE_PX // 4)
+    assert not sample.field[:, 0].any()
+    later = sample.field[0, 1:]
+    torch.testing.assert_close(later, torch.full_like(later, 2.0))
+    assert sample.probability.shape == (SIDE_PX, SIDE_PX)
+    assert float(sample.probability.min()) > 0.99
+    assert sample.calls.conditional == 0 < sample.calls.unconditional
+
+
+@torch.no_grad()
+def test_seeds_decide_and_repeat(network: MotionUNet) -> None:
+    torch.nn.init.normal_(network.motion_head.weight)
+    fields = [sample_motion(network, image(), 2, request(seed=seed)).field for seed in (0, 1, 0)]
+    assert torch.equal(fields[0], fields[2])
+    assert not torch.allclose(fields[0], fields[1])
+
+
+@torch.no_grad()
+@pytest.mark.parametrize(("weight", "passes"), [(1.0, (8, 0)), (3.0, (8, 8)), (0.0, (0, 8))])
+def test_guidance_runs_only_the_passes_that_it_needs(
+    network: MotionUNet, weight: float, passes: tuple[int, int]
+) -> None:
+    guided = request(text=True, guidance=Guidance(weight=weight), steps=8)
+    calls = sample_motion(network, image(), 2, guided).calls
+    assert (calls.conditional, calls.unconditional) == passes
+
+
+def test_probabilities_are_averaged_within_a_colour_and_not_across() -> None:
+    rgb = torch.zeros(1, 3, SIDE_PX, SIDE_PX)
+    rgb[..., 16:] = 1.0
+    probability = torch.zeros(1, SIDE_PX, SIDE_PX)
+    probability[:, :, 12:16] = 1.0
+    smooth = bilateral_smooth(probability, rgb)
+    assert float(smooth[0, 16, 10]) > 0.1
+    assert float(smooth[0, :, 16:].max()) < 1e-3
+    flat = torch.full((1, SIDE_PX, SIDE_PX), 0.4)
+    torch.testing.assert_close(bilateral_smooth(flat, torch.rand(1, 3, SIDE_PX, SIDE_PX)), flat)

@@ -1,0 +1,109 @@
+"""Depth and displacement by the priors of a model, and what stands in where there is none."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from image_layers import input_image, random_rgb
+
+from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.layered_image.build import ImageMaps
+from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
+from diff4splat.generation.motion_sampling import MotionRequest
+from diff4splat.generation.priors import image_depth, image_maps
+from diff4splat.generation.settings import GenerationSettings
+from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
+from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.model import Model
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.motion_unet.motion_field import UNIT
+from diff4splat.progress.run_log import RunLog
+
+SIDE_PX = 32
+
+
+def model_of(*parts: str) -> Model:
+    config = replace(
+        tiny_size(),
+        monocular_depth=MonocularDepthConfig(channels=8),
+        motion_unet=MotionUNetConfig(width=8, heads=1),
+    )
+    return Model(config=config, networks=create_networks(config, parts=parts))
+
+
+def image() -> InputImage:
+    return input_image(random_rgb(SIDE_PX, SIDE_PX))
+
+
+@torch.no_grad()
+def maps_of(model: Model, frames: int = 2, log: RunLog | None = None) -> ImageMaps:
+    text = torch.randn(1, 4, model.config.text.width)
+    request = MotionRequest(text=text, seed=0, settings=GenerationSettings())
+    return image_maps(model, image(), frames, request, log or RunLog())
+
+
+def moves_right(model: Model, share: float, probability: float = 0.99) -> Model:
+    """Everything moves by a share of its depth, as probably as that."""
+    with torch.no_grad():
+        model.networks.motion_unet.motion_head.bias[0] = share / UNIT
+        model.networks.motion_unet.mask_head.bias.fill_(math.log(probability / (1 - probability)))
+    return model
+
+
+def test_without_priors_the_image_is_a_static_plane() -> None:
+    log = RunLog()
+    maps = maps_of(model_of(), log=log)
+    assert torch.equal(maps.depth, torch.full((SIDE_PX, SIDE_PX), PLANE_DEPTH))
+    assert maps.displacement is None and len(log.skipped) == 0
+    assert "sample motion" not in log.phases.seconds
+
+
+@torch.no_grad()
+def test_the_depth_prior_decides_about_depth() -> None:
+    model = model_of("monocular_depth")
+    network, limit = model.networks.monocular_depth, model.config.activation.log_distance_limit
+    for parameter in network.parameters():
+        parameter.add_(0.1 * torch.randn_like(parameter))
+    raw = network(image().rgb.movedim(-1, 0)[None])[0, 0].double()
+    wanted = PLANE_DEPTH * (limit * (raw / limit).tanh()).exp()
+    torch.testing.assert_close(image_depth(model, image()).double(), wanted, rtol=1e-5, atol=0)
+    assert float(wanted.std()) > 0
+
+
+def test_displacement_is_a_share_of_depth_from_zero_on() -> None:
+    maps = maps_of(moves_right(model_of("motion_unet"), 0.25), frames=3)
+    assert maps.displacement.shape == (3, SIDE_PX, SIDE_PX, 3)
+    assert not maps.displacement[0].any() and not maps.displacement[..., 1:].any()
+    later = maps.displacement[1:, ..., 0]
+    torch.testing.assert_close(later, torch.full_like(later, 0.25 * PLANE_DEPTH))
+
+
+@pytest.mark.parametrize(
+    ("share", "probability", "moves"),
+    [
+        (0.25, 0.05, False),
+        (0.25, 0.3, True),
+        (0.9 * MIN_RELATIVE_DISPLACEMENT, 0.9, False),
+        (1.1 * MIN_RELATIVE_DISPLACEMENT, 0.9, True),
+    ],
+)
+def test_what_hardly_or_improbably_moves_is_static(
+    share: float, probability: float, moves: bool
+) -> None:
+    maps = maps_of(moves_right(model_of("motion_unet"), share, probability))
+    assert (maps.displacement is not None) is moves
+
+
+def test_one_latent_frame_has_no_motion() -> None:
+    log = RunLog()
+    maps = maps_of(moves_right(model_of("motion_unet"), 0.25), frames=1, log=log)
+    assert maps.displacement is None and "sample motion" not in log.phases.seconds
+
+
+def test_saved_guidance_passes_are_noted() -> None:
+    log = RunLog()
+    maps_of(model_of("motion_unet"), log=log)
+    (omission,) = log.skipped
+    assert omission.what == "guidance pass" and "weight of 1" in omission.why

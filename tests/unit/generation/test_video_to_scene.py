@@ -1,0 +1,68 @@
+"""A true video with its cameras to a scene."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from image_layers import FOCAL_PX, sliding_path
+
+from diff4splat.errors import InputError, ShapeError
+from diff4splat.generation.settings import GenerationSettings
+from diff4splat.generation.video_to_scene import scene_from_video
+from diff4splat.geometry.camera import pinhole
+from diff4splat.models.config.sizes import size_by_name
+from diff4splat.models.hub.model import Model
+from diff4splat.paths.camera_path import CameraPath
+from diff4splat.progress.run_log import RunLog
+from diff4splat.scene.motion.static import StaticMotion
+
+SIDE_PX, FRAMES = 32, 5
+EVERYTHING = GenerationSettings(min_opacity=0.0)
+
+
+def video(frames: int = FRAMES) -> torch.Tensor:
+    return torch.rand(frames, SIDE_PX, SIDE_PX, 3)
+
+
+def path(frames: int = FRAMES) -> CameraPath:
+    return sliding_path(pinhole(FOCAL_PX, (SIDE_PX, SIDE_PX)), frames, (0.1, 0.0, 0.0))
+
+
+def model(name: str = "test") -> Model:
+    return Model(config=size_by_name(name))
+
+
+@pytest.mark.parametrize("name", ["test", "small"])
+def test_a_fresh_model_shows_the_video_on_planes_and_is_static(name: str) -> None:
+    scene = scene_from_video(model(name), video(), path(), EVERYTHING)
+    assert isinstance(scene.motion, StaticMotion)
+    assert scene.provenance.untrained and scene.provenance.weights_sha256 == "none"
+    assert scene.path.times_s.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert bool(scene.gaussians.means.isfinite().all())
+    if name == "test":
+        assert len(scene.gaussians) == FRAMES * SIDE_PX**2
+
+
+def test_only_what_reconstructs_is_loaded_and_the_video_model_is_not() -> None:
+    log = RunLog()
+    whole = model()
+    scene_from_video(whole, video(), path(), EVERYTHING, log)
+    assert whole.loaded == frozenset()
+    assert "sample video" not in log.phases.seconds
+    trained = replace(whole, trained=frozenset({"vae", "ldrm", "deformation"}))
+    assert not scene_from_video(trained, video(), path(), EVERYTHING).provenance.untrained
+
+
+def test_equal_videos_give_equal_scenes() -> None:
+    shown = video()
+    left, right = (scene_from_video(model(), shown, path(), EVERYTHING) for _ in range(2))
+    assert torch.equal(left.gaussians.sh, right.gaussians.sh)
+    other = scene_from_video(model(), 1 - shown, path(), EVERYTHING)
+    assert not torch.equal(left.gaussians.sh, other.gaussians.sh)
+
+
+def test_frames_and_cameras_must_fit() -> None:
+    with pytest.raises(ShapeError, match="expected 5 cameras"):
+        scene_from_video(model(), video(), path(4))
+    with pytest.raises(InputError, match="1 \\+ 4 k"):
+        scene_from_video(model(), video(4), path(4))
