@@ -33,14 +33,6 @@ def log_weights(
     return _nearness(side, cells) - unlike / (2 * ALIKE**2)
 
 
-def bilateral_upsample(
-    maps: Float[Tensor, "c h w"], log_weight: Float[Tensor, "k sh sw"]
-) -> Float[Tensor, "c sh sw"]:
-    """Weighted means of the cells around every pixel."""
-    side = log_weight.shape[-1] // maps.shape[-1]
-    return (log_weight.softmax(0) * neighbourhood(maps, side)).sum(1)
-
-
 def _nearness(side: int, cells: Float[Tensor, "h w 3"]) -> Float[Tensor, "k sh sw"]:
     inside = (torch.arange(side).to(cells) + 0.5) / side - 0.5
     away = (torch.arange(-1, 2).to(cells)[:, None] - inside).square()

@@ -3,7 +3,7 @@
     clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
              first latent frame: clean, level 0, no loss
 
-Axes: ``b`` batch, ``c t h w`` latents with their motion channels.
+Axes: ``b`` batch, ``c t h w`` latents.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from torch import Tensor
 
 from diff4splat.flow.path import add_noise
 from diff4splat.models.blocks.patches import fill_first_pack
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.factory import Networks
 from diff4splat.training.latents.latent_batch import LatentBatch
@@ -164,6 +165,12 @@ class VideoFlow:
             power = vae.pca_shortcut.energy() * vae.latent_std.square()
             share = power.pow(losses.channel_power_exponent)
         return share / share.mean()
+
+
+def condition_parts(model: ModelConfig) -> tuple[str, ...]:
+    """Names of the parts that make render conditions of a model, beside its autoencoder."""
+    conditioned = model.dit.render_condition and model.monocular_depth.used
+    return ("monocular_depth",) if conditioned else ()
 
 
 def hidden_share(batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:

@@ -2,11 +2,7 @@
 
 import torch
 
-from diff4splat.models.blocks.bilateral_upsampling import (
-    bilateral_upsample,
-    log_weights,
-    neighbourhood,
-)
+from diff4splat.models.blocks.bilateral_upsampling import log_weights, neighbourhood
 
 RED, BLUE = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.1, 0.9])
 
@@ -16,6 +12,12 @@ def halves(height: int, width: int) -> torch.Tensor:
     picture = BLUE.expand(height, width, 3).clone()
     picture[:, : width // 2] = RED
     return picture
+
+
+def bilateral_upsample(maps: torch.Tensor, log_weight: torch.Tensor) -> torch.Tensor:
+    """Weighted means of the cells around every pixel."""
+    side = log_weight.shape[-1] // maps.shape[-1]
+    return (log_weight.softmax(0) * neighbourhood(maps, side)).sum(1)
 
 
 def test_every_pixel_sees_the_nine_cells_around_its_own() -> None:
