@@ -82,18 +82,27 @@ class VideoFlow:
     def measures(self, batch: LatentBatch, training: bool) -> Terms:
         """``flow_error``: mean squared error of the velocity over fixed levels.
 
-        ``hidden_error`` is the same, weighted by how much of a latent cell the first frame hides.
+        ``hidden_error`` is the same, weighted by how much of a latent cell the first frame hides;
+        NaN where it hides nothing.
         """
         videos = [self.at_level(batch, level) for level in EVAL_LEVELS]
         predicted = [self.velocity(batch, one, training) for one in videos]
-        hidden = hidden_share(batch)
-        measured = {"flow_error": None} | ({} if hidden is None else {"hidden_error": hidden})
-        return {
-            name: torch.stack(
-                [self._error(*pair, cells=cells) for pair in zip(predicted, videos, strict=True)]
-            ).mean(0)
-            for name, cells in measured.items()
-        }
+        pairs, hidden = list(zip(predicted, videos, strict=True)), hidden_share(batch)
+        measured = {"flow_error": self._mean_error(pairs)}
+        if hidden is not None:
+            applies = hidden[:, 1:].flatten(1).any(1)
+            error = self._mean_error(pairs, hidden)
+            measured["hidden_error"] = torch.where(applies, error, torch.nan)
+        return measured
+
+    def _mean_error(
+        self,
+        pairs: list[tuple[Tensor, NoisyVideo]],
+        cells: Float[Tensor, "b t h w"] | None = None,
+    ) -> Float[Tensor, " b"]:
+        """The mean error of predicted velocities."""
+        errors = [self._error(velocity, video, cells=cells) for velocity, video in pairs]
+        return torch.stack(errors).mean(0)
 
     def noisy(self, batch: LatentBatch) -> NoisyVideo:
         """Noise and level of every sample."""
