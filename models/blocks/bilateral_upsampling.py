@@ -34,16 +34,8 @@ def log_weights(
     return _log_spatial_weight(side, cells) - color_distance / (2 * COLOR_SIGMA**2)
 
 
-<<<<<<< HEAD
 def _log_spatial_weight(side: int, cells: Float[Tensor, "h w 3"]) -> Float[Tensor, "k sh sw"]:
     offset = (torch.arange(side).to(cells) + 0.5) / side - 0.5
     distance = (torch.arange(-1, 2).to(cells)[:, None] - offset).square()
     square = (distance[:, None, :, None] + distance[None, :, None, :]).flatten(0, 1)
     return -square.repeat(1, *cells.shape[:2]) / (2 * DISTANCE_SIGMA**2)
-=======
-def _nearness(side: int, cells: Float[Tensor, "h w 3"]) -> Float[Tensor, "k sh sw"]:
-    inside = (torch.arange(side).to(cells) + 0.5) / side - 0.5
-    away = (torch.arange(-1, 2).to(cells)[:, None] - inside).square()
-    square = (away[:, None, :, None] + away[None, :, None, :]).flatten(0, 1)
-    return -square.repeat(1, *cells.shape[:2]) / (2 * NEAR**2)
->>>>>>> h-train2

@@ -1,4 +1,3 @@
-<<<<<<< HEAD
 """Displacement of what the first frame shows, as the motion prior predicts it (ours; ADR 18).
 
 Axes: ``t`` latent frames, ``c`` = 3, ``hc wc`` cells of 4 pixels, ``hh ww`` pixels. Per latent
@@ -7,16 +6,6 @@ frame and cell the mean of
     (position at the last time of the latent frame − position in the first frame) / depth / UNIT
 
 along the axes of the first camera. It is 0 in the first latent frame.
-=======
-"""The motion of what the first frame shows (ours; docs/adr/0018).
-
-Axes: ``t`` latent frames, ``c`` = 3, ``hc wc`` cells of 4 pixels, ``hh ww`` pixels. Per latent
-frame and cell the motion is the mean of
-
-    (position at the last time of the latent frame − position in the first frame) / depth / UNIT
-
-along the axes of the first camera. In the first latent frame it is 0.
->>>>>>> h-train2
 """
 
 import torch
@@ -26,11 +15,7 @@ from torch import Tensor
 from diff4splat.models.config.networks import MOTION_CELL_PX
 
 UNIT = 0.08
-<<<<<<< HEAD
 """Displacement over depth that is 1 in a field: a third of a typical one, large against noise."""
-=======
-"""Relative displacement at which a motion is 1: a third of the usual, which thus exceeds noise."""
->>>>>>> h-train2
 
 
 def upsample_to_pixels(field: Float[Tensor, "c t hc wc"]) -> Float[Tensor, "t c hh ww"]:
@@ -41,18 +26,9 @@ def upsample_to_pixels(field: Float[Tensor, "c t hc wc"]) -> Float[Tensor, "t c 
 
 
 def masked_offsets(
-<<<<<<< HEAD
     field: Float[Tensor, "t c hh ww"],
     mask: Bool[Tensor, "hh ww"] | Float[Tensor, "hh ww"],
     depth: Float[Tensor, "hh ww"],
 ) -> Float[Tensor, "t hh ww 3"]:
     """Displacement of every pixel in scene units, 0 outside ``mask``; ``depth`` is z."""
     return (field * mask).movedim(1, -1) * UNIT * depth[..., None]
-=======
-    motion: Float[Tensor, "t c hh ww"],
-    mask: Bool[Tensor, "hh ww"] | Float[Tensor, "hh ww"],
-    depth: Float[Tensor, "hh ww"],
-) -> Float[Tensor, "t hh ww 3"]:
-    """Displacement of pixels in scene units: their ``motion`` within the ``mask``."""
-    return (motion * mask).movedim(1, -1) * UNIT * depth[..., None]
->>>>>>> h-train2

@@ -4,24 +4,13 @@ from dataclasses import replace
 
 from stage_fixtures import stage_recipe
 
-<<<<<<< HEAD
-from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig, RefinementConfig
-=======
 from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig
->>>>>>> h-train2
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe.losses import DepthLosses
 from diff4splat.training.recipe.stage import StageRecipe
 
-<<<<<<< HEAD
-REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
-MODEL: ModelConfig = replace(
-    tiny_size(), refinement=REFINEMENT, monocular_depth=MonocularDepthConfig(channels=4)
-)
-=======
 MODEL: ModelConfig = replace(tiny_size(), monocular_depth=MonocularDepthConfig(channels=4))
->>>>>>> h-train2
 
 
 def depth_recipe(**losses: float) -> StageRecipe:

@@ -20,17 +20,7 @@ def halves(height: int, width: int) -> torch.Tensor:
     return image
 
 
-<<<<<<< HEAD
 def test_every_pixel_has_nine_cells_around_it() -> None:
-=======
-def bilateral_upsample(maps: torch.Tensor, log_weight: torch.Tensor) -> torch.Tensor:
-    """Weighted means of the cells around every pixel."""
-    side = log_weight.shape[-1] // maps.shape[-1]
-    return (log_weight.softmax(0) * neighbourhood(maps, side)).sum(1)
-
-
-def test_every_pixel_sees_the_nine_cells_around_its_own() -> None:
->>>>>>> h-train2
     maps = torch.arange(12.0).view(1, 3, 4)
     found = neighbourhood(maps, 2)
     assert found.shape == (1, 9, 6, 8)

@@ -1,15 +1,10 @@
-<<<<<<< HEAD
 """The displacement field of cells, and offsets of pixels."""
-=======
-"""Motion of cells as displacement of pixels."""
->>>>>>> h-train2
 
 import torch
 
 from diff4splat.models.motion_unet.motion_field import UNIT, masked_offsets, upsample_to_pixels
 
 
-<<<<<<< HEAD
 def test_a_field_is_smooth_at_pixels() -> None:
     field = torch.arange(4.0).expand(3, 2, 4, 4)
     rows = upsample_to_pixels(field)
@@ -20,15 +15,11 @@ def test_a_field_is_smooth_at_pixels() -> None:
 
 
 def test_only_pixels_of_the_mask_move_and_offsets_grow_with_depth() -> None:
-=======
-def test_only_pixels_of_the_mask_are_displaced() -> None:
->>>>>>> h-train2
     field = torch.zeros(3, 2, 4, 4)
     field[1, 1] = 2.0
     mask = torch.zeros(16, 16, dtype=torch.bool)
     mask[3:6, 2:9] = True
     depth = torch.rand(16, 16) + 1
-<<<<<<< HEAD
     offsets = masked_offsets(upsample_to_pixels(field), mask, depth)
     assert offsets.shape == (2, 16, 16, 3)
     torch.testing.assert_close(offsets[1, ..., 1], 2 * UNIT * depth * mask)
@@ -43,9 +34,3 @@ def test_there_is_a_gradient_to_field_and_mask() -> None:
         return masked_offsets(upsample_to_pixels(field), mask, torch.ones(16, 16).double())
 
     assert torch.autograd.gradcheck(offsets, (field, mask), fast_mode=True)
-=======
-    found = masked_offsets(upsample_to_pixels(field), mask, depth)
-    assert found.shape == (2, 16, 16, 3)
-    torch.testing.assert_close(found[1, ..., 1], 2 * UNIT * depth * mask)
-    assert not found[0].any() and not found[1, ..., 0].any()
->>>>>>> h-train2
