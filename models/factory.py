@@ -1,7 +1,7 @@
-"""The one place where networks are put together.
+"""Builds every network of a model.
 
-Every part starts from its own random stream. Its weights depend on the configuration, the seed and
-the part alone: not on the caller's random state, nor on which other parts are built.
+Every part starts from a separate random stream. Its weights depend on the configuration, the seed
+and the part alone: not on the caller's random state, nor on which other parts are built.
 """
 
 from collections.abc import Callable, Collection, Mapping

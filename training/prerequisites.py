@@ -110,9 +110,10 @@ def _take(networks: Networks, start: Model | None, parts: Collection[str]) -> No
     """What ``start`` has trained of these parts."""
     if start is None:
         return
-    for part in (name for name in PARTS if name in start.trained and name in parts):
-        stored = getattr(start.networks, part).state_dict()
-        _fill(getattr(networks, part), stored, f"{start.folder}: {part}")
+    for part, network in networks.parts():
+        if part in start.trained and part in parts:
+            stored = getattr(start.networks, part).state_dict()
+            _fill(network, stored, f"{start.folder}: {part}")
 
 
 def _has_weights(stage: StageRecipe, place: Path) -> bool:

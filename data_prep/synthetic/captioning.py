@@ -6,6 +6,7 @@ from diff4splat.captions.colors import color_name
 from diff4splat.captions.grammar import (
     CaptionFacts,
     Event,
+    NamedObject,
     describe,
     motion_text,
 )

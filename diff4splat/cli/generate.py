@@ -16,6 +16,7 @@ from diff4splat.cli.options.camera import CameraOptions, choose_path
 from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 
 if TYPE_CHECKING:
+    from diff4splat.generation.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
 
 

@@ -57,7 +57,7 @@ def model_lines(name: str) -> list[str]:
     counts = parameter_counts(facts.config)
     rows = [f"{part:<16}{count:>16,}  {facts.states[part]}" for part, count in counts.items()]
     properties = {
-        "weights": facts.place,
+        "weights": facts.location,
         "weights_sha256": facts.weights_sha256,
         "license": facts.provenance.license,
         "origin": facts.provenance.origin,

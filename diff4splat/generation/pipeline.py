@@ -8,7 +8,7 @@ Axes: ``b c t h w`` inside networks, images ``h w 3`` outside; this file is wher
     scene ◄─ match colours ◄─ combine ◄──────────────────────────────────────────────┘
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -17,47 +17,21 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
-from diff4splat.generation.image_size import (
-    default_side_px,
-    downsampling_factor,
-    image_plan,
-    size_multiple_px,
-)
-from diff4splat.generation.input_cameras import (
-    reconcile_intrinsics,
-    resample_to_model_frames,
-    to_camera_path,
-)
-from diff4splat.generation.input_image import InputImage, downsample, load_image
+from diff4splat.generation.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.motion_sampling import MotionRequest
-from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
+from diff4splat.generation.plan import GenerationPlan
 from diff4splat.generation.priors import image_maps
+from diff4splat.generation.request import Request, UserInput, prepare_request
 from diff4splat.generation.scene_assembly import combine
-from diff4splat.generation.settings import GenerationSettings, require_seed
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
 from diff4splat.generation.video_fill import FillRequest, fill_hidden
 from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
-from diff4splat.models.text_encoder.prompt import require_prompt
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """One generation, validated, with the path as the networks see it."""
-
-    image: InputImage
-    small: InputImage
-    """The copy that the networks see."""
-    path: CameraPath
-    small_path: CameraPath
-    prompt: str | None
-    seed: int
-    settings: GenerationSettings
-    plan: GenerationPlan
 
 
 class Diff4SplatPipeline:
@@ -116,61 +90,19 @@ class Diff4SplatPipeline:
             CheckpointError, FileFormatError: weights that are needed cannot be read.
         """
         log = log or RunLog()
-        settings = settings or GenerationSettings()
-        request = self._request(image, path, prompt, require_seed(seed), settings)
+        user = UserInput(
+            image=image,
+            path=path,
+            prompt=prompt,
+            seed=seed,
+            settings=settings or GenerationSettings(),
+        )
+        request = prepare_request(self.model, user, self.device)
         request.plan.record(self.model.config, log)
         with log.phases.phase("load networks"):
             self.model = with_parts(self.model, request.plan.parts)
             self.model.networks.to(self.device)
         return self._generate(request, log)
-
-    def _request(
-        self,
-        image: InputImage | Path | str,
-        path: CameraPath | str,
-        prompt: str | None,
-        seed: int,
-        settings: GenerationSettings,
-    ) -> Request:
-        """Everything that can be refused is refused here, before weights are read."""
-        config = self.model.config
-        if prompt is not None:
-            require_prompt(prompt, config.text.max_bytes)
-        image = self._image(image, settings)
-        image, path = reconcile_intrinsics(image, to_camera_path(path, image.camera))
-        facts = RequestFacts(
-            prompt=prompt is not None,
-            fill=settings.fill,
-            still=settings.still,
-            frames=config.frames,
-        )
-        plan = plan_generation(config, self.model.trained, facts)
-        on_device = image.to(self.device)
-        small = downsample(on_device, downsampling_factor(config, plan, image.camera.size_px))
-        small_path = resample_to_model_frames(path, config.frames).to(self.device)
-        cameras = small_path.cameras.resized(small.camera.size_px)
-        return Request(
-            image=on_device,
-            small=small,
-            path=path,
-            small_path=replace(small_path, cameras=cameras),
-            prompt=prompt,
-            seed=seed,
-            settings=settings,
-            plan=plan,
-        )
-
-    def _image(self, image: InputImage | Path | str, settings: GenerationSettings) -> InputImage:
-        """At a size that the model can take, in single precision."""
-        config = self.model.config
-        if not isinstance(image, InputImage):
-            plan = image_plan(config, self.model.trained, settings.fill)
-            side_px = default_side_px(config, plan)
-            image = load_image(
-                Path(image), side_px, multiple_px=size_multiple_px(config, plan, side_px)
-            )
-        config.latent_grid(config.frames, image.camera.size_px)
-        return replace(image, rgb=image.rgb.float(), camera=image.camera.to(torch.float32))
 
     def _generate(self, request: Request, log: RunLog) -> Scene:
         model, small = self._running(request.plan), request.small

@@ -1,8 +1,8 @@
-"""3D convolution that never looks ahead, with its memory handed in and out.
+"""3D convolution over past frames only, with its cache as an explicit input and output.
 
 Axes: ``b`` batch, ``c`` channels, ``t`` frames of a chunk, ``h w`` pixels. A kernel of three
-frames sees frames t−2, t−1 and t, so a chunk needs the last two input frames of the chunk before
-it. They are explicit tensors, never attributes of the layer: a chunk stays a pure function and
+frames covers frames t−2, t−1 and t, so a chunk needs the last two input frames of the previous
+chunk. They are explicit tensors, never attributes of the layer: a chunk stays a pure function and
 exports to ONNX.
 """
 
@@ -16,7 +16,7 @@ HISTORY_FRAMES = 2
 class FrameMemory:
     """The two earlier frames of every causal convolution of a network, in the order of the calls.
 
-    Without ``caches`` a video starts here: its first frame is taken to have stood still before.
+    Without ``caches`` a video starts here: its first frame is repeated before it.
     """
 
     def __init__(self, caches: tuple[Tensor, ...] | None = None) -> None:
@@ -29,7 +29,7 @@ class FrameMemory:
         return tuple(self._new)
 
     def prepend(self, frames: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b c t2 h w"]:
-        """``frames`` with the two frames before them, which the memory then forgets."""
+        """``frames`` after the two cached frames; caches the last two for the next chunk."""
         if self._old is None:
             history = frames[:, :, :1].expand(-1, -1, HISTORY_FRAMES, -1, -1)
         else:
@@ -56,6 +56,6 @@ class CausalConv3d(nn.Module):
     def forward(
         self, frames: Float[Tensor, "b c t h w"], memory: FrameMemory
     ) -> Float[Tensor, "b c2 t2 h2 w2"]:
-        """Convolve after putting the remembered frames in front."""
+        """Convolve after the cached frames are put in front."""
         # Channels last: oneDNN's 3D convolutions take half the time of the plain layout on CPUs.
         return self.conv(memory.prepend(frames).contiguous(memory_format=torch.channels_last_3d))

@@ -1,8 +1,8 @@
-"""Layers of the detail decoder, and the way from cells of four pixels to pixels.
+"""Residual convolution block, and convex upsampling from cells of four pixels to pixels.
 
-Axes: ``n`` pictures, ``c`` channels, ``h w`` cells, ``h4 w4`` pixels. Convex enlargement: every
-pixel is a weighted mean of the 3×3 cells around its own, the weights are the network's (RAFT,
-arXiv 2003.12039, §3.3). Means cannot overshoot, and a weight near 1 makes a sharp edge.
+Axes: ``n`` images, ``c`` channels, ``h w`` cells, ``h4 w4`` pixels. Convex upsampling: every pixel
+is a weighted mean of 3×3 cells, with weights that a network predicts (RAFT, arXiv 2003.12039,
+§3.3). Means cannot overshoot, and a weight near 1 gives a sharp edge.
 """
 
 import torch
@@ -31,9 +31,9 @@ class ConvBlock(nn.Module):
         return features + self.conv_2(torch.nn.functional.silu(self.norm_2(hidden)))
 
 
-def cells(pictures: Float[Tensor, "n c h4 w4"]) -> Float[Tensor, "n c16 h w"]:
+def cells(images: Float[Tensor, "n c h4 w4"]) -> Float[Tensor, "n c16 h w"]:
     """The 16 pixels of every cell as channels."""
-    return torch.nn.functional.pixel_unshuffle(pictures, CELL_PX)
+    return torch.nn.functional.pixel_unshuffle(images, CELL_PX)
 
 
 def convex_upsample(
@@ -41,10 +41,10 @@ def convex_upsample(
 ) -> Float[Tensor, "n c h4 w4"]:
     """Pixels from cells; ``weights`` are logits, equal ones give the mean of the neighbours."""
     channels, height, width = maps.shape[1:]
-    share = weights.unflatten(1, (NEIGHBOURS, CELL_PX**2)).softmax(1)
+    shares = weights.unflatten(1, (NEIGHBOURS, CELL_PX**2)).softmax(1)
     padded = torch.nn.functional.pad(maps, (1, 1, 1, 1), mode="replicate")
-    around = torch.nn.functional.unfold(padded, 3).unflatten(1, (channels, NEIGHBOURS))
+    neighbours = torch.nn.functional.unfold(padded, 3).unflatten(1, (channels, NEIGHBOURS))
     # As a product of small matrices: the products of all pixels and neighbours are never stored.
-    mixed = torch.einsum("nckp,nksp->ncsp", around, share.flatten(3))
-    mixed = mixed.unflatten(-1, (height, width))
-    return torch.nn.functional.pixel_shuffle(mixed.flatten(1, 2), CELL_PX)
+    pixels = torch.einsum("nckp,nksp->ncsp", neighbours, shares.flatten(3))
+    pixels = pixels.unflatten(-1, (height, width))
+    return torch.nn.functional.pixel_shuffle(pixels.flatten(1, 2), CELL_PX)

@@ -1,7 +1,7 @@
-"""Two-layer perceptron with tanh-GELU, applied to every token on its own.
+"""Two-layer perceptron with tanh-GELU, applied to each token separately.
 
-Axes: ``*b n`` tokens, ``d`` width. The tanh form is asked for by name: exporters that fall back on
-the erf form change the network by up to 4e-4.
+Axes: ``*b n`` tokens, ``d`` width. The tanh form is explicit: exporters that fall back on the erf
+form change the network by up to 4e-4.
 """
 
 import torch

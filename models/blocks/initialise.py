@@ -1,4 +1,4 @@
-"""Exact zero where a branch must not act at first; everything else keeps PyTorch's own start."""
+"""Zero initialisation of layers that must not act at first; all others keep PyTorch's default."""
 
 from typing import TypeVar
 

@@ -1,4 +1,4 @@
-"""Adaptive layer norm: a condition steers a residual branch (DiT, arXiv 2212.09748).
+"""Adaptive layer norm: a condition scales and shifts a residual branch (DiT, arXiv 2212.09748).
 
 Axes: ``b`` batch, ``d`` width, ``e`` width of the condition. ``x + gate · f(norm(x) · (1 + scale)
 + shift)``. The projections start at zero, so a fresh block is the identity.

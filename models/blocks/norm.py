@@ -1,8 +1,8 @@
 """Root-mean-square normalisation of feature maps and tokens.
 
 Axes: ``b`` batch, ``c`` channels, ``...`` positions, ``d`` width of a token. y = gain · x /
-sqrt(mean_c(x²) + ε) at every position on its own, so a video cut into chunks is normalised exactly
-as the whole (unlike GroupNorm).
+sqrt(mean_c(x²) + ε) at every position separately, so a video cut into chunks is normalised exactly
+as the whole video (unlike GroupNorm).
 """
 
 import torch
@@ -34,6 +34,6 @@ class TokenRmsNorm(nn.RMSNorm):
         super().__init__(width, eps=EPSILON)
 
     def forward(self, tokens: Float[Tensor, "*b d"]) -> Float[Tensor, "*b d"]:
-        """The gain follows the tokens, which mixed precision may have made half precise."""
+        """The gain follows the tokens, which mixed precision may have cast to half precision."""
         gain = self.weight.to(tokens.dtype)
         return torch.nn.functional.rms_norm(tokens, self.normalized_shape, gain, EPSILON)

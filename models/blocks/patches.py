@@ -1,4 +1,4 @@
-"""Between maps and tokens: patches in space and packs of four frames in time.
+"""Maps to tokens and back: patches in space and packs of four frames in time.
 
 Axes: ``b`` batch, ``c`` channels, ``f`` video frames = 1 + 4 k, ``t h w`` frames, rows and columns
 of a grid, ``d`` width of a token. Latent frame i ≥ 1 belongs to the video frames 4i−3 … 4i and

@@ -2,7 +2,7 @@
 
 Axes: ``b`` batch, ``n`` tokens of a grid in (t, h, w) order, ``p`` pairs of head channels, ``d``
 head width. Channels (2 p, 2 p + 1) turn by position · 10000^(−2 p_axis / d_axis). Rows and columns
-own 2 ⌊d/6⌋ channels each and frames the rest. Real arithmetic only: complex tensors cannot be
+have 2 ⌊d/6⌋ channels each and frames the rest. Real arithmetic only: complex tensors cannot be
 exported to ONNX.
 """
 

@@ -23,9 +23,11 @@ def level_embedding(level: Float[Tensor, "*b"], width: int) -> Float[Tensor, "*b
     return torch.cat([angle.cos(), angle.sin()], -1)
 
 
-def octave_embedding(time: Float[Tensor, "*b"], octaves: int) -> Float[Tensor, "*b {2*octaves}"]:
-    """sin, then cos, of π 2^k · time for k = 0 … octaves − 1; ``time`` in [0, 1]."""
-    frequency = math.pi * 2.0 ** torch.arange(octaves, dtype=torch.float32, device=time.device)
+def fourier_embedding(
+    time: Float[Tensor, "*b"], frequencies: int
+) -> Float[Tensor, "*b {2*frequencies}"]:
+    """sin, then cos, of π 2^k · time for k = 0 … frequencies − 1; ``time`` in [0, 1]."""
+    frequency = math.pi * 2.0 ** torch.arange(frequencies, dtype=torch.float32, device=time.device)
     angle = time.float()[..., None] * frequency
     return torch.cat([angle.sin(), angle.cos()], -1)
 
@@ -39,6 +41,6 @@ class EmbeddingMlp(nn.Module):
         self.contract = nn.Linear(width, width)
 
     def forward(self, embedding: Float[Tensor, "*b e"]) -> Float[Tensor, "*b d"]:
-        """Cast to the weights' dtype only here, after the angles are safe."""
+        """Cast to the weights' dtype only here, after the sinusoids."""
         hidden = self.expand(embedding.to(self.expand.weight.dtype))
         return self.contract(torch.nn.functional.silu(hidden))

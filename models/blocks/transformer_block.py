@@ -23,6 +23,6 @@ class TransformerBlock(nn.Module):
         self.feedforward = FeedForward(width, feedforward_width)
 
     def forward(self, tokens: Float[Tensor, "b n d"], rope: RopeTables) -> Float[Tensor, "b n d"]:
-        """Every token sees every other."""
+        """Every token attends to every other."""
         tokens = tokens + self.attention(self.attention_norm(tokens), rope=rope)
         return tokens + self.feedforward(self.feedforward_norm(tokens))

@@ -1,4 +1,4 @@
-"""Checks that configurations share; all raise a ConfigError in the same words."""
+"""Checks that configurations share; all raise a ConfigError in one form."""
 
 from typing import Protocol, runtime_checkable
 
@@ -14,7 +14,7 @@ class HasHeads(Protocol):
 
 
 def require(holds: bool, what: str, expected: str, got: object) -> None:
-    """Raise a ConfigError in the usual words unless ``holds``."""
+    """Raise a ConfigError unless ``holds``."""
     if not holds:
         raise ConfigError(f"{what}: expected {expected}, got {got!r}")
 

@@ -1,7 +1,7 @@
 """Model configurations of version 1, written before the priors were parts of their own.
 
 Version 1 kept the depth prior in ``detail`` and the motion prior in ``dit``. Anything that does not
-look like version 1 passes unchanged and is refused by the reader of the current version.
+look like version 1 passes unchanged and is refused when the current version is read.
 """
 
 from collections.abc import Mapping

@@ -28,7 +28,7 @@ from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConf
 
 Config = TypeVar("Config")
 Fill = Literal["none", "video"]
-"""What shows where the image hides: extended layers, or the video model's Gaussians."""
+"""What fills hidden regions: extended layers, or the video model's Gaussians."""
 VERSION = 2
 """Of the JSON form; version 1 had no such key."""
 
@@ -48,7 +48,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelConfig:
-    """Everything that decides the shape of the weights, and the sizes a model was made for."""
+    """Everything that decides the shape of the weights, and the default sizes."""
 
     name: str
     """Name of the size, such as ``small``; for people."""
@@ -66,8 +66,8 @@ class ModelConfig:
     monocular_depth: MonocularDepthConfig = field(default_factory=MonocularDepthConfig)
     motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
     default_fill: Fill = "video"
-    """What generation fills hidden regions with unless asked otherwise; the paper's is the video
-    model. ``none`` where that model still makes the image worse."""
+    """What fills hidden regions by default; the paper uses the video model. ``none`` where that
+    model makes hidden regions worse."""
 
     def __post_init__(self) -> None:
         named = isinstance(self.name, str) and self.name != ""
@@ -88,10 +88,10 @@ class ModelConfig:
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)
 
     def _require_fitting_refinement(self) -> None:
-        """A refinement decoder sees frames and has one size of token."""
+        """A refinement decoder takes frames and has one size of token."""
         used = self.refinement.used
-        sees = used or self.ldrm.input == "latents"
-        require(sees, "LdrmConfig.input", "latents without a refinement decoder", "frames")
+        allowed = used or self.ldrm.input == "latents"
+        require(allowed, "LdrmConfig.input", "latents without a refinement decoder", "frames")
         whole = not used or self.ldrm.grid_stride == 1
         expected = "1 with a refinement decoder"
         require(whole, "LdrmConfig.grid_stride", expected, self.ldrm.grid_stride)
@@ -101,7 +101,7 @@ class ModelConfig:
 
     @property
     def token_px(self) -> int:
-        """Pixels per token side; picture sides must be multiples of it."""
+        """Pixels per token side; image sides must be multiples of it."""
         return self.vae.space_stride * TOKEN_PATCH
 
     def latent_grid(self, frames: int, size_px: tuple[int, int]) -> tuple[int, int, int]:
@@ -117,7 +117,7 @@ class ModelConfig:
             if side < 1 or side % self.token_px:
                 nearest = self.token_px * max(round(side / self.token_px), 1)
                 raise InputError(
-                    f"picture size: expected sides that are multiples of {self.token_px} px, "
+                    f"image size: expected sides that are multiples of {self.token_px} px, "
                     f"got {side}; use {nearest}"
                 )
         stride = self.vae.space_stride
@@ -148,7 +148,7 @@ class ModelConfig:
 def _current(data: Any) -> Any:
     """The fields of this version; anything that is no object is refused later.
 
-    A configuration inside another file needs no version: its sections tell.
+    A configuration inside another file has no version; its sections show it.
     """
     if not isinstance(data, Mapping):
         return data
@@ -158,8 +158,8 @@ def _current(data: Any) -> Any:
             f"model configuration: expected version 1 or {VERSION}, got {version!r}; "
             "a newer diff4splat may read it"
         )
-    own = {key: value for key, value in data.items() if key != "version"}
-    return upgrade_config(own) if version == 1 else own
+    current = {key: value for key, value in data.items() if key != "version"}
+    return upgrade_config(current) if version == 1 else current
 
 
 def _build(kind: type[Config], data: object, where: str) -> Config:

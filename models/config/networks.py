@@ -1,4 +1,4 @@
-"""Settings of the single networks: frozen, checked when made, each number with its source.
+"""Settings of the single networks: frozen, checked at construction, each number with its source.
 
 Sources: "paper" is Diff4Splat (arXiv 2511.00503) with the section; "inferred" is our choice where
 the paper is silent; other names are the work a number was taken from.
@@ -42,7 +42,7 @@ class VaeConfig:
     blocks: int = 1
     """Residual blocks per resolution (2 in Wan 2.1)."""
     pca_shortcut: bool = False
-    """Convolutions correct a linear (PCA) autoencoder instead of doing all (ours; ADR 14)."""
+    """Convolutions correct a linear (PCA) autoencoder instead of replacing it (ours; ADR 14)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "latent_channels", "pixel_patch", "blocks")
@@ -114,11 +114,11 @@ class DitConfig:
     camera_width: int = 64
     """Hidden width of the camera adapter (inferred; AC3D finds a narrow one enough)."""
     prediction_type: Literal["velocity", "clean"] = "velocity"
-    """Velocity (paper), or the clean latent that it leads to: where a token holds more numbers than
-    the width, noise does not fit through and data do (JiT, arXiv 2511.13720)."""
+    """Velocity (paper), or the clean latent. Where a token holds more numbers than the width, noise
+    does not fit through the network and data do (JiT, arXiv 2511.13720)."""
     render_condition: bool = False
-    """Also sees the layered image rendered along the path, with a mask of valid pixels, and
-    corrects it if it predicts clean latents (ours; as GEN3C and ViewCrafter; ADR 16, 26)."""
+    """Takes the layered image rendered along the path, with a mask of valid pixels. If it predicts
+    clean latents it corrects that render (ours; as GEN3C and ViewCrafter; ADR 16, 26)."""
     pooled_text: bool = False
     """The mean of the text states also modulates every block, as the noise level does (Stable
     Diffusion 3, arXiv 2403.03206)."""
@@ -172,19 +172,19 @@ class LdrmConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RefinementConfig:
-    """LDRM's convolutional decoder, which sees frames beside tokens (ours, ADR 15)."""
+    """LDRM's convolutional decoder, which takes frames beside tokens (ours, ADR 15)."""
 
     channels: int = 0
     """At a quarter of the resolution, two thirds more at each of two coarser ones; 0: none."""
     match_channels: int = 16
-    """Features that are compared between frames."""
+    """Feature channels that are compared across frames."""
     cost_volume_depths: int = 24
     """Depths at which they are compared; 0 leaves the cost volume out."""
     depth_range: tuple[float, float] = (1.0, 60.0)
-    """Nearest and farthest compared depth, in units of which the plane lies at 4."""
+    """Nearest and farthest compared depth in scene units; the plane prior is at 4."""
     border_cells: int = 16
-    """Cells of 4 px by which the layer behind the first frame extends beyond its border, a
-    multiple of 4; 0 leaves the layer out."""
+    """Cells of 4 px by which the border layer extends the first frame, a multiple of 4; 0 leaves
+    the layer out."""
 
     def __post_init__(self) -> None:
         require_counts(self, "match_channels")
@@ -217,8 +217,8 @@ class DeformationConfig:
     time_frequencies: int = 10
     """Frequencies 2^0 … 2^9 of the time embedding (MoVieS)."""
     static_threshold_px: float = 0.0
-    """How far trained weights move what is static, in pixels of the model's own size: Gaussians
-    that the network moves by less are static (ours, measured)."""
+    """Displacement below which a Gaussian is static, in pixels at the model's default size: trained
+    weights move static surfaces by about as much (ours, measured)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "width", "blocks", "time_frequencies")
@@ -241,7 +241,7 @@ class ActivationConfig:
     log_scale_limit: float = math.log(16)
     """L: standard deviations stay within a factor e^L of the pixel footprint."""
     footprint_px: float = 0.35
-    """Standard deviation of an uncorrected Gaussian, in cells of its own grid. With the usual
+    """Standard deviation of an uncorrected Gaussian, in cells of its grid. With the usual
     dilation 0.35 is right for one Gaussian per pixel, 0.6 for a half grid (docs/adr/0005)."""
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Settings of the priors: networks that see one image and no video."""
+"""Settings of the priors: networks that take one image and no video."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ class MonocularDepthConfig:
     """Depth prior: a U-Net from one image to the depth of its pixels (ours, ADR 23)."""
 
     channels: int = 0
-    """At half the resolution; 0 leaves the prior out, and the image lies on a plane."""
+    """At half the resolution; 0 leaves the prior out: the image is a plane."""
 
     def __post_init__(self) -> None:
         require_optional_width(self, "channels")
@@ -26,7 +26,7 @@ class MotionUNetConfig:
     """Motion prior: a U-Net from one image and text to displacements and a mask (ours, ADR 22)."""
 
     width: int = 0
-    """Channels at a quarter of the resolution; 0 leaves the prior out, and the image is static."""
+    """Channels at a quarter of the resolution; 0 leaves the prior out: the image is static."""
     heads: int = 4
     """Of text cross-attention; twice as many must divide the width."""
     mask_refiner_width: int = 0

@@ -1,16 +1,16 @@
 """Deformation at any query time, one time per call (Diff4Splat appendix; time input of MoVieS).
 
 Axes: ``b`` batch, ``d`` width of LDRM's tokens, ``t h w`` token grid, ``f hh ww`` frames and cells
-of the Gaussian grid, ``e`` width of the condition. Query time and each latent frame's own time are
-fractions of the clip in [0, 1]: every Gaussian moves from the time of its own frame to the query
+of the Gaussian grid, ``e`` width of the condition. The query time and the time of each latent frame
+are fractions of the clip in [0, 1]: every Gaussian moves from the time of its frame to the query
 time.
 
-    tokens ─ linear ─ blocks(time) ─┬─ finer ─────┬─ finer ─────┬─ finer ─┐
+    tokens ─ linear ─ blocks(time) ─┬─ ×2 ────────┬─ ×2 ────────┬─ ×2 ────┐
                                    1×1 ── up ─ + 1×1 ── up ─ + 1×1 ─ up ─ + 1×1 ── up ── 10 channels
 
-A 1×1 convolution and bilinear enlargement commute, so the sum over levels equals one 1×1
-convolution over all levels enlarged and stacked, for a small part of the memory and time. All 1×1
-start at zero.
+A 1×1 convolution and bilinear upsampling commute, so the sum over levels equals one 1×1
+convolution over all levels upsampled and stacked, at a fraction of the memory and time. All 1×1
+convolutions start at zero.
 """
 
 from collections.abc import Iterable, Iterator
@@ -23,12 +23,12 @@ from diff4splat.models.blocks.feedforward import FeedForward
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
 from diff4splat.models.blocks.norm import EPSILON
-from diff4splat.models.blocks.time_embedding import EmbeddingMlp, octave_embedding
+from diff4splat.models.blocks.time_embedding import EmbeddingMlp, fourier_embedding
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import DEFORMATION_SPLIT, TIME_STRIDE
 
 LEVEL_FRAMES = (2, 2, 1)
-"""Frames that each finer level makes of one; their product is TIME_STRIDE."""
+"""Frames that each level expands one into; their product is TIME_STRIDE."""
 CHANNELS = sum(DEFORMATION_SPLIT)
 
 
@@ -49,8 +49,8 @@ class TimeBlock(nn.Module):
         return tokens + gate * self.feedforward(modulate(self.norm(tokens), shift, scale))
 
 
-class FinerLevel(nn.Module):
-    """Twice the resolution and ``frames`` times the frames, all learned from the coarser cell."""
+class UpsamplingLevel(nn.Module):
+    """Twice the resolution and ``frames`` times the frames."""
 
     def __init__(self, channels: int, out_channels: int, frames: int) -> None:
         super().__init__()
@@ -60,10 +60,10 @@ class FinerLevel(nn.Module):
 
     def forward(self, features: Float[Tensor, "n c h w"]) -> Float[Tensor, "n2 c2 h2 w2"]:
         """``n`` counts the frames of all batch elements."""
-        finer = torch.nn.functional.pixel_shuffle(self.expand(features), 2)
-        finer = finer.unflatten(1, (-1, self.out_channels)).flatten(0, 1)
-        finer = torch.nn.functional.gelu(finer, approximate="tanh")
-        return finer + self.smooth(finer)
+        upsampled = torch.nn.functional.pixel_shuffle(self.expand(features), 2)
+        upsampled = upsampled.unflatten(1, (-1, self.out_channels)).flatten(0, 1)
+        upsampled = torch.nn.functional.gelu(upsampled, approximate="tanh")
+        return upsampled + self.smooth(upsampled)
 
 
 class DeformationNetwork(nn.Module):
@@ -71,16 +71,20 @@ class DeformationNetwork(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        own = config.deformation
-        self.time_frequencies = own.time_frequencies
-        self.last_scale = config.token_px // 2 ** len(own.level_widths) // config.ldrm.grid_stride
-        self.token_projection = nn.Linear(config.ldrm.width, own.width)
-        self.time_mlp = EmbeddingMlp(4 * own.time_frequencies, own.width)
-        self.blocks = nn.ModuleList([TimeBlock(own.width) for _ in range(own.blocks)])
-        widths = (own.width, *own.level_widths)
+        deformation = config.deformation
+        self.time_frequencies = deformation.time_frequencies
+        self.last_scale = (
+            config.token_px // 2 ** len(deformation.level_widths) // config.ldrm.grid_stride
+        )
+        self.token_projection = nn.Linear(config.ldrm.width, deformation.width)
+        self.time_mlp = EmbeddingMlp(4 * deformation.time_frequencies, deformation.width)
+        self.blocks = nn.ModuleList(
+            [TimeBlock(deformation.width) for _ in range(deformation.blocks)]
+        )
+        widths = (deformation.width, *deformation.level_widths)
         self.levels = nn.ModuleList(
             [
-                FinerLevel(*pair, frames)
+                UpsamplingLevel(*pair, frames)
                 for *pair, frames in zip(widths, widths[1:], LEVEL_FRAMES, strict=False)
             ]
         )
@@ -88,7 +92,7 @@ class DeformationNetwork(nn.Module):
 
     @property
     def is_identity(self) -> bool:
-        """True while the last layers are exactly zero: nothing moves, so leave the network out."""
+        """True while the last layers are exactly zero; then nothing moves."""
         return not any(bool(parameter.any()) for parameter in self.heads.parameters())
 
     def forward(
@@ -100,11 +104,13 @@ class DeformationNetwork(nn.Module):
         motion = self.heads[0](features)
         for level, head, frames in zip(self.levels, self.heads[1:], LEVEL_FRAMES, strict=True):
             features = level(features)
-            motion = enlarge(motion.repeat_interleave(frames, 0), 2) + head(features)
-        # Three frames of the first pack lie before the video.
+            motion = upsample_bilinear(motion.repeat_interleave(frames, 0), 2) + head(features)
+        # Three frames of the first pack precede the video.
         motion = motion.unflatten(0, (batch, -1))[:, TIME_STRIDE - 1 :]
         frames = motion.shape[1]
-        motion = enlarge(motion.flatten(0, 1), self.last_scale).unflatten(0, (batch, frames))
+        motion = upsample_bilinear(motion.flatten(0, 1), self.last_scale).unflatten(
+            0, (batch, frames)
+        )
         return motion.transpose(1, 2).to(tokens.dtype)
 
     def at_times(
@@ -117,20 +123,20 @@ class DeformationNetwork(nn.Module):
     def _tokens_at(self, tokens: Tensor, time: Tensor) -> Float[Tensor, "b t h w e"]:
         frames = tokens.shape[2]
         latent_frame = torch.arange(frames, dtype=torch.float32, device=tokens.device)
-        own_time = latent_frame / max(frames - 1, 1)
-        query = octave_embedding(time, self.time_frequencies)[:, None].expand(-1, frames, -1)
-        own = octave_embedding(own_time, self.time_frequencies)[None].expand(
+        frame_time = latent_frame / max(frames - 1, 1)
+        query = fourier_embedding(time, self.time_frequencies)[:, None].expand(-1, frames, -1)
+        source = fourier_embedding(frame_time, self.time_frequencies)[None].expand(
             tokens.shape[0], -1, -1
         )
-        condition = self.time_mlp(torch.cat([query, own], -1))
+        condition = self.time_mlp(torch.cat([query, source], -1))
         features = self.token_projection(tokens.movedim(1, -1))
         for block in self.blocks:
             features = block(features, condition)
         return features
 
 
-def enlarge(maps: Float[Tensor, "n c h w"], scale: int) -> Float[Tensor, "n c h2 w2"]:
-    """Bilinear enlargement in space by a whole factor."""
+def upsample_bilinear(maps: Float[Tensor, "n c h w"], scale: int) -> Float[Tensor, "n c h2 w2"]:
+    """Bilinear upsampling in space by a whole factor."""
     if scale == 1:
         return maps
     return torch.nn.functional.interpolate(

@@ -1,12 +1,12 @@
-"""Deformation from the detail decoder's features: one query time per call (MoVieS's time input).
+"""Deformation from refinement features, one query time per call (time input of MoVieS).
 
-Axes: ``b`` batch, ``d`` channels of features and motion cues, ``k`` key frames, ``n`` = b k,
+Axes: ``b`` batch, ``d`` channels of features and motion features, ``k`` key frames, ``n`` = b k,
 ``h w`` cells of 4 pixels, ``h4 w4`` pixels, ``e`` width of the condition. Times are fractions of
-the clip. The answer is multiplied by (query time − own time): a Gaussian is where its own frame saw
-it, and what the network says is how fast it leaves. It says so beside the rate at which the pixel
-was seen to leave until that time, of which it takes a share of its own:
+the clip. The output is a rate, multiplied by elapsed = query time − time of the key frame, so a
+Gaussian has no offset at its key frame. The network adds a predicted share of the rate that optical
+flow measured until the query time:
 
-    offset = elapsed · depth · (enlarged(head + share · seen rate))
+    offset = elapsed · depth · upsampled(head + share · measured rate)
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,7 +19,7 @@ from diff4splat.models.blocks.conv_block import CELL_PX, NEIGHBOURS, convex_upsa
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation
 from diff4splat.models.blocks.norm import ChannelRmsNorm
-from diff4splat.models.blocks.time_embedding import EmbeddingMlp, octave_embedding
+from diff4splat.models.blocks.time_embedding import EmbeddingMlp, fourier_embedding
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import DEFORMATION_SPLIT
 from diff4splat.models.ldrm.refinement.decoder import widths
@@ -28,8 +28,8 @@ from diff4splat.models.ldrm.refinement.motion_features import (
     RATE_UNIT,
     SLOT_CUES,
     SLOTS,
-    frames_between,
-    slot_shares,
+    keyframe_span,
+    slot_weights,
 )
 
 CHANNELS = sum(DEFORMATION_SPLIT)
@@ -50,8 +50,8 @@ class TimeConvBlock(nn.Module):
     ) -> Float[Tensor, "n c h w"]:
         """One condition per key frame."""
         shift, scale, gate = self.modulation(condition)[..., None, None].unbind(-4)
-        quiet = self.norm(features) * (1 + scale) + shift
-        hidden = torch.nn.functional.silu(self.conv_1(torch.nn.functional.silu(quiet)))
+        modulated = self.norm(features) * (1 + scale) + shift
+        hidden = torch.nn.functional.silu(self.conv_1(torch.nn.functional.silu(modulated)))
         return features + gate * self.conv_2(hidden)
 
 
@@ -60,24 +60,24 @@ class RefinedDeformation(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        own = config.deformation
-        self.time_frequencies = own.time_frequencies
-        seen = widths(config.refinement.channels)[0]
-        # Features grow along their skips; cues would drown in them.
-        self.norm_in = ChannelRmsNorm(seen)
-        self.input_conv = nn.Conv2d(seen + CUES, own.width, 3, padding=1)
-        self.input_motion = nn.Conv2d(SLOT_CUES, own.width, 3, padding=1)
-        self.time_mlp = EmbeddingMlp(4 * own.time_frequencies, own.width)
+        deformation = config.deformation
+        self.time_frequencies = deformation.time_frequencies
+        channels = widths(config.refinement.channels)[0]
+        # Features grow along the skip connections and would dominate the motion features.
+        self.norm_in = ChannelRmsNorm(channels)
+        self.input_conv = nn.Conv2d(channels + CUES, deformation.width, 3, padding=1)
+        self.input_motion = nn.Conv2d(SLOT_CUES, deformation.width, 3, padding=1)
+        self.time_mlp = EmbeddingMlp(4 * deformation.time_frequencies, deformation.width)
         self.blocks = nn.ModuleList(
-            [TimeConvBlock(own.width, own.width) for _ in range(own.blocks)]
+            [TimeConvBlock(deformation.width, deformation.width) for _ in range(deformation.blocks)]
         )
-        self.norm = ChannelRmsNorm(own.width)
-        self.weights = nn.Conv2d(own.width, NEIGHBOURS * CELL_PX**2, 1)
-        self.head = zero_(nn.Conv2d(own.width, CHANNELS + 1, 3, padding=1))
+        self.norm = ChannelRmsNorm(deformation.width)
+        self.weights = nn.Conv2d(deformation.width, NEIGHBOURS * CELL_PX**2, 1)
+        self.head = zero_(nn.Conv2d(deformation.width, CHANNELS + 1, 3, padding=1))
 
     @property
     def is_identity(self) -> bool:
-        """True while the last layer is exactly zero: nothing moves, so leave the network out."""
+        """True while the last layer is exactly zero; then nothing moves."""
         return not any(bool(parameter.any()) for parameter in self.head.parameters())
 
     def forward(
@@ -95,43 +95,45 @@ class RefinedDeformation(nn.Module):
             yield self._at(input_features, tokens, time)
 
     def _input_features(self, tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n c h w"]:
-        seen, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
-        return self.input_conv(torch.cat([self.norm_in(seen), cues], 1))
+        features, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
+        return self.input_conv(torch.cat([self.norm_in(features), cues], 1))
 
     def _at(
         self, input_features: Float[Tensor, "n c h w"], tokens: Tensor, time: Float[Tensor, " b"]
     ) -> Float[Tensor, "b 10 k h4 w4"]:
         batch, _, keys = tokens.shape[:3]
-        own = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
-        elapsed, condition = time[:, None] - own, self._condition(time, own)
-        now = _seen_at(tokens, elapsed)
-        features = input_features + self.input_motion(now)
+        key_times = torch.arange(keys, dtype=torch.float32, device=tokens.device) / max(keys - 1, 1)
+        elapsed, condition = time[:, None] - key_times, self._condition(time, key_times)
+        measured = _measured_motion(tokens, elapsed)
+        features = input_features + self.input_motion(measured)
         for block in self.blocks:
             features = block(features, condition)
         features = torch.nn.functional.silu(self.norm(features))
         raw, share = self.head(features).split([CHANNELS, 1], 1)
-        raw = torch.cat([raw[:, :3] + share * RATE_UNIT * now[:, :3], raw[:, 3:]], 1)
+        raw = torch.cat([raw[:, :3] + share * RATE_UNIT * measured[:, :3], raw[:, 3:]], 1)
         raw = raw * _lengths(tokens).to(features.dtype)
         motion = convex_upsample(raw, self.weights(features)).unflatten(0, (batch, keys))
         elapsed = elapsed[..., None, None, None].to(motion.dtype)
         return (elapsed * motion).transpose(1, 2).to(tokens.dtype)
 
     def _condition(
-        self, time: Float[Tensor, " b"], own: Float[Tensor, " k"]
+        self, time: Float[Tensor, " b"], key_times: Float[Tensor, " k"]
     ) -> Float[Tensor, "n e"]:
-        query = octave_embedding(time, self.time_frequencies)[:, None].expand(-1, len(own), -1)
-        source = octave_embedding(own, self.time_frequencies)[None].expand(len(time), -1, -1)
+        query = fourier_embedding(time, self.time_frequencies)[:, None].expand(
+            -1, len(key_times), -1
+        )
+        source = fourier_embedding(key_times, self.time_frequencies)[None].expand(len(time), -1, -1)
         return self.time_mlp(torch.cat([query, source], -1)).flatten(0, 1)
 
 
-def _seen_at(
+def _measured_motion(
     tokens: Float[Tensor, "b d k h w"], elapsed: Float[Tensor, "b k"]
 ) -> Float[Tensor, "n 4 h w"]:
-    """Rate and difference of every cell at one time, between those of the nearest slots."""
+    """Rate and difference of every cell at one time, interpolated from the two nearest slots."""
     keys = tokens.shape[2]
     slots = tokens[:, -CUES:-1].transpose(1, 2).unflatten(2, (SLOTS, SLOT_CUES))
-    shares = slot_shares(elapsed * frames_between(keys)).to(tokens.dtype)
-    return torch.einsum("bks,bksdhw->bkdhw", shares, slots).flatten(0, 1)
+    weights = slot_weights(elapsed * keyframe_span(keys)).to(tokens.dtype)
+    return torch.einsum("bks,bksdhw->bkdhw", weights, slots).flatten(0, 1)
 
 
 def _lengths(tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n 10 h w"]:

@@ -1,4 +1,4 @@
-"""Weights that are installed with the package: one folder per size, found by the size's name.
+"""Weights that are installed with the package: one folder per size, named like it.
 
     models/weights/<size>/{config.json, provenance.json, <part>.safetensors, SHA256SUMS, CARD.md}
 
@@ -11,10 +11,10 @@ from diff4splat.models.config.sizes import SIZES
 
 WEIGHTS_FOLDER = Path(__file__).parents[1] / "weights"
 CARD_FILE = "CARD.md"
-"""What people should know before they use the weights; not read by any code."""
+"""Model card for people; no code reads it."""
 
 
 def bundled_folder(size: str) -> Path | None:
-    """Where the weights of a size lie; None if none ship, or if there is no such size."""
+    """Folder of a size's weights; None if none are bundled, or if there is no such size."""
     folder = WEIGHTS_FOLDER / size if size in SIZES else None
     return folder if folder is not None and folder.is_dir() else None

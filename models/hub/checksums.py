@@ -1,8 +1,8 @@
 """SHA256SUMS of a model folder: one line ``digest  name`` per file, as ``sha256sum -c`` reads it.
 
-A folder with such a list is checked whenever it is read; one without is taken as it is. The list
-holds the configuration, the provenance and the weights. The model card is not in it: words may be
-corrected without new weights.
+A folder with such a list is checked whenever it is read. The list
+holds the configuration, the provenance and the weights. The model card is not in it: its text may
+be corrected without new weights.
 """
 
 import hashlib
@@ -28,13 +28,13 @@ def listed_files(folder: Path) -> list[Path]:
 
 
 def write_sums(folder: Path) -> None:
-    """List what lies in the folder."""
+    """List the files of the folder."""
     lines = [f"{file_sha256(file)}  {file.name}\n" for file in listed_files(folder)]
     write_text(folder / SUMS_FILE, "".join(lines))
 
 
 def require_whole(folder: Path, advice: str, names: Collection[str] | None = None) -> None:
-    """Every file is the one that the list names; ``advice`` says how to get the folder again.
+    """Compare every file with the list; ``advice`` is how to get the folder again.
 
     With ``names`` only those files are compared; names of files that do not exist and that the
     list does not name are ignored.
@@ -71,7 +71,7 @@ def _read_sums(file: Path, advice: str) -> dict[str, str]:
         raise FileFormatError(
             f"{file}: expected a list of checksums, got none that can be read; {advice}"
         ) from error
-    found = [_LINE.fullmatch(line) for line in lines]
-    if not found or None in found:
+    matches = [_LINE.fullmatch(line) for line in lines]
+    if not matches or None in matches:
         raise FileFormatError(f"{file}: expected lines 'digest  name', got others; {advice}")
-    return {match[2]: match[1] for match in found}
+    return {match[2]: match[1] for match in matches}

@@ -1,10 +1,10 @@
-"""A trained model as a folder that can be passed on: trained parts in half precision, with sums.
+"""A trained model as a folder to share: trained parts in half precision, with sums.
 
     RUN/model (float32, all parts) ─► config.json  provenance.json  <part>.safetensors  SHA256SUMS
 
 Half precision keeps eleven bits: weights change by at most 1/2048 of themselves, and those below
-6e-8 vanish. Weights above 65504 do not fit and are refused. A model card that lies in the target
-folder stays.
+6e-8 vanish. Weights above 65504 do not fit and are refused. A model card in the target folder
+is kept.
 """
 
 from collections.abc import Collection
@@ -72,7 +72,7 @@ def export_model(
 
 
 def require_half_precision(part: nn.Module, name: str) -> None:
-    """Every weight is finite, and still is in half precision.
+    """Every weight is finite, also in half precision.
 
     Raises:
         CheckpointError: naming the first that is not.

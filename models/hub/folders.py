@@ -1,7 +1,7 @@
-"""From a name to a model folder, and what it says about itself before any weights are read.
+"""From a name to a model folder, its configuration and provenance, before any weights are read.
 
-A folder with a configuration comes first, then the weights that ship, then the sizes. A folder that
-only happens to have the name of a size is no model.
+A folder with a configuration comes first, then bundled weights, then sizes. A folder without a
+configuration that has the name of a size is no model.
 """
 
 from collections.abc import Collection

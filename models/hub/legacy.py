@@ -1,8 +1,8 @@
 """Weight files of version 1, written before the priors were parts of their own.
 
 Version 1 kept the depth prior inside ``ldrm`` and the motion prior inside ``dit``, under other
-names, and its video model also predicted motion channels, which nothing uses any more. Values stay
-equal; channels of the video model that predicted motion are dropped.
+names, and its video model also predicted motion channels, which nothing uses any more. Values are
+kept; channels of the video model that predicted motion are dropped.
 """
 
 import re
@@ -74,16 +74,16 @@ def upgrade_tensors(
     part: str, tensors: Mapping[str, Tensor], config: ModelConfig
 ) -> dict[str, Tensor]:
     """The weights of one part, from the tensors of ``legacy_file(part)``."""
-    found = {_renamed(part, key): value for key, value in _own(part, tensors).items()}
-    return _upgrade_dit(found, config) if part == "dit" else found
+    upgraded = {_renamed(part, key): value for key, value in _part_tensors(part, tensors).items()}
+    return _upgrade_dit(upgraded, config) if part == "dit" else upgraded
 
 
-def _own(part: str, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def _part_tensors(part: str, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """The tensors that belong to the part, without its prefix."""
     if part in SOURCES:
         prefix = SOURCES[part][1]
-        own = {key: value for key, value in tensors.items() if key.startswith(prefix)}
-        return {key.removeprefix(prefix): value for key, value in own.items()}
+        inside = {key: value for key, value in tensors.items() if key.startswith(prefix)}
+        return {key.removeprefix(prefix): value for key, value in inside.items()}
     others = tuple(prefix for file, prefix in SOURCES.values() if file == part)
     return {key: value for key, value in tensors.items() if not key.startswith(others)}
 

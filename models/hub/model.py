@@ -41,7 +41,7 @@ class Model:
     config: ModelConfig
     networks: Networks = field(default_factory=Networks)
     folder: Path | None = None
-    """Where the weights lie; None for random ones."""
+    """Of the weights; None for random ones."""
     trained: frozenset[str] = frozenset()
     """Names of the parts that are trained to their end."""
     license: str = NOT_STATED
@@ -108,7 +108,7 @@ def save_model(model: Model, folder: Path) -> None:
     complete = with_parts(model, model.parts)
     provenance = ModelProvenance(trained=model.trained, license=model.license, origin=model.origin)
     write_provenance(provenance, folder)
-    # Checksums of what lay there before would call the new files damaged.
+    # Checksums of the files before would call the new ones damaged.
     (folder / SUMS_FILE).unlink(missing_ok=True)
     save_networks(complete.networks, model.config, folder)
 

@@ -1,4 +1,4 @@
-"""What a model folder or a size says about its weights; files are checked, no network is built."""
+"""Facts about the weights of a model folder or a size; files are checked, no network is built."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ class ModelInfo:
     config: ModelConfig
     provenance: ModelProvenance
     states: Mapping[str, str]
-    """Per part: trained, untrained (weights that nobody finished), or random (no weights)."""
-    place: str
+    """Per part: trained, untrained (weights of unfinished training), or random (no weights)."""
+    location: str
     """The folder, or that there is none."""
     weights_sha256: str
 
@@ -38,7 +38,7 @@ def model_info(name_or_folder: str | Path) -> ModelInfo:
             config=config,
             provenance=ModelProvenance(),
             states=dict.fromkeys(model_parts(config), "random"),
-            place="none: random weights",
+            location="none: random weights",
             weights_sha256="none",
         )
     config, provenance = load_config(folder), read_provenance(folder)
@@ -46,7 +46,7 @@ def model_info(name_or_folder: str | Path) -> ModelInfo:
         config=config,
         provenance=provenance,
         states={part: _state(folder, part, provenance) for part in model_parts(config)},
-        place=str(folder),
+        location=str(folder),
         weights_sha256=weights_sha256(folder),
     )
 

@@ -1,4 +1,4 @@
-"""What is known about a model's weights: which parts are trained, their licence and their origin.
+"""Provenance of a model's weights: which parts are trained, their licence and their origin.
 
 provenance.json, version 2:
 
@@ -38,11 +38,11 @@ class ModelProvenance:
     license: str = NOT_STATED
     """Of the weights, as an SPDX name."""
     origin: str = NOT_STATED
-    """One line for people: made by whom, from what."""
+    """One line for people: trained by whom, on what."""
 
 
 def read_provenance(folder: Path) -> ModelProvenance:
-    """What a model folder says about itself; nothing is trained where it says nothing.
+    """The provenance of a model folder; without the file nothing is trained.
 
     Raises:
         CheckpointError: the file is damaged, or from a newer version.
@@ -51,7 +51,7 @@ def read_provenance(folder: Path) -> ModelProvenance:
     if not file.is_file():
         return ModelProvenance()
     try:
-        found = _parse(json.loads(file.read_text(encoding="utf-8")), file)
+        provenance = _parse(json.loads(file.read_text(encoding="utf-8")), file)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         if isinstance(error, CheckpointError):
             raise
@@ -59,7 +59,7 @@ def read_provenance(folder: Path) -> ModelProvenance:
             f"{file}: expected a JSON object with 'trained', or 'untrained' in version 1, "
             "got something else; fetch the model again"
         ) from error
-    return _with_priors(found) if is_version_1(folder) else found
+    return _with_priors(provenance) if is_version_1(folder) else provenance
 
 
 def write_provenance(provenance: ModelProvenance, folder: Path) -> None:

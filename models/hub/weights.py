@@ -2,9 +2,9 @@
 
     config.json  {vae,text_encoder,dit,ldrm,deformation,monocular_depth,motion_unet}.safetensors
 
-Reading is strict: every key and every shape must be the one the configuration asks for. Weights
+Reading is strict: every key and every shape must be that of the configuration. Weights
 may be stored in half precision; they are read into float32. Folders of version 1 are read too
-(``legacy.py``). Whether a part may be absent is for provenance.py to say.
+(``legacy.py``). provenance.py decides which parts may be absent.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ from diff4splat.models.factory import PARTS, Networks, create_networks, model_pa
 from diff4splat.models.hub.legacy import legacy_file, upgrade_tensors
 
 CONFIG_FILE = "config.json"
-SHOWN = 3
+MAX_LISTED = 3
 """Names listed in an error message before "and so on"."""
 
 
@@ -88,8 +88,8 @@ def weights_sha256(folder: Path, parts: Iterable[str] = PARTS) -> str:
     for path in sorted({weight_file(folder, part) for part in parts}):
         if path.is_file():
             with path.open("rb") as file:
-                found = hashlib.file_digest(file, "sha256").hexdigest()
-            digest.update(f"{path.stem}:{found}\n".encode())
+                sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+            digest.update(f"{path.stem}:{sha256}\n".encode())
     return digest.hexdigest()
 
 
@@ -160,11 +160,11 @@ def _fill(part: nn.Module, tensors: dict[str, Tensor], name: str) -> None:
     part.load_state_dict({key: value.float() for key, value in tensors.items()}, assign=True)
 
 
-def _refuse(found: list[str], what: str) -> None:
-    if found:
-        listed = ", ".join(found[:SHOWN]) + (", …" if len(found) > SHOWN else "")
+def _refuse(keys: list[str], what: str) -> None:
+    if keys:
+        listed = ", ".join(keys[:MAX_LISTED]) + (", …" if len(keys) > MAX_LISTED else "")
         raise CheckpointError(
-            f"{what} {len(found)} ({listed}); the weights belong to another configuration"
+            f"{what} {len(keys)} ({listed}); the weights belong to another configuration"
         )
 
 

@@ -1,9 +1,8 @@
 """Raw reconstruction maps and a base scene to Gaussians, one per grid cell.
 
 Axes: ``t h w`` frames, rows and columns of the Gaussian grid, flattened in this order into ``n``.
-Lengths in scene units, distance along the unit ray. The base scene is a picture standing in space:
-colour, distance and opacity per cell, and the cameras that saw it. With raw = 0 the result is
-exactly the base:
+Lengths in scene units, distance along the unit ray. The base scene is colour, distance and opacity
+per cell of a camera. With raw = 0 the result is exactly the base:
 
     mean  = camera centre + distance · ray
     scale = footprint_px · z / focal_px · exp(L tanh(raw / L)), z = distance · cos(ray, view axis)
@@ -29,15 +28,15 @@ from diff4splat.scene.harmonics import dc_from_color
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PixelBase:
-    """What every grid cell shows before the network corrects it."""
+    """Colour, distance and opacity of every grid cell before the network corrects them."""
 
     rgb: Float[Tensor, "t h w 3"]
     distance: Float[Tensor, "t h w"]
     """Along the unit ray, above 0."""
     opacity: Float[Tensor, "t h w"]
-    """In [0, 1]; 0 for cells that show nothing."""
+    """In [0, 1]; 0 for invisible cells."""
     cameras: Camera
-    """A batch of shape (t,) for pictures of size (h, w): resize cameras to a half grid first."""
+    """A batch of shape (t,) for images of size (h, w): resize cameras to a half grid first."""
 
     def __post_init__(self) -> None:
         grid = tuple(self.distance.shape)
@@ -46,10 +45,10 @@ class PixelBase:
             got = tuple(getattr(self, name).shape)
             if got != shape:
                 raise ShapeError(f"PixelBase.{name}: expected {shape} (from distance), got {got}")
-        seen = (*self.cameras.batch_shape, *self.cameras.size_px)
-        if seen != grid:
+        got = (*self.cameras.batch_shape, *self.cameras.size_px)
+        if got != grid:
             raise ShapeError(
-                f"PixelBase.cameras: expected frames and size {grid}, got {seen}; resize them"
+                f"PixelBase.cameras: expected frames and size {grid}, got {got}; resize them"
             )
 
 

@@ -8,7 +8,7 @@ length:
     rays ─── patch 4×16×16 ─ linear ─ norm ─────────┴─ concatenate ─ linear ─ blocks ─ norm ─ tokens
     tokens ─ transposed convolution 4×16×16 (zero at first), drop 3 frames ─ 12 channels per pixel
 
-The zero layer makes a fresh model output exactly 0, which the heads read as "the base scene".
+The zero layer makes a fresh model output exactly 0, which is the base scene.
 With refinement (``refinement/``) the last line differs:
 
     tokens, decoded frames, cameras ─ decoder ─┬─ 12 channels per pixel of the key frames
@@ -80,7 +80,7 @@ class Ldrm(nn.Module):
         tokens = self._tokens(latent, camera, posed_video)
         if self.refinement is not None:
             return self.refinement(tokens, _require_frames(posed_video), moving=moving)
-        # Latent i holds frames 4 i − 3 … 4 i: three of the first pack lie before the video.
+        # Latent i holds frames 4 i − 3 … 4 i: three of the first pack precede the video.
         gaussians = self.to_gaussians(tokens)[:, :, TIME_STRIDE - 1 :]
         return RawGaussianMaps(gaussians=gaussians.to(latent.dtype), tokens=tokens.to(latent.dtype))
 
@@ -120,7 +120,7 @@ class Ldrm(nn.Module):
         if latent.shape != pose.shape:
             raise ShapeError(
                 f"LDRM: expected rays for the latent's token grid {tuple(latent.shape[:4])}, "
-                f"got {tuple(pose.shape[:4])}; make both from the same frames and picture size"
+                f"got {tuple(pose.shape[:4])}; make both from the same frames and image size"
             )
         return self.merge(torch.cat([latent, pose], -1))
 

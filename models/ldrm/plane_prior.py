@@ -1,9 +1,10 @@
-"""The scene before any correction: the photograph on a plane in front of the first camera.
+"""The scene before any correction: the image on a plane in front of the first camera.
 
 Axes: ``t h w`` frames, rows and columns of the Gaussian grid. Every frame of the path gets one
-Gaussian per cell of its own camera, on the plane z = PLANE_DEPTH of the first camera. Those of the
-first frame carry the photograph's pixels and are opaque; those of later frames carry what their ray
-sees of the plane and lie below the pruning threshold, until a trained head raises them.
+Gaussian per cell of its camera, on the plane z = PLANE_DEPTH of the first camera. Those of the
+first frame have the pixels' colours and are opaque. Those of later frames have the colour of the
+plane where their ray meets it, and an opacity below the pruning threshold until a trained head
+raises it.
 """
 
 import torch
@@ -15,7 +16,7 @@ from diff4splat.geometry.rays import world_rays
 from diff4splat.models.ldrm.gaussian_head import PixelBase
 
 PLANE_DEPTH = 4.0
-"""Scene units. Keeps standard deviations near 0.006, which half-precision viewers still hold."""
+"""Scene units. Keeps standard deviations near 0.006, which half precision resolves."""
 OPAQUE, UNSEEN = 0.999, 0.002
 """Opacities of the first frame and of later ones; the paper prunes below 0.005."""
 DISTANCE_RANGE = (PLANE_DEPTH / 8, PLANE_DEPTH * 8)
@@ -34,11 +35,11 @@ def plane_base(
     origins, directions = world_rays(grid)
     distance = _distance_to_plane(origins[..., 2], directions[..., 2])
     points = (origins + distance[..., None] * directions).flatten(1, 2)
-    seen = _sample(rgb, camera.resized(grid.size_px), points)
+    colors = _sample(rgb, camera.resized(grid.size_px), points)
     opacity = torch.full_like(distance, UNSEEN)
     opacity[0] = OPAQUE
     return PixelBase(
-        rgb=torch.cat([rgb[None], seen.unflatten(1, grid.size_px)[1:]]),
+        rgb=torch.cat([rgb[None], colors.unflatten(1, grid.size_px)[1:]]),
         distance=distance,
         opacity=opacity,
         cameras=grid,
@@ -53,7 +54,7 @@ def _shrink(rgb: Float[Tensor, "h w 3"], factor: int) -> Float[Tensor, "h2 w2 3"
 def _distance_to_plane(
     origin_z: Float[Tensor, "t h w"], direction_z: Float[Tensor, "t h w"]
 ) -> Float[Tensor, "t h w"]:
-    """Along each ray; rays that miss the plane get its plain depth."""
+    """Along each ray; rays that miss the plane get its depth."""
     hits = direction_z * (PLANE_DEPTH - origin_z) > 1e-6
     distance = (PLANE_DEPTH - origin_z) / torch.where(hits, direction_z, 1.0)
     return torch.where(hits, distance, PLANE_DEPTH).clamp(*DISTANCE_RANGE)
@@ -62,7 +63,7 @@ def _distance_to_plane(
 def _sample(
     rgb: Float[Tensor, "h w 3"], camera: Camera, points: Float[Tensor, "t n 3"]
 ) -> Float[Tensor, "t n 3"]:
-    """Colours of the picture where ``points`` project; its border continues outwards."""
+    """Colours of the image where ``points`` project; its border is replicated."""
     pixels = project(camera, points.flatten(0, 1))[0].unflatten(0, points.shape[:2])
     height, width = camera.size_px
     normalized = 2 * pixels / pixels.new_tensor([width, height]) - 1

@@ -12,7 +12,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawGaussianMaps:
-    """Raw attributes of one Gaussian per grid cell, and the tokens they came from."""
+    """Raw attributes of one Gaussian per grid cell, and the tokens for the deformation network."""
 
     gaussians: Float[Tensor, "b 12 f hh ww"]
     """Channels RGB 3, scale 3, quaternion 4, opacity 1, ray distance 1; zero is the base scene.
@@ -20,7 +20,7 @@ class RawGaussianMaps:
     tokens: Float[Tensor, "b d t h2 w2"]
     """Canonical latent for the deformation network."""
     border: Float[Tensor, "b 12 hs ws"] | None = None
-    """The same channels for the layer behind and around the first frame; with refinement only."""
+    """The same channels for the border extension of the first frame; with refinement only."""
 
     def sample(self, index: int) -> "RawGaussianMaps":
         """One batch element, as a batch of one."""

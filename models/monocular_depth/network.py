@@ -1,10 +1,10 @@
-"""Depth of one picture alone: a U-Net that starts at its pixels (ours; docs/adr/0023).
+"""Depth prior: a U-Net from one image to the ray distance of its pixels (ours; ADR 23).
 
-Axes: ``b`` batch, ``h w`` pixels. The detail decoder sees cells of four pixels and was made for
-videos, where parallax tells depth. In one picture only shading, size and place do, edges of depth
-are edges of colour, and every picture with a true depth can teach it: no scene is rendered.
+Axes: ``b`` batch, ``h w`` pixels. One image has no parallax, so refinement, which works on cells of
+four pixels, does not apply. Shading, size and position are the cues, depth edges are colour edges,
+and any image with ground-truth depth can train the network.
 
-    picture, place ─ cells of 2 ─ 1/2 ── 1/4 ── 1/8 ── 1/16 ── 1/8 ── 1/4 ── 1/2 ─ raw distance
+    image, coordinates ─ cells of 2 ─ 1/2 ── 1/4 ── 1/8 ── 1/16 ── 1/8 ── 1/4 ── 1/2 ─ raw distance
 """
 
 from itertools import pairwise
@@ -21,7 +21,7 @@ FOLDED_PX = 2
 GROWTH = (1, 2, 3, 4)
 """Channels at 1/2, 1/4, 1/8 and 1/16 of the resolution, in multiples of the configured width."""
 MULTIPLE_PX = FOLDED_PX << (len(GROWTH) - 1)
-"""What the size of a picture must be a multiple of."""
+"""Image sides must be multiples of it."""
 
 
 class MonocularDepthNet(nn.Module):
@@ -41,25 +41,25 @@ class MonocularDepthNet(nn.Module):
         self.up_blocks = nn.ModuleList([ConvBlock(count) for count in channels[:-1]])
         self.head = zero_(nn.Conv2d(width, FOLDED_PX**2, 3, padding=1))
 
-    def forward(self, picture: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 1 h w"]:
-        """``picture`` is RGB in [0, 1], its sides multiples of 16."""
-        seen = torch.cat([picture * 2 - 1, pixel_coordinates(picture)], 1)
-        features = self.input_conv(torch.nn.functional.pixel_unshuffle(seen, FOLDED_PX))
-        passed = []
-        for block, shrink in zip(self.down_blocks, self.downsample, strict=False):
-            passed.append(block(features))
-            features = shrink(passed[-1])
+    def forward(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 1 h w"]:
+        """``image`` is RGB in [0, 1], its sides multiples of 16."""
+        inputs = torch.cat([image * 2 - 1, pixel_coordinates(image)], 1)
+        features = self.input_conv(torch.nn.functional.pixel_unshuffle(inputs, FOLDED_PX))
+        skips = []
+        for block, downsample in zip(self.down_blocks, self.downsample, strict=False):
+            skips.append(block(features))
+            features = downsample(skips[-1])
         features = self.mid(self.down_blocks[-1](features))
         for level in reversed(range(len(self.up_blocks))):
-            larger = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
-            features = self.up_blocks[level](passed[level] + larger)
+            upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
+            features = self.up_blocks[level](skips[level] + upsampled)
         return torch.nn.functional.pixel_shuffle(self.head(features), FOLDED_PX)
 
 
-def pixel_coordinates(picture: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 2 h w"]:
-    """X and y of the pixels' centres, −1 and 1 at the edges of the picture."""
+def pixel_coordinates(image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 2 h w"]:
+    """X and y of the pixel centres, −1 and 1 at the edges of the image."""
     y, x = (
-        (2 * torch.arange(size, device=picture.device, dtype=picture.dtype) + 1) / size - 1
-        for size in picture.shape[2:]
+        (2 * torch.arange(size, device=image.device, dtype=image.dtype) + 1) / size - 1
+        for size in image.shape[2:]
     )
-    return torch.stack(torch.meshgrid(x, y, indexing="xy")).expand(len(picture), -1, -1, -1)
+    return torch.stack(torch.meshgrid(x, y, indexing="xy")).expand(len(image), -1, -1, -1)

@@ -1,1 +1,1 @@
-"""Motion of the picture's own cells by a U-Net that reads the picture and the words (ours)."""
+"""Motion prior: a U-Net from an image and text tokens to displacements and a mask."""

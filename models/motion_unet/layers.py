@@ -1,8 +1,8 @@
-"""Layers of the motion branch: convolutions under a condition, shared means, a look at the words.
+"""Layers of the motion U-Net: modulated convolutions, means over frames, text cross-attention.
 
 Axes: ``n`` = b t maps (the latent frames of a sample one after another), ``c`` channels, ``h w``
-cells, ``e`` width of a condition or of a text token. Everything a block adds on account of
-conditions, words and other frames is zero at first.
+cells, ``e`` width of a condition or of a text token. Whatever a block adds from conditions,
+text and other frames is zero at first.
 """
 
 import torch
@@ -35,8 +35,8 @@ class ModulatedConvBlock(nn.Module):
         """Same size."""
         scale, shift = self.modulation(condition)[..., None, None].unbind(1)
         hidden = self.conv_1(torch.nn.functional.silu(self.norm_1(features)))
-        steered = self.norm_2(hidden) * (1 + scale) + shift
-        return features + self.conv_2(torch.nn.functional.silu(steered))
+        modulated = self.norm_2(hidden) * (1 + scale) + shift
+        return features + self.conv_2(torch.nn.functional.silu(modulated))
 
 
 class TemporalMeanMixing(nn.Module):
@@ -53,7 +53,7 @@ class TemporalMeanMixing(nn.Module):
 
 
 class TextCrossAttention(nn.Module):
-    """x + attention(norm(x), words): every cell asks what is said about it."""
+    """x + attention(norm(x), text): every cell attends to the text tokens."""
 
     def __init__(self, channels: int, heads: int, text_width: int) -> None:
         super().__init__()
@@ -62,18 +62,18 @@ class TextCrossAttention(nn.Module):
         zero_(self.attention.to_output)
 
     def forward(
-        self, features: Float[Tensor, "n c h w"], words: TextTokens
+        self, features: Float[Tensor, "n c h w"], text: TextTokens
     ) -> Float[Tensor, "n c h w"]:
-        """Nothing is added where nothing is told."""
-        told = words.told.to(features)[:, None, None]
-        by_frame = self.norm(features).unflatten(0, (len(told), -1)).movedim(2, -1)
-        asked = self.attention(by_frame.flatten(1, 3), words.states, mask=words.readable) * told
-        answer = asked.unflatten(1, by_frame.shape[1:4])
-        return features + answer.movedim(-1, 2).flatten(0, 1)
+        """Nothing is added to a sample without text."""
+        has_text = text.has_text.to(features)[:, None, None]
+        by_frame = self.norm(features).unflatten(0, (len(has_text), -1)).movedim(2, -1)
+        update = self.attention(by_frame.flatten(1, 3), text.states, mask=text.attention_mask)
+        update = (update * has_text).unflatten(1, by_frame.shape[1:4])
+        return features + update.movedim(-1, 2).flatten(0, 1)
 
 
 class UNetLevel(nn.Module):
-    """What happens at one resolution on the way down: see around, see other frames, read."""
+    """One resolution of the encoder: convolutions, mean over frames, text cross-attention."""
 
     def __init__(self, channels: int, condition_width: int, heads: int, text_width: int) -> None:
         super().__init__()
@@ -86,8 +86,8 @@ class UNetLevel(nn.Module):
         features: Float[Tensor, "n c h w"],
         condition: Float[Tensor, "n e"],
         samples: int,
-        words: TextTokens | None,
+        text: TextTokens | None,
     ) -> Float[Tensor, "n c h w"]:
-        """Without ``words`` nothing is read."""
+        """Without ``text`` there is no cross-attention."""
         features = self.frame_mean(self.block(features, condition), samples)
-        return features if words is None else self.text_attention(features, words)
+        return features if text is None else self.text_attention(features, text)

@@ -1,11 +1,10 @@
-"""Which pixels move, up to the edges that the picture has there: a U-Net beside the branch (ours).
+"""Refines the motion mask at pixels: a small U-Net beside the motion U-Net (ours; ADR 25).
 
-Axes: ``b`` batch, ``hh ww`` pixels, ``hc wc`` cells of 4 pixels, ``c`` the branch's channels. The
-branch knows from the words which thing is meant, and sees cells; here pixels are seen, and where a
-thing ends.
+Axes: ``b`` batch, ``hh ww`` pixels, ``hc wc`` cells of 4 pixels, ``c`` channels of the motion
+U-Net, which selects the object that the text names, on cells; this network adds its edges.
 
-    picture, place ─ cells of 2 ─ 1/2 ─────────── 1/2 ─ conv (zero) ─ logits
-    the branch's features ─ linear ─── + 1/4 ── 1/4 ┘
+    image, coordinates ─ cells of 2 ─ 1/2 ─────────── 1/2 ─ conv (zero) ─ logits
+    features of the motion U-Net ─ linear ─ + 1/4 ── 1/4 ┘
 """
 
 import torch
@@ -18,7 +17,7 @@ from diff4splat.models.monocular_depth.network import FOLDED_PX, pixel_coordinat
 
 
 class MaskRefiner(nn.Module):
-    """Logits to be added to those of the branch; zero when fresh."""
+    """Logits to add to those of the motion U-Net; zero when fresh."""
 
     def __init__(self, width: int, channels: int) -> None:
         super().__init__()
@@ -31,12 +30,12 @@ class MaskRefiner(nn.Module):
         self.head = zero_(nn.Conv2d(width, FOLDED_PX**2, 3, padding=1))
 
     def forward(
-        self, picture: Float[Tensor, "b 3 hh ww"], told: Float[Tensor, "b c hc wc"]
+        self, image: Float[Tensor, "b 3 hh ww"], features: Float[Tensor, "b c hc wc"]
     ) -> Float[Tensor, "b hh ww"]:
-        """``picture`` is RGB in [0, 1], its sides multiples of 4."""
-        seen = torch.cat([picture * 2 - 1, pixel_coordinates(picture)], 1)
-        fine = self.fine(self.input_image(torch.nn.functional.pixel_unshuffle(seen, FOLDED_PX)))
-        coarse = self.coarse(self.down(fine) + self.input_features(told))
-        larger = torch.nn.functional.pixel_shuffle(self.up(coarse), 2)
-        logits = self.head(self.fine_out(fine + larger))
+        """``image`` is RGB in [0, 1], its sides multiples of 4."""
+        inputs = torch.cat([image * 2 - 1, pixel_coordinates(image)], 1)
+        fine = self.fine(self.input_image(torch.nn.functional.pixel_unshuffle(inputs, FOLDED_PX)))
+        coarse = self.coarse(self.down(fine) + self.input_features(features))
+        upsampled = torch.nn.functional.pixel_shuffle(self.up(coarse), 2)
+        logits = self.head(self.fine_out(fine + upsampled))
         return torch.nn.functional.pixel_shuffle(logits, FOLDED_PX)[:, 0]

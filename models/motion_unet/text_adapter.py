@@ -1,7 +1,7 @@
-"""The branch's own reading of the words: blocks behind the text encoder, which stays as it is.
+"""Text adapter of the motion U-Net: blocks after the text encoder, which stays frozen.
 
-Axes: ``b`` batch, ``s`` text tokens, ``e`` their width. The encoder learnt what the video model
-asks of a text, which way things go; the branch also asks which thing is meant.
+Axes: ``b`` batch, ``s`` text tokens, ``e`` their width. The encoder was trained with the video
+model, which needs the direction of motion; the motion U-Net also needs the object that moves.
 """
 
 import math
@@ -18,7 +18,7 @@ BLOCKS = 2
 
 
 class TextAdapter(nn.Module):
-    """States of the words, seen again; the states themselves when fresh."""
+    """Residual blocks on the text states; the identity when fresh."""
 
     def __init__(self, config: TextConfig) -> None:
         super().__init__()
@@ -29,12 +29,12 @@ class TextAdapter(nn.Module):
             zero_(block.to_output)
             zero_(block.contract)
 
-    def forward(self, words: TextTokens) -> Float[Tensor, "b s e"]:
+    def forward(self, text: TextTokens) -> Float[Tensor, "b s e"]:
         """States of real tokens; those of padding are zero."""
-        states = words.states
+        states = text.states
         buckets = distance_buckets(states.shape[1], self.config, states.device)
         bias = self.distance_bias(buckets).permute(2, 0, 1)[None]
-        bias = bias.masked_fill(~words.readable[:, None, None], -math.inf)
+        bias = bias.masked_fill(~text.attention_mask[:, None, None], -math.inf)
         for block in self.blocks:
             states = block(states, bias)
-        return states * words.mask[..., None]
+        return states * text.mask[..., None]

@@ -1,4 +1,4 @@
-"""The words of a prompt as the motion branch reads them.
+"""Text tokens of a prompt, as the motion U-Net takes them.
 
 Axes: ``b`` batch, ``s`` text tokens, ``e`` their width.
 """
@@ -12,7 +12,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTokens:
-    """States of text tokens; a sample without a real token reads as one without a text."""
+    """States of text tokens; a sample without a real token equals one without text."""
 
     states: Float[Tensor, "b s e"]
     """0 where a token is not real."""
@@ -20,19 +20,19 @@ class TextTokens:
     """True where a token is real."""
 
     @property
-    def told(self) -> Bool[Tensor, " b"]:
+    def has_text(self) -> Bool[Tensor, " b"]:
         """Whether a sample has any real token."""
         return self.mask.any(1)
 
     @property
-    def readable(self) -> Bool[Tensor, "b s"]:
-        """The mask, but all true where nothing is told: a softmax over nothing is no number."""
-        return self.mask | ~self.told[:, None]
+    def attention_mask(self) -> Bool[Tensor, "b s"]:
+        """The mask, but all true for samples without text: softmax needs at least one token."""
+        return self.mask | ~self.has_text[:, None]
 
-    def pooled(self, untold: Float[Tensor, " e"]) -> Float[Tensor, "b e"]:
-        """The mean over real tokens, ``untold`` where there are none."""
+    def pooled(self, null_embedding: Float[Tensor, " e"]) -> Float[Tensor, "b e"]:
+        """The mean over real tokens, ``null_embedding`` where there are none."""
         mean = self.states.sum(1) / self.mask.sum(1, keepdim=True).clamp_min(1)
-        return torch.where(self.told[:, None], mean, untold)
+        return torch.where(self.has_text[:, None], mean, null_embedding)
 
 
 def text_tokens(text: Float[Tensor, "b s e"], mask: Bool[Tensor, "b s"] | None) -> TextTokens:

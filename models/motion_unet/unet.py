@@ -1,17 +1,17 @@
-"""What moves, and clean motion from a noisy one, by picture and words: a U-Net on cells (ours).
+"""Motion prior: a U-Net on cells that denoises displacement and predicts a motion mask (ours).
 
 Axes: ``b`` batch, ``t`` latent frames after the first, ``n`` = b t, ``hh ww`` pixels of the first
-picture, ``hc wc`` its cells of 4 pixels, ``s e`` text tokens and their width, ``d`` width of the
-condition. Motion in the units of ``video_motion``. Noise level 0 is data and 1 is noise.
+image, ``hc wc`` its cells of 4 pixels, ``s e`` text tokens and their width, ``d`` width of the
+condition. Motion in the units of ``motion_field``. Noise level 0 is data and 1 is noise.
 
-    picture, place ─ conv ─┐
-    noisy motion ─── conv ─┴ + ─ 1/4 ─ 1/8 ─ 1/16 ─ 1/8 ─ 1/4 ─┬ conv (zero) ─ clean motion
-    level, time, mean of the words ─ scale and shift of every block ┤
-    words ─ reader ─ attention of every cell, on the way down ──────┤
-                                                                    └ mean over time ─ what moves
+    image, coordinates ─ conv ─┐
+    noisy motion ─────── conv ─┴ + ─ 1/4 ─ 1/8 ─ 1/16 ─ 1/8 ─ 1/4 ─┬ conv (zero) ─ clean motion
+    level, time, mean of the text ─ scale and shift of every block ┤
+    text ─ text adapter ─ cross-attention in the encoder ──────────┤
+                                                                   └ mean over time ─ mask logits
 
-The latent frames of a sample see each other through the mean of their features. Cells know which
-thing moves; where it ends, a second look at the pixels tells (``outline``).
+The latent frames of a sample interact through the mean of their features. The mask of cells is
+refined at pixels (``mask_refiner``).
 """
 
 from dataclasses import replace
@@ -32,16 +32,16 @@ from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 
 CHANNELS = 3
 IMAGE_CHANNELS = 3 * CELL_PX**2 + 2
-"""The pixels of a cell and its place."""
+"""The pixels of a cell and its coordinates."""
 MULTIPLE_PX = 16
-"""What the size of a picture must be a multiple of: the coarsest cells."""
+"""Image sides must be multiples of it: the coarsest cells."""
 
 
 class MotionUNet(nn.Module):
-    """Clean motion of every cell of a picture in every latent frame after the first.
+    """Clean motion of every cell of an image in every latent frame after the first.
 
     Raises:
-        ConfigError: ``width`` cannot be shared by the heads at all three resolutions.
+        ConfigError: ``width`` is not a multiple of twice the heads.
     """
 
     def __init__(
@@ -72,64 +72,64 @@ class MotionUNet(nn.Module):
         self.up_1 = nn.Conv2d(middle, 4 * fine, 1)
         self.middle_out = ModulatedConvBlock(middle, width)
         self.fine_out = ModulatedConvBlock(fine, width)
-        # No norm before it: at low levels the answer is the noisy motion itself, size and all.
+        # No norm before it: at low noise levels the output keeps the scale of the noisy motion.
         self.motion_head = zero_(nn.Conv2d(fine, CHANNELS, 3, padding=1))
         self.mask_head = zero_(nn.Conv2d(fine, CELL_PX**2, 3, padding=1))
         self.mask_refiner = MaskRefiner(mask_refiner_width, fine) if mask_refiner_width else None
 
     def forward(
         self,
-        picture: Float[Tensor, "b 3 hh ww"],
+        image: Float[Tensor, "b 3 hh ww"],
         noisy: Float[Tensor, "b 3 t hc wc"],
         level: Float[Tensor, " b"],
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
     ) -> Float[Tensor, "b 3 t hc wc"]:
-        """The clean motion (not a velocity); ``picture`` is RGB in [0, 1].
+        """The clean motion (not a velocity); ``image`` is RGB in [0, 1].
 
-        A sample of which no token is real in ``text_mask`` gets the answer of one without a text.
+        A sample without a real token in ``text_mask`` gets the output of one without text.
 
         Raises:
-            ShapeError: the picture is no multiple of 16 pixels, or the motion not on its cells.
+            ShapeError: the image sides are no multiples of 16, or the motion is not on its cells.
         """
-        return self._motion(self.features(picture, noisy, level, text, text_mask), noisy)
+        return self._motion(self.features(image, noisy, level, text, text_mask), noisy)
 
     def predict_motion_and_mask(
         self,
-        picture: Float[Tensor, "b 3 hh ww"],
+        image: Float[Tensor, "b 3 hh ww"],
         noisy: Float[Tensor, "b 3 t hc wc"],
         level: Float[Tensor, " b"],
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
     ) -> tuple[Float[Tensor, "b 3 t hc wc"], Float[Tensor, "b hh ww"]]:
-        """The clean motion, and for every pixel the logit of how likely it moves at all.
+        """The clean motion, and for every pixel the logit of the probability that it moves.
 
         Raises:
             ShapeError: as ``forward``.
         """
-        features = self.features(picture, noisy, level, text, text_mask)
-        told = features.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)
-        moves = torch.nn.functional.pixel_shuffle(self.mask_head(told), CELL_PX)[:, 0]
+        features = self.features(image, noisy, level, text, text_mask)
+        pooled = features.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)
+        mask = torch.nn.functional.pixel_shuffle(self.mask_head(pooled), CELL_PX)[:, 0]
         if self.mask_refiner is not None:
-            moves = moves + self.mask_refiner(picture, told)
-        return self._motion(features, noisy), moves
+            mask = mask + self.mask_refiner(image, pooled)
+        return self._motion(features, noisy), mask
 
     def features(
         self,
-        picture: Float[Tensor, "b 3 hh ww"],
+        image: Float[Tensor, "b 3 hh ww"],
         noisy: Float[Tensor, "b 3 t hc wc"],
         level: Float[Tensor, " b"],
         text: Float[Tensor, "b s e"] | None,
         text_mask: Bool[Tensor, "b s"] | None,
     ) -> Float[Tensor, "n c hc wc"]:
-        """What both answers are read from."""
-        _require_sizes(picture, noisy)
+        """Input of both heads."""
+        _require_sizes(image, noisy)
         samples, frames = len(noisy), noisy.shape[2]
-        words = None if text is None else self._read(text_tokens(text, text_mask))
-        condition = self._condition(level, frames, words)
-        fine = self.fine(self._input_features(picture, noisy), condition, samples, words)
-        middle = self.middle(self.down_1(fine), condition, samples, words)
-        coarse = self.coarse(self.down_2(middle), condition, samples, words)
+        tokens = None if text is None else self._adapt(text_tokens(text, text_mask))
+        condition = self._condition(level, frames, tokens)
+        fine = self.fine(self._input_features(image, noisy), condition, samples, tokens)
+        middle = self.middle(self.down_1(fine), condition, samples, tokens)
+        coarse = self.coarse(self.down_2(middle), condition, samples, tokens)
         coarse = self.mid(coarse, condition)
         middle = self.middle_out(middle + _upsample(self.up_2(coarse)), condition)
         return self.fine_out(fine + _upsample(self.up_1(middle)), condition)
@@ -140,16 +140,16 @@ class MotionUNet(nn.Module):
         motion = self.motion_head(features)
         return motion.unflatten(0, (len(noisy), noisy.shape[2])).transpose(1, 2)
 
-    def _read(self, words: TextTokens) -> TextTokens:
-        return replace(words, states=self.text_adapter(words))
+    def _adapt(self, tokens: TextTokens) -> TextTokens:
+        return replace(tokens, states=self.text_adapter(tokens))
 
     def _condition(
-        self, level: Float[Tensor, " b"], frames: int, words: TextTokens | None
+        self, level: Float[Tensor, " b"], frames: int, tokens: TextTokens | None
     ) -> Float[Tensor, "n d"]:
-        """Level and words of a sample, and the time of a latent frame as a share of the clip."""
+        """Noise level and text of a sample, and the time of each latent frame in the clip."""
         time = torch.arange(1, frames + 1, device=level.device) / frames
         pooled = (
-            self.null_text_embedding if words is None else words.pooled(self.null_text_embedding)
+            self.null_text_embedding if tokens is None else tokens.pooled(self.null_text_embedding)
         )
         by_sample = self.level_mlp(level_embedding(level, self.frequency_width))
         by_sample = by_sample + self.pooled_text(pooled)
@@ -157,26 +157,26 @@ class MotionUNet(nn.Module):
         return (by_sample[:, None] + by_frame).flatten(0, 1)
 
     def _input_features(
-        self, picture: Float[Tensor, "b 3 hh ww"], noisy: Float[Tensor, "b 3 t hc wc"]
+        self, image: Float[Tensor, "b 3 hh ww"], noisy: Float[Tensor, "b 3 t hc wc"]
     ) -> Float[Tensor, "n c hc wc"]:
-        """The picture's features are made once for all frames."""
-        seen = self.input_image(torch.cat([cells(picture) * 2 - 1, cell_coordinates(noisy)], 1))
+        """The image's features are computed once for all frames."""
+        features = self.input_image(torch.cat([cells(image) * 2 - 1, cell_coordinates(noisy)], 1))
         motion = self.input_motion(noisy.transpose(1, 2).flatten(0, 1))
-        return (motion.unflatten(0, (len(noisy), -1)) + seen[:, None]).flatten(0, 1)
+        return (motion.unflatten(0, (len(noisy), -1)) + features[:, None]).flatten(0, 1)
 
 
 def widths(width: int, heads: int) -> tuple[int, int, int]:
     """Channels at 1/4, 1/8 and 1/16 of the resolution."""
     if width < 1 or heads < 1 or width % (2 * heads):
         raise ConfigError(
-            f"width of the motion branch: expected a multiple of {2 * heads} for {heads} heads, "
+            f"width of the motion U-Net: expected a multiple of {2 * heads} for {heads} heads, "
             f"got {width}; change width or heads"
         )
     return width, 3 * width // 2, 2 * width
 
 
 def cell_coordinates(noisy: Float[Tensor, "b 3 t hc wc"]) -> Float[Tensor, "b 2 hc wc"]:
-    """X and y of the cells' centres, −1 and 1 at the edges of the picture."""
+    """X and y of the cell centres, −1 and 1 at the edges of the image."""
     y, x = (
         (2 * torch.arange(size, device=noisy.device, dtype=noisy.dtype) + 1) / size - 1
         for size in noisy.shape[3:]
@@ -189,15 +189,15 @@ def _upsample(maps: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h2 w2"]:
     return torch.nn.functional.pixel_shuffle(maps, 2)
 
 
-def _require_sizes(picture: Float[Tensor, "..."], noisy: Float[Tensor, "..."]) -> None:
-    size = tuple(picture.shape[2:])
+def _require_sizes(image: Float[Tensor, "..."], noisy: Float[Tensor, "..."]) -> None:
+    size = tuple(image.shape[2:])
     if any(side == 0 or side % MULTIPLE_PX for side in size):
         raise ShapeError(
-            f"picture: expected multiples of {MULTIPLE_PX} pixels, got {size}; crop or resize it"
+            f"image: expected multiples of {MULTIPLE_PX} pixels, got {size}; crop or resize it"
         )
     grid = tuple(side // CELL_PX for side in size)
     if tuple(noisy.shape[3:]) != grid or noisy.shape[2] == 0:
         raise ShapeError(
             f"motion: expected at least one latent frame of {grid} cells, got "
-            f"{tuple(noisy.shape[2:])}; make it on the cells of the picture"
+            f"{tuple(noisy.shape[2:])}; use the cells of the image"
         )

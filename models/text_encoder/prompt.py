@@ -1,4 +1,4 @@
-"""What a prompt may be, decided before any network is built (and without importing torch)."""
+"""Checks of prompts, before any network is built (and without importing torch)."""
 
 from diff4splat.errors import InputError
 

@@ -45,7 +45,7 @@ PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DitConditions:
-    """What stays the same over all noise levels of one generation; None is not computed at all."""
+    """Embedded conditions, the same at all noise levels of a generation; None is skipped."""
 
     camera: Float[Tensor, "b t h2 w2 d"] | None = None
     text: Float[Tensor, "b s d"] | None = None
@@ -67,7 +67,7 @@ class TextProjection(nn.Module):
         self.contract = nn.Linear(width, width)
 
     def forward(self, text: Float[Tensor, "b s e"]) -> Float[Tensor, "b s d"]:
-        """Project every token on its own."""
+        """Project every token separately."""
         return self.contract(torch.nn.functional.gelu(self.expand(text), approximate="tanh"))
 
 

@@ -2,7 +2,7 @@
 
 Axes: ``b`` batch, ``t`` latent frames, ``m`` tokens of a frame, ``d`` width, ``s`` text tokens.
 The six modulation vectors (shift, scale, gate for attention and for feed-forward) are one shared
-projection of the noise level plus a table of the block's own (PixArt-α, arXiv 2310.00426).
+projection of the noise level plus a table per block (PixArt-α, arXiv 2310.00426).
 """
 
 import torch
@@ -48,12 +48,12 @@ class DitBlock(nn.Module):
             ..., None, :
         ].unbind(2)
         frames = tokens.shape[1]
-        quiet = modulate(self.attention_norm(tokens), shift, scale).flatten(1, 2)
-        tokens = tokens + gate * self.attention(quiet, rope=rope).unflatten(1, (frames, -1))
+        modulated = modulate(self.attention_norm(tokens), shift, scale).flatten(1, 2)
+        tokens = tokens + gate * self.attention(modulated, rope=rope).unflatten(1, (frames, -1))
         if text is not None:
-            asked = self.text_norm(tokens).flatten(1, 2)
-            tokens = tokens + self.text_attention(asked, context=text, mask=text_mask).unflatten(
+            queries = self.text_norm(tokens).flatten(1, 2)
+            tokens = tokens + self.text_attention(queries, context=text, mask=text_mask).unflatten(
                 1, (frames, -1)
             )
-        quiet = modulate(self.feedforward_norm(tokens), ff_shift, ff_scale)
-        return tokens + ff_gate * self.feedforward(quiet)
+        modulated = modulate(self.feedforward_norm(tokens), ff_shift, ff_scale)
+        return tokens + ff_gate * self.feedforward(modulated)

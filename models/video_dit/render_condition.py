@@ -2,7 +2,7 @@
 
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and columns, ``f hh ww``
 video frames and pixels, ``h2 w2`` tokens, ``d`` width. Image-to-3D video models are conditioned
-this way (ViewCrafter, arXiv 2409.02048; GEN3C, arXiv 2503.03751): valid pixels are seen in the
+like this (ViewCrafter, arXiv 2409.02048; GEN3C, arXiv 2503.03751): valid pixels are visible in the
 input image, all others are to be filled.
 """
 
@@ -24,7 +24,7 @@ class RenderCondition:
     latent: Float[Tensor, "b c t h w"]
     """Standardised."""
     validity: Float[Tensor, "b 1 f hh ww"]
-    """1 where the input image shows the pixel, 0 where it hides it."""
+    """1 where the pixel is visible in the input image, 0 where it is hidden."""
 
 
 class RenderConditionEmbedding(nn.Module):

@@ -1,7 +1,7 @@
 """Encoder of the video autoencoder: 1 + 4 k frames to 1 + k latent frames.
 
 Axes: ``b`` batch, ``c`` channels, ``f`` video frames, ``t h w`` latent frames, rows and columns.
-The frame before the first is taken to be the first again. A still picture is therefore the case
+The first frame is repeated before the video. An image is therefore the case
 f = 1, and latent frame 0 of any video is the latent of its first frame alone.
 """
 

@@ -1,4 +1,4 @@
-"""Layers of the video autoencoder: residual block, halving and doubling.
+"""Layers of the video autoencoder: residual block, downsampling and upsampling.
 
 Axes: ``b`` batch, ``c`` channels, ``t`` frames, ``h w`` pixels. Every normalisation is per
 position and every convolution over time is causal, so a video may be processed in chunks without a
@@ -27,7 +27,7 @@ class VaeBlock(nn.Module):
     def forward(
         self, frames: Float[Tensor, "b c t h w"], memory: FrameMemory
     ) -> Float[Tensor, "b c t h w"]:
-        """Two causal convolutions around the skip."""
+        """Two causal convolutions with a skip connection."""
         hidden = self.conv_1(torch.nn.functional.silu(self.norm_1(frames)), memory)
         return frames + self.conv_2(torch.nn.functional.silu(self.norm_2(hidden)), memory)
 
@@ -42,7 +42,7 @@ class Downsample(nn.Module):
     def forward(
         self, frames: Float[Tensor, "b c t h w"], memory: FrameMemory
     ) -> Float[Tensor, "b c2 t2 h2 w2"]:
-        """Output frame i sees input frames 2i−2, 2i−1 and 2i."""
+        """Output frame i depends on input frames 2i−2, 2i−1 and 2i."""
         return self.conv(frames, memory)
 
 

@@ -1,9 +1,9 @@
 """The linear part of the video autoencoder: one matrix to latents, one back (ours).
 
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and columns. Every latent
-pixel sees its own block of four frames and ``stride``² pixels and nothing else. The best such pair
-of matrices is known in closed form (principal components), so training starts where linear codes
-end, and the convolutions beside it learn what blocks do not know of each other (the residual
+pixel depends on one block of four frames and ``stride``² pixels alone. The best such pair
+of matrices is known in closed form (principal components), so training starts from the best
+linear autoencoder, and the convolutions beside it learn the dependence between blocks (residual
 autoencoding of DC-AE, arXiv 2410.10733, with a learned instead of a fixed shortcut).
 """
 
@@ -34,13 +34,13 @@ class PcaShortcut(nn.Module):
         return unpatchify(self.to_block(latent.movedim(1, -1)), self.patch)
 
     def blocks(self, video: Float[Tensor, "b 3 f h8 w8"]) -> Float[Tensor, "b t h w n"]:
-        """What the matrices see, in the order (t, h, w, c)."""
+        """Input of the matrices, in the order (t, h, w, c)."""
         listed = patchify(fill_first_pack(video), self.patch).unflatten(-1, (3, -1))
         return listed.transpose(-1, -2).flatten(-2)
 
     @torch.no_grad()
-    def energy(self) -> Float[Tensor, " c"]:
-        """How much of a picture hangs on each latent channel of variance 1."""
+    def channel_power(self) -> Float[Tensor, " c"]:
+        """Sum of squares that each latent channel of variance 1 adds to the pixels."""
         return self.to_block.weight.square().sum(0)
 
     @torch.no_grad()

@@ -1,7 +1,7 @@
 """Causal 3D video autoencoder, 4×8×8 (layout of Wan 2.1): video to latents and back.
 
 Axes: ``b`` batch, ``c`` latent channels, ``f`` = 1 + 4 k video frames, ``t h w`` latent frames,
-rows and columns. Video is ``b c t h w`` in [−1, 1]. Everybody outside sees *standardised* latents,
+rows and columns. Video is ``b c t h w`` in [−1, 1]. Latents outside this class are *standardised*,
 (raw − mean_c) / std_c with the statistics of the training set; until they are set, mean is 0, std
 is 1.
 """
@@ -22,7 +22,7 @@ from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
 LOG_VARIANCE_RANGE = (-30.0, 20.0)
 """Clamp that keeps exp() finite in float32 and half precision losses (Stable Diffusion)."""
 FIRST_LOG_VARIANCE = -6.0
-"""Of latents around a PCA shortcut of variance 1: its noise costs no more than the shortcut."""
+"""Initial log-variance with a PCA shortcut, whose latents have variance 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class VideoVae(nn.Module):
         self.register_buffer("latent_std", torch.ones(config.latent_channels))
 
     def encode(self, video: Float[Tensor, "b 3 f hh ww"]) -> LatentDistribution:
-        """Standardised latents of a video, or of a picture when f = 1.
+        """Standardised latents of a video, or of an image when f = 1.
 
         Raises:
             ShapeError: f is not 1 + 4 k, or a side is not a multiple of ``space_stride``.
@@ -116,7 +116,7 @@ class VideoVae(nn.Module):
 def _pca_shortcut(
     config: VaeConfig, encoder: VaeEncoder, decoder: VaeDecoder
 ) -> PcaShortcut | None:
-    """The shortcut, if asked for; convolutions then start as no correction at all."""
+    """The shortcut, if configured; the convolutions then start as a correction of zero."""
     if not config.pca_shortcut:
         return None
     zero_(encoder.conv_out)

@@ -1,19 +1,16 @@
-"""A tiny stage of the depth of single pictures."""
+"""A tiny stage of the depth of single images."""
 
 from dataclasses import replace
 
 from stage_fixtures import stage_recipe
 
-from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig, RefinementConfig
+from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe.losses import DepthLosses
 from diff4splat.training.recipe.stage import StageRecipe
 
-REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
-MODEL: ModelConfig = replace(
-    tiny_size(), refinement=REFINEMENT, monocular_depth=MonocularDepthConfig(channels=4)
-)
+MODEL: ModelConfig = replace(tiny_size(), monocular_depth=MonocularDepthConfig(channels=4))
 
 
 def depth_recipe(**losses: float) -> StageRecipe:
@@ -24,7 +21,7 @@ def depth_recipe(**losses: float) -> StageRecipe:
         name="monocular_depth",
         kind="monocular_depth",
         data=data,
-        trained=("ldrm",),
+        trained=("monocular_depth",),
         losses=DepthLosses(**losses),
     )
 

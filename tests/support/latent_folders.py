@@ -10,11 +10,15 @@ from diff4splat.training.recipe.data import DataSettings, SourceSettings
 from diff4splat.training.recipe.losses import FlowLosses
 from diff4splat.training.recipe.stage import StageRecipe
 
-FRAMES = 5
+FRAMES, SIZE_PX = 5, (24, 24)
 
 
 def make_pack(
-    is_static: list[bool], first: int = 0, draft: bool = True, versions: int = 1, model: str = "m"
+    is_static: list[bool],
+    first: int = 0,
+    rendered: bool = True,
+    versions: int = 1,
+    model: str = "m",
 ) -> LatentPack:
     """Clip number ``first + k`` has that number as its latent, and in its caption."""
     count = len(is_static)
@@ -24,19 +28,27 @@ def make_pack(
     pose[:, :, 0, 3] = number[:, None] * 0.01 * torch.arange(FRAMES)
     return LatentPack(
         latent=latent,
-        render_condition=latent + 0.5 if draft else None,
-        motion=latent[:, :0],
+        render_latent=latent + 0.5 if rendered else None,
+        validity=_validity(number) if rendered else None,
         cameras=Camera(
             focal_px=torch.full((count, FRAMES, 2), 20.0) + number[:, None, None],
             center_px=torch.full((count, FRAMES, 2), 12.0),
             world_from_camera=pose,
-            size_px=(24, 26),
+            size_px=SIZE_PX,
         ),
         is_static=torch.tensor(is_static, dtype=torch.bool),
         captions=tuple(f"clip {first + k}, “said”" for k in range(count)),
         model=model,
         versions=versions,
     )
+
+
+def _validity(number: torch.Tensor) -> torch.Tensor:
+    """All valid but for one column of the last frame, another for every clip."""
+    validity = torch.ones(len(number), 1, FRAMES, *SIZE_PX, dtype=torch.bool)
+    for index, column in enumerate(number.long() % SIZE_PX[1]):
+        validity[index, :, -1, :, column] = False
+    return validity
 
 
 def latent_folder(folder: Path, *packs: LatentPack) -> Path:

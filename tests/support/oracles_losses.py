@@ -14,6 +14,32 @@ def flow_matching(velocity: np.ndarray, clean: np.ndarray, noise: np.ndarray, fi
     return np.array(losses)
 
 
+def weighted_flow_matching(velocity, clean, noise, cells, channels, first: int) -> list[float]:
+    """Per element: sum over cells and channels of weight · square, over the sum of cell weights."""
+    losses = []
+    for predicted, data, random, weights in zip(velocity, clean, noise, cells, strict=True):
+        total, share = 0.0, 0.0
+        for c, t, y, x in np.ndindex(data.shape):
+            if t >= first:
+                error = predicted[c, t, y, x] - (random[c, t, y, x] - data[c, t, y, x])
+                total += weights[t, y, x] * channels[c] * error**2
+                share += weights[t, y, x]
+        losses.append(total / share if share else 0.0)
+    return losses
+
+
+def hidden_share(validity: np.ndarray, grid: tuple[int, int, int]) -> np.ndarray:
+    """Of ``validity`` (f, hh, ww): the hidden part of every latent cell, pixel by pixel."""
+    rows, columns = validity.shape[1] // grid[1], validity.shape[2] // grid[2]
+    hidden, count = np.zeros(grid), np.zeros(grid)
+    for frame, row, column in np.ndindex(validity.shape):
+        # Latent frame 0 is video frame 0; every other one is four video frames.
+        cell = (-(-frame // 4), row // rows, column // columns)
+        hidden[cell] += validity[frame, row, column] == 0
+        count[cell] += 1
+    return hidden / count
+
+
 def correlation_loss(rendered: np.ndarray, truth: np.ndarray, valid: np.ndarray) -> float:
     """Of one map, over its valid pixels, by numpy's own correlation."""
     return 1 - np.corrcoef(rendered[valid], truth[valid])[0, 1]

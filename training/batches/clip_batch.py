@@ -38,10 +38,8 @@ class ClipBatch:
     track_offset: Float[Tensor, "b m n 3"]
     """Where the point is at the target time, relative to where it is at its own frame's."""
     track_valid: Bool[Tensor, "b n"]
-    motion: Float[Tensor, "b 3 t hc wc"]
-    """Where what the first frame shows goes to, per cell (``motion_truth``)."""
     field: Float[Tensor, "b 3 t hc wc"]
-    """The same, as what moves goes, continued to all other cells (``motion_truth.continued``)."""
+    """Relative displacement of every cell (``motion_field``), extended from those that move."""
     moving: Bool[Tensor, "b h w"]
     """Pixels of the first frame that move."""
     is_static: Bool[Tensor, " b"]

@@ -15,7 +15,6 @@ from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.training.batches.augment import augmented
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.motion_targets import (
-    cell_means,
     extend_to_all_cells,
     moving_mask,
     pixel_motion,
@@ -67,7 +66,6 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         track_cell=tracks.cell[None],
         track_offset=tracks.offset[None],
         track_valid=tracks.valid[None],
-        motion=cell_means(motion)[None],
         field=extend_to_all_cells(motion, moving)[None],
         moving=moving[None],
         is_static=torch.tensor([clip.note.is_static]),

@@ -64,6 +64,7 @@ def encode_clips(job: EncodingJob, phases: Phases) -> int:
         OutputError: the folder cannot be written.
     """
     clips, count = ClipFolder(job.clips), 0
+    versions_each, weights = 2 if job.mirror else 1, job.model.weights_sha256()
     starts = range(0, len(clips), PACK)
     with phases.phase("encode clips", len(clips)) as advance:
         for number, start in enumerate(starts):
@@ -74,7 +75,7 @@ def encode_clips(job: EncodingJob, phases: Phases) -> int:
                     versions += _versions(job, clips, position)
                 advance()
             if versions:
-                pack = replace(join_packs(versions), versions=2 if job.mirror else 1)
+                pack = replace(join_packs(versions), versions=versions_each, model=weights)
                 write_pack(pack, job.folder, number)
             count += len(versions)
     return count
@@ -105,7 +106,10 @@ def _input_clip(clip: Clip, data: DataSettings) -> Clip:
 
 
 def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
-    """A clip in model units whose first camera is the identity, as a pack of one."""
+    """A clip in model units whose first camera is the identity, as a pack of one.
+
+    The pack does not name the model: digesting its weights for every clip would be slow.
+    """
     view, frames = clip.views[0], slice(None, data.clip_frames, data.input_stride)
     rgb, cameras = unit_rgb(view.rgb[frames]), view.cameras[frames].to(torch.float32)
     latent = model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean
@@ -113,11 +117,10 @@ def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:
     return LatentPack(
         latent=latent,
         render_latent=None if condition is None else condition.latent,
-        validity=None if condition is None else condition.validity,
+        validity=None if condition is None else condition.validity.bool(),
         cameras=stack_cameras([cameras]),
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
-        model=model.weights_sha256(),
     )
 
 

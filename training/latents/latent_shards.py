@@ -7,7 +7,7 @@ Axes: ``n`` clips of a pack, ``c t h w`` latents, ``f hh ww`` video frames and p
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,13 +34,14 @@ class LatentPack:
 
     latent: Float[Tensor, "n c t h w"]
     render_latent: Float[Tensor, "n c t h w"] | None
-    validity: Float[Tensor, "n 1 f hh ww"] | None
+    validity: Bool[Tensor, "n 1 f hh ww"] | None
+    """Where the first frame shows what a pixel sees; None without a render condition."""
     cameras: Camera
     """Batch shape (n, f)."""
     is_static: Bool[Tensor, " n"]
     captions: tuple[str, ...]
-    model: str
-    """Hash of the weights that encoded them."""
+    model: str = ""
+    """Digest of the weights that encoded them."""
     versions: int = 1
     """So many in a row are of one clip: itself, and perhaps its mirror image."""
 
@@ -64,7 +65,7 @@ def write_pack(pack: LatentPack, folder: Path, number: int) -> None:
     }
     if pack.render_latent is not None:
         tensors["render_latent"] = pack.render_latent.float()
-        tensors["validity"] = pack.validity.half()
+        tensors["validity"] = pack.validity.byte()
     metadata = {
         "captions": json.dumps(pack.captions),
         "size_px": json.dumps(cameras.size_px),
@@ -132,31 +133,41 @@ def require_alike(packs: Sequence[LatentPack], where: str) -> None:
 
 def _read_pack(file: Path) -> LatentPack:
     try:
-        stored, metadata = read_tensors(file), read_metadata(file)
-        if "draft" in stored:
-            raise ValueError("render conditions of an earlier release, without validity")
-        validity = stored.get("validity")
-        cameras = Camera(
-            focal_px=stored["focal_px"],
-            center_px=stored["center_px"],
-            world_from_camera=stored["pose"],
-            size_px=tuple(json.loads(metadata["size_px"])),
-        )
-        return LatentPack(
-            latent=stored["latent"],
-            render_latent=stored.get("render_latent"),
-            validity=None if validity is None else validity.float(),
-            cameras=cameras,
-            is_static=stored["is_static"].bool(),
-            captions=_captions(metadata, len(stored["latent"])),
-            model=metadata["model"],
-            versions=int(metadata["versions"]),
-        )
+        stored = read_tensors(file)
+        pack = None if "draft" in stored else _pack(stored, read_metadata(file))
     except (FileFormatError, KeyError, ValueError, TypeError) as error:
         raise FileFormatError(
             f"{file}: expected {', '.join(TENSORS)} of encoded clips, got a file without; "
             "encode the clips again"
         ) from error
+    if pack is None:
+        raise FileFormatError(
+            f"{file}: expected render conditions with validity, got those of an earlier release; "
+            "encode the clips again"
+        )
+    return pack
+
+
+def _pack(stored: Mapping[str, Tensor], metadata: Mapping[str, str]) -> LatentPack:
+    render, validity = stored.get("render_latent"), stored.get("validity")
+    if (render is None) != (validity is None):
+        raise ValueError("a render condition without its latent or its validity")
+    cameras = Camera(
+        focal_px=stored["focal_px"],
+        center_px=stored["center_px"],
+        world_from_camera=stored["pose"],
+        size_px=tuple(json.loads(metadata["size_px"])),
+    )
+    return LatentPack(
+        latent=stored["latent"],
+        render_latent=render,
+        validity=None if validity is None else validity.bool(),
+        cameras=cameras,
+        is_static=stored["is_static"].bool(),
+        captions=_captions(metadata, len(stored["latent"])),
+        model=metadata["model"],
+        versions=int(metadata["versions"]),
+    )
 
 
 def _captions(metadata: dict[str, str], count: int) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ class _Source:
             source=(self.name,),
             latent=pack.latent[own],
             render_latent=None if pack.render_latent is None else pack.render_latent[own],
-            validity=None if pack.validity is None else pack.validity[own],
+            validity=None if pack.validity is None else pack.validity[own].float(),
             cameras=pack.cameras[own],
             captions=(pack.captions[place],),
         )

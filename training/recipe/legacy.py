@@ -97,8 +97,8 @@ def upgraded_stage(stage: Mapping[str, Any]) -> dict[str, Any]:
     """One stage of such a recipe."""
     found = _renamed(stage, STAGE_KEYS)
     found["kind"] = KINDS.get(str(stage.get("kind")), stage.get("kind"))
-    if stage.get("kind") in TRAINED:
-        found["trained"] = list(TRAINED[stage["kind"]])
+    if (trained := TRAINED.get(str(stage.get("kind")))) is not None:
+        found["trained"] = list(trained)
     if isinstance(stage.get("data"), dict):
         found["data"] = _renamed(stage["data"], DATA_KEYS)
     losses = stage.get("losses", {})

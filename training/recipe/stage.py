@@ -34,7 +34,7 @@ class StageRecipe:
     micro_batch: int
     """Samples per process and forward pass; the rest of the batch is accumulated."""
     trained: tuple[str, ...]
-    """Model parts that learn: vae, text_encoder, dit, ldrm, deformation."""
+    """Model parts that learn, by their names in ``models.factory.PARTS``."""
     losses: Losses
     """Of the class that ``LOSSES`` names for the kind."""
     optimizer: OptimizerSettings = field(default_factory=OptimizerSettings)

@@ -3,7 +3,7 @@
     clean ── (1 − level) clean + level noise ─ dit ─ velocity ─ loss
              first latent frame: clean, level 0, no loss
 
-Axes: ``b`` batch, ``c t h w`` latents with their motion channels.
+Axes: ``b`` batch, ``c t h w`` latents.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from torch import Tensor
 
 from diff4splat.flow.path import add_noise
 from diff4splat.models.blocks.patches import fill_first_pack
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.factory import Networks
 from diff4splat.training.latents.latent_batch import LatentBatch
@@ -81,18 +82,27 @@ class VideoFlow:
     def measures(self, batch: LatentBatch, training: bool) -> Terms:
         """``flow_error``: mean squared error of the velocity over fixed levels.
 
-        ``hidden_error`` is the same, weighted by how much of a latent cell the first frame hides.
+        ``hidden_error`` is the same, weighted by how much of a latent cell the first frame hides;
+        NaN where it hides nothing.
         """
         videos = [self.at_level(batch, level) for level in EVAL_LEVELS]
         predicted = [self.velocity(batch, one, training) for one in videos]
-        hidden = hidden_share(batch)
-        measured = {"flow_error": None} | ({} if hidden is None else {"hidden_error": hidden})
-        return {
-            name: torch.stack(
-                [self._error(*pair, cells=cells) for pair in zip(predicted, videos, strict=True)]
-            ).mean(0)
-            for name, cells in measured.items()
-        }
+        pairs, hidden = list(zip(predicted, videos, strict=True)), hidden_share(batch)
+        measured = {"flow_error": self._mean_error(pairs)}
+        if hidden is not None:
+            applies = hidden[:, 1:].flatten(1).any(1)
+            error = self._mean_error(pairs, hidden)
+            measured["hidden_error"] = torch.where(applies, error, torch.nan)
+        return measured
+
+    def _mean_error(
+        self,
+        pairs: list[tuple[Tensor, NoisyVideo]],
+        cells: Float[Tensor, "b t h w"] | None = None,
+    ) -> Float[Tensor, " b"]:
+        """The mean error of predicted velocities."""
+        errors = [self._error(velocity, video, cells=cells) for velocity, video in pairs]
+        return torch.stack(errors).mean(0)
 
     def noisy(self, batch: LatentBatch) -> NoisyVideo:
         """Noise and level of every sample."""
@@ -161,9 +171,15 @@ class VideoFlow:
         losses, vae = self._losses, self._networks.vae
         share = torch.ones_like(vae.latent_std)
         if vae.pca_shortcut is not None:
-            power = vae.pca_shortcut.energy() * vae.latent_std.square()
+            power = vae.pca_shortcut.channel_power() * vae.latent_std.square()
             share = power.pow(losses.channel_power_exponent)
         return share / share.mean()
+
+
+def condition_parts(model: ModelConfig) -> tuple[str, ...]:
+    """Names of the parts that make render conditions of a model, beside its autoencoder."""
+    conditioned = model.dit.render_condition and model.monocular_depth.used
+    return ("monocular_depth",) if conditioned else ()
 
 
 def hidden_share(batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:

@@ -17,7 +17,12 @@ from torch import Tensor
 from diff4splat.errors import FileFormatError
 from diff4splat.io.atomic import atomic_path
 
-_TYPE_NAMES = {torch.float64: "F64", torch.int64: "I64", torch.float32: "F32"}
+_TYPE_NAMES = {
+    torch.float64: "F64",
+    torch.int64: "I64",
+    torch.float32: "F32",
+    torch.uint8: "U8",
+}
 MAX_HEADER_BYTES = 100_000_000
 """The library's own limit; real headers have a few kilobytes."""
 
@@ -27,7 +32,7 @@ class TensorFile:
     """What such a file holds."""
 
     tensors: dict[str, Tensor]
-    """float32, float64 or int64."""
+    """float32, float64, int64 or uint8."""
     metadata: dict[str, str]
 
 

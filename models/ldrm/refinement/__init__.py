@@ -1,1 +1,1 @@
-"""From tokens, pictures and cameras to Gaussians with sharp edges (ours, after MVSplat)."""
+"""Refinement of tokens with frames and cameras to Gaussians with sharp edges (after MVSplat)."""

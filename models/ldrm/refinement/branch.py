@@ -1,4 +1,4 @@
-"""LDRM's refinement: everything after the tokens (ours, ADR 15).
+"""LDRM's refinement, from tokens to raw maps (ours, ADR 15).
 
 Axes: ``b`` batch, ``k`` key frames, ``e`` width of a token, ``h4 w4`` token grid, ``h w`` cells of
 4 pixels, ``hh ww`` pixels, ``d`` channels for the deformation network.
@@ -20,7 +20,7 @@ from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
 
 
 class RefinementBranch(nn.Module):
-    """Raw maps of the key frames and of the surroundings."""
+    """Raw maps of the key frames and of the border extension."""
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()

@@ -1,10 +1,10 @@
-"""How well the other frames agree with each key frame at each of a series of depths.
+"""Agreement of the other frames with each key frame at a series of depths (plane sweep).
 
 Axes: ``b`` batch, ``f`` frames, ``k`` key frames, ``s`` other frames of a key, ``c`` channels,
 ``d`` depths, ``h w`` cells. Depths are evenly spaced in inverse depth, hence in parallax; the
 agreement is the scalar product of features (MVSplat, arXiv 2403.14627, §3.1; plane sweep of
-Collins 1996). Mean and maximum over the frames that see a point: the maximum still knows the depth
-where some frames are blocked by something nearer or shows what moves.
+Collins 1996). Mean and maximum over the frames in which a point is visible: the maximum is right
+also where the point is occluded or moves in some frames.
 """
 
 import torch
@@ -17,9 +17,9 @@ from diff4splat.models.ldrm.refinement.posed_video import camera_frames, flat_ca
 from diff4splat.models.ldrm.refinement.warping import inside, other_pixels, sampled
 
 STEP = TIME_STRIDE // 2
-"""Every second frame is compared: neighbours have hardly any parallax."""
+"""Every second frame is compared: neighbours have little parallax."""
 UNSEEN = -1.0
-"""Agreement where no other frame sees a point."""
+"""Agreement where a point is visible in no other frame."""
 
 
 def cost_volume(
@@ -38,26 +38,26 @@ def _agreement(
     if len(others) == 0:
         shape = (len(features), 2 * len(inverse_depths), height, width)
         return features.new_full(shape, UNSEEN)
-    agreed, seen = _compared(features, cameras, inverse_depths, (key, others))
-    count = seen.sum(1)
-    mean = (agreed * seen).sum(1) / count.clamp_min(1)
-    best = agreed.masked_fill(~seen, UNSEEN).amax(1)
+    agreement, visible = _compare(features, cameras, inverse_depths, (key, others))
+    count = visible.sum(1)
+    mean = (agreement * visible).sum(1) / count.clamp_min(1)
+    best = agreement.masked_fill(~visible, UNSEEN).amax(1)
     return torch.cat([torch.where(count > 0, mean, UNSEEN), best], 1)
 
 
-def _compared(
+def _compare(
     features: Tensor,
     cameras: Camera,
     inverse_depths: Tensor,
     frames: tuple[int, Int[Tensor, " s"]],
 ) -> tuple[Float[Tensor, "b s d h w"], Tensor]:
-    """Scalar products, and which of them mean something."""
+    """Scalar products, and in which frames each point is visible."""
     key, others = frames
-    own = features[:, key]
-    count, size = len(others), own.shape[-2:]
-    seeing = flat_cameras(camera_frames(cameras, torch.full_like(others, key)))
-    depths = inverse_depths[None, :, None, None].expand(len(own) * count, -1, *size)
-    pixels, relative = other_pixels(seeing, flat_cameras(camera_frames(cameras, others)), depths)
-    found = sampled(features[:, others].flatten(0, 1), pixels).unflatten(0, (-1, count))
-    product = (found * own[:, None, :, None]).mean(2)
+    reference = features[:, key]
+    count, size = len(others), reference.shape[-2:]
+    source = flat_cameras(camera_frames(cameras, torch.full_like(others, key)))
+    depths = inverse_depths[None, :, None, None].expand(len(reference) * count, -1, *size)
+    pixels, relative = other_pixels(source, flat_cameras(camera_frames(cameras, others)), depths)
+    warped = sampled(features[:, others].flatten(0, 1), pixels).unflatten(0, (-1, count))
+    product = (warped * reference[:, None, :, None]).mean(2)
     return product, inside(pixels, relative).unflatten(0, (-1, count))

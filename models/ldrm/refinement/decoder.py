@@ -1,11 +1,11 @@
-"""Features of every cell of the key frames: tokens, pictures and parallax in one U-Net.
+"""Features of every cell of the key frames: tokens, frames and a cost volume in one U-Net.
 
 Axes: ``b`` batch, ``f`` frames, ``k`` key frames, ``n`` = b k, ``e`` width of a token, ``h w``
 cells of 4 pixels, ``h4 w4`` cells of 16 (the tokens' grid).
 
-    pictures ─ cells ─┬─ match ─ plane sweep ─┐
-                      └───────────────────────┴─ 1/4 ── 1/8 ── 1/16 ─┐
-    tokens ─ linear ──────────────────────────────────────────────── + ─ 1/16 ── 1/8 ── 1/4 ─ out
+    frames ─ cells ─┬─ match ─ cost volume ─┐
+                    └───────────────────────┴─ 1/4 ── 1/8 ── 1/16 ─┐
+    tokens ─ linear ────────────────────────────────────────────── + ─ 1/16 ── 1/8 ── 1/4 ─ out
 """
 
 import torch
@@ -27,16 +27,18 @@ class RefinementDecoder(nn.Module):
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
-        own = config.refinement
-        self.config = own
-        fine, middle, coarse = widths(own.channels)
-        if own.cost_volume_depths:
+        refinement = config.refinement
+        self.config = refinement
+        fine, middle, coarse = widths(refinement.channels)
+        if refinement.cost_volume_depths:
             self.match = nn.Sequential(
                 nn.Conv2d(CELL_CHANNELS, fine, 3, padding=1),
                 nn.SiLU(),
-                nn.Conv2d(fine, own.match_channels, 3, padding=1),
+                nn.Conv2d(fine, refinement.match_channels, 3, padding=1),
             )
-        self.input_conv = nn.Conv2d(CELL_CHANNELS + 2 * own.cost_volume_depths, fine, 3, padding=1)
+        self.input_conv = nn.Conv2d(
+            CELL_CHANNELS + 2 * refinement.cost_volume_depths, fine, 3, padding=1
+        )
         self.fine, self.middle, self.coarse = ConvBlock(fine), ConvBlock(middle), ConvBlock(coarse)
         self.down_1 = nn.Conv2d(fine, middle, 2, stride=2)
         self.down_2 = nn.Conv2d(middle, coarse, 2, stride=2)

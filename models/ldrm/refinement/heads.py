@@ -1,8 +1,8 @@
-"""Fused features to raw maps: of the key frames' pixels, and of what lies around the first one.
+"""Fused features to raw maps of the key frames' pixels and of the border extension.
 
 Axes: ``b`` batch, ``k`` key frames, ``n`` = b k, ``c`` channels, ``h w`` cells of 4 pixels,
-``h4 w4`` pixels, ``hs ws`` cells with the surroundings. Ray distances are enlarged convexly, so
-that edges of depth stay sharp; all other attributes have a value of their own in every pixel.
+``h4 w4`` pixels, ``hs ws`` cells with the margin. Ray distances are upsampled convexly, which
+keeps depth edges sharp; all other attributes are predicted for every pixel.
 """
 
 import torch
@@ -34,7 +34,7 @@ class PixelHead(nn.Module):
 
 
 class BorderHead(nn.Module):
-    """Twelve raw channels for every cell of the first picture and of a margin around it."""
+    """Twelve raw channels for every cell of the first frame and of a margin on each side."""
 
     def __init__(self, width: int, margin: int) -> None:
         super().__init__()
@@ -46,26 +46,26 @@ class BorderHead(nn.Module):
         self.out = zero_(nn.Conv2d(2 * width, sum(GAUSSIAN_SPLIT), 3, padding=1))
 
     def forward(self, features: Float[Tensor, "b c h w"]) -> Float[Tensor, "b 12 hs ws"]:
-        """From the features of the first frame; borders continue outwards."""
-        around = replicate_border(features, self.margin)
-        local = self.local(self.input_conv(torch.cat([around, self._places(around)], 1)))
+        """From the features of the first frame, whose border is replicated."""
+        extended = replicate_border(features, self.margin)
+        local = self.local(self.input_conv(torch.cat([extended, self._coordinates(extended)], 1)))
         context = self.context(self.downsample(local))
         context = torch.nn.functional.interpolate(context, local.shape[-2:], mode="bilinear")
         return self.out(torch.cat([local, context], 1))
 
-    def _places(self, around: Tensor) -> Float[Tensor, "b 2 hs ws"]:
-        """How far outside the picture a cell lies, across and down; 0 inside, in margins."""
-        height, width = around.shape[-2:]
-        axes = [self._beyond(size).to(around) for size in (height, width)]
-        down, across = torch.meshgrid(*axes, indexing="ij")
-        return torch.stack([across, down]).expand(len(around), -1, -1, -1)
+    def _coordinates(self, extended: Tensor) -> Float[Tensor, "b 2 hs ws"]:
+        """Signed distance of a cell beyond the image border, x and y, in margins; 0 inside."""
+        height, width = extended.shape[-2:]
+        axes = [self._beyond(size).to(extended) for size in (height, width)]
+        y, x = torch.meshgrid(*axes, indexing="ij")
+        return torch.stack([x, y]).expand(len(extended), -1, -1, -1)
 
     def _beyond(self, size: int) -> Float[Tensor, " s"]:
-        place = torch.arange(size, dtype=torch.float32)
-        after = (place - (size - 1 - self.margin)).clamp_min(0)
-        return (after - (self.margin - place).clamp_min(0)) / max(self.margin, 1)
+        index = torch.arange(size, dtype=torch.float32)
+        after = (index - (size - 1 - self.margin)).clamp_min(0)
+        return (after - (self.margin - index).clamp_min(0)) / max(self.margin, 1)
 
 
 def replicate_border(maps: Float[Tensor, "b c h w"], margin: int) -> Float[Tensor, "b c hs ws"]:
-    """The border continues outwards by ``margin`` cells."""
+    """Replicate the border by ``margin`` cells on each side."""
     return torch.nn.functional.pad(maps, (margin,) * 4, mode="replicate")

@@ -1,8 +1,8 @@
-"""What the reconstruction sees beside latents: the decoded pictures and the cameras behind them.
+"""A video with its cameras, which refinement takes beside latents.
 
 Axes: ``b`` batch, ``f`` video frames, ``k`` key frames, ``c`` channels, ``h w`` pixels. Key frames
-are the last of every pack of four, 0, 4, 8, …: each latent frame has one, and only they carry
-Gaussians (``DetailConfig``), since those between show the same surfaces again.
+are the last of every pack of four, 0, 4, 8, …: each latent frame has one. With refinement only they
+have Gaussians, since the others show the same surfaces.
 """
 
 from dataclasses import dataclass, replace
@@ -18,12 +18,12 @@ from diff4splat.models.config.networks import TIME_STRIDE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PosedVideo:
-    """Decoded video with one camera per frame."""
+    """Decoded or true video with one camera per frame."""
 
     rgb: Float[Tensor, "b 3 f h w"]
-    """In [0, 1]; the first frame is the photograph itself where there is one."""
+    """In [0, 1]; the first frame is the input image where there is one."""
     cameras: Camera
-    """Batch shape (b, f), of the pictures' size; the first of each is the identity."""
+    """Batch shape (b, f), of the frames' size; the first of each is the identity."""
 
     def __post_init__(self) -> None:
         batch, _, *video = self.rgb.shape
@@ -36,8 +36,8 @@ class PosedVideo:
 
     def sample(self, index: int) -> "PosedVideo":
         """One batch element, as a batch of one."""
-        own = slice(index, index + 1)
-        return PosedVideo(rgb=self.rgb[own], cameras=self.cameras[own])
+        row = slice(index, index + 1)
+        return PosedVideo(rgb=self.rgb[row], cameras=self.cameras[row])
 
     @property
     def keys(self) -> Int[Tensor, " k"]:
@@ -46,7 +46,7 @@ class PosedVideo:
 
     @property
     def key_rgb(self) -> Float[Tensor, "b k 3 h w"]:
-        """Pictures of the key frames."""
+        """Colours of the key frames."""
         return self.rgb[:, :, ::TIME_STRIDE].transpose(1, 2)
 
     @property

@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 import torch
 from clip_shards import reading, write_shards
+from stage_fixtures import SquaredDifference
 
 from diff4splat.configs.recipes import RECIPES, recipe_by_name
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError
-from diff4splat.models.factory import PARTS, create_networks
+from diff4splat.models.config.model import MonocularDepthConfig
+from diff4splat.models.factory import create_networks, model_parts
 from diff4splat.training.latent_statistics import FILE, read_statistics
 from diff4splat.training.prerequisites import (
     continued_stage,
@@ -22,7 +24,9 @@ from diff4splat.training.prerequisites import (
     trained_networks,
 )
 from diff4splat.training.recipe.recipe import Recipe
-from diff4splat.training.recipe.stage import Gate
+from diff4splat.training.recipe.stage import Gate, StageRecipe
+from diff4splat.training.stages.factory import create_stage
+from diff4splat.training.stages.model_stage import StagePlan
 from diff4splat.training.train_stage import StageRequest, train_stage
 from diff4splat.training.trainer.checkpoints.export import load_parts
 
@@ -46,16 +50,14 @@ SMALL_BUILDS_ON = {
     "static-low": {"vae": "vae", "ldrm": "posed_video_pretrain"},
     "motion": {"vae": "vae", "ldrm": "static-low"},
     "dynamic": {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
-    "monocular_depth": {"ldrm": "dynamic"},
-    "video_diffusion": {"vae": "vae", "ldrm": "monocular_depth"},
-    "motion_diffusion": {"text_encoder": "video_diffusion", "dit": "video_diffusion"},
+    "monocular_depth": {},
+    "video_diffusion": {"vae": "vae", "monocular_depth": "monocular_depth"},
+    "motion_diffusion": {"text_encoder": "video_diffusion"},
 }
-"""What differs in ``small``, at its only size: seeing is learnt first, and motion by itself."""
+"""What differs in ``small``: LDRM starts without an autoencoder, and has motion and priors."""
 SMALL_CONTINUES = {
     "static-low": "posed_video_pretrain",
     "dynamic": "motion",
-    "monocular_depth": "dynamic",
-    "motion_diffusion": "video_diffusion",
 }
 
 
@@ -143,11 +145,37 @@ def test_stages_start_with_averaged_weights(begun: tuple[Recipe, Path]) -> None:
     assert any(torch.equal(buffer.flatten(), std) for buffer in stored.values())
 
 
-def test_parts_that_do_not_run_are_only_shapes(begun: tuple[Recipe, Path]) -> None:
+def test_parts_that_do_not_run_are_not_built(begun: tuple[Recipe, Path]) -> None:
     recipe, run = begun
     networks = starting_networks(recipe, recipe.stage("static-high"), run)
-    on_meta = {name for name, part in networks.parts() if next(part.parameters()).is_meta}
-    assert on_meta == set(PARTS) - {"vae", "ldrm"}
+    assert [name for name, _ in networks.parts()] == ["vae", "ldrm"]
+
+
+def with_depth_prior(recipe: Recipe, rendered: bool, channels: int) -> Recipe:
+    model = recipe.model
+    model = replace(
+        model,
+        dit=replace(model.dit, render_condition=rendered),
+        monocular_depth=MonocularDepthConfig(channels=channels),
+    )
+    return replace(recipe, model=model)
+
+
+@pytest.mark.parametrize("stage", recipe_by_name("test").stages, ids=lambda stage: stage.name)
+@pytest.mark.parametrize(("rendered", "channels"), [(False, 0), (False, 4), (True, 0), (True, 4)])
+def test_stages_have_a_depth_prior_where_they_render_with_one(
+    stage: StageRecipe, rendered: bool, channels: int, tmp_path: Path
+) -> None:
+    recipe = with_depth_prior(recipe_by_name("test"), rendered, channels)
+    vae = recipe.stages[0]
+    alone = replace(recipe, stages=(vae,) if stage.kind == "vae" else (stage,))
+    networks = starting_networks(alone, stage, tmp_path)
+    renders = rendered and channels > 0 and stage.kind in ("video_diffusion", "joint")
+    assert (networks.monocular_depth is not None) == renders
+    plan = StagePlan(model=recipe.model, recipe=stage, seed=0, features=SquaredDifference())
+    created = create_stage(networks, plan)
+    frozen = [one for key, one in created.named_parameters() if key.startswith("monocular_depth")]
+    assert bool(frozen) == renders and not any(one.requires_grad for one in frozen)
 
 
 def test_parts_nobody_trained_are_the_recipes_random_ones(begun: tuple[Recipe, Path]) -> None:
@@ -155,7 +183,8 @@ def test_parts_nobody_trained_are_the_recipes_random_ones(begun: tuple[Recipe, P
     networks, done = trained_networks(recipe, run)
     assert done == {"vae", "ldrm"}
     random = create_networks(recipe.model, seed=recipe.seed)
-    for part in set(PARTS) - done:
+    assert [name for name, _ in networks.parts()] == list(model_parts(recipe.model))
+    for part in set(model_parts(recipe.model)) - done:
         wanted = getattr(random, part).state_dict()
         for key, value in getattr(networks, part).state_dict().items():
             assert torch.equal(value, wanted[key]), key

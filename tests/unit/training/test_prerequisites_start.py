@@ -13,7 +13,8 @@ from torch import nn
 
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import CheckpointError, ConfigError
-from diff4splat.models.factory import PARTS, create_networks
+from diff4splat.models.config.model import MonocularDepthConfig
+from diff4splat.models.factory import create_networks, model_parts
 from diff4splat.models.hub.model import Model, load_model
 from diff4splat.training.prerequisites import (
     continued_stage,
@@ -96,8 +97,7 @@ def test_a_stage_starts_with_the_models_trained_parts(start: Model, tmp_path: Pa
     networks = starting_networks(recipe, recipe.stage("dynamic"), tmp_path, start)
     for part in TRAINED:
         assert same(getattr(networks, part), getattr(start.networks, part)), part
-    on_meta = {name for name, part in networks.parts() if next(part.parameters()).is_meta}
-    assert on_meta == {"text_encoder", "dit"}
+    assert {name for name, _ in networks.parts()} == {"vae", "ldrm", "deformation"}
 
 
 def test_parts_that_the_model_has_not_trained_are_the_recipes_random_ones(
@@ -141,8 +141,22 @@ def test_trained_parts_are_those_of_the_run_and_of_the_model(
     assert done == {"vae", "ldrm"} and same(networks.ldrm, start.networks.ldrm)
     assert not same(networks.vae, start.networks.vae)
     random = create_networks(recipe.model, seed=recipe.seed)
-    for part in set(PARTS) - done:
+    for part in set(model_parts(recipe.model)) - done:
         assert same(getattr(networks, part), getattr(random, part)), part
+
+
+def test_priors_that_the_recipes_model_lacks_are_left_out(start: Model, tmp_path: Path) -> None:
+    recipe = recipe_by_name("test")
+    config = replace(start.config, monocular_depth=MonocularDepthConfig(channels=4))
+    prior = create_networks(config, parts=("monocular_depth",)).monocular_depth
+    networks = replace(start.networks, monocular_depth=prior)
+    rich = replace(start, config=config, networks=networks)
+    rich = as_trained(rich, *TRAINED, "monocular_depth")
+    networks, _ = trained_networks(recipe, tmp_path, rich)
+    assert networks.monocular_depth is None and same(networks.ldrm, start.networks.ldrm)
+    recipe = replace(recipe, model=config)
+    networks, done = trained_networks(recipe, tmp_path, rich)
+    assert same(networks.monocular_depth, prior) and "monocular_depth" in done
 
 
 def test_a_part_that_an_unfinished_stage_trains_is_not_done(
@@ -173,7 +187,7 @@ def test_a_stage_is_trained_with_nothing_but_the_model_before_it(
     recipe, _ = begun
     with pytest.raises(ConfigError, match="train that stage first"):
         train_stage(StageRequest(recipe=recipe, stage="static-low", folder=tmp_path))
-    given = as_trained(with_text_encoder(start), "vae")
+    given = as_trained(start, "vae")
     asked = StageRequest(recipe=recipe, stage="static-low", folder=tmp_path, start=given)
     assert train_stage(asked).outcome == "finished"
     whole = load_model(tmp_path / MODEL_FOLDER)

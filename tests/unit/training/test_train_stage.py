@@ -60,7 +60,7 @@ def course(shards: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
     for stage in STAGES:
         train_stage(StageRequest(recipe=recipe, stage=stage, folder=folder, note=notes.append))
         model = load_model(folder / MODEL_FOLDER)
-        untrained.append(model.untrained)
+        untrained.append(bool(set(model.parts) - model.trained))
         trained.append(model.trained)
         vae.append(load_file(folder / MODEL_FOLDER / "vae.safetensors"))
     return Run(recipe, folder, tuple(untrained), tuple(trained), tuple(notes), tuple(vae))

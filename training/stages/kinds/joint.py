@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import Networks
 from diff4splat.models.hub.model import Model
 from diff4splat.training.batches.clip_batch import ClipBatch
@@ -28,7 +29,7 @@ from diff4splat.training.stages.metrics import reconstruction_metrics
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import reconstruction_preview
 from diff4splat.training.stages.scene_prediction import RenderedScenes, ScenePredictor
-from diff4splat.training.stages.video_flow import VideoFlow
+from diff4splat.training.stages.video_flow import VideoFlow, condition_parts
 
 STEPS = 2
 """Euler steps from the random level back to 0."""
@@ -40,6 +41,11 @@ class JointStage(ModelStage):
     """Video diffusion and reconstruction in one step."""
 
     parts = ("vae", "text_encoder", "dit", "ldrm", "deformation")
+
+    @classmethod
+    def needed(cls, model: ModelConfig) -> tuple[str, ...]:
+        """The depth prior makes the render conditions."""
+        return (*cls.parts, *condition_parts(model))
 
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)

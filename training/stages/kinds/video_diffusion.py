@@ -19,7 +19,7 @@ from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.latents.video_latents import encode_batch, image_video
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import Row, preview
-from diff4splat.training.stages.video_flow import EVAL_LEVELS, VideoFlow
+from diff4splat.training.stages.video_flow import EVAL_LEVELS, VideoFlow, condition_parts
 
 
 class VideoDiffusionStage(ModelStage):
@@ -30,8 +30,7 @@ class VideoDiffusionStage(ModelStage):
     @classmethod
     def needed(cls, model: ModelConfig) -> tuple[str, ...]:
         """The depth prior makes the render conditions."""
-        conditioned = model.dit.render_condition and model.monocular_depth.used
-        return (*cls.parts, "monocular_depth") if conditioned else cls.parts
+        return (*cls.parts, *condition_parts(model))
 
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)

@@ -8,7 +8,7 @@ from image_layers import FAR_RANGES, random_depth, random_rgb
 from torch import Tensor
 
 from diff4splat.generation.layered_image.upsampling import SAME_SURFACE, upsample_maps
-from diff4splat.models.blocks.bilateral_upsampling import ALIKE, NEAR
+from diff4splat.models.blocks.bilateral_upsampling import COLOR_SIGMA, DISTANCE_SIGMA
 
 GRID, SIDE = (3, 5), 4
 SIZE_PX = (GRID[0] * SIDE, GRID[1] * SIDE)
@@ -31,7 +31,9 @@ def oracle(
                     y = down - ((row % SIDE + 0.5) / SIDE - 0.5)
                     x = right - ((column % SIDE + 0.5) / SIDE - 0.5)
                     unlike = float((small[i, j] - full[row, column]).square().sum())
-                    weight = -(y * y + x * x) / (2 * NEAR**2) - unlike / (2 * ALIKE**2)
+                    weight = -(y * y + x * x) / (2 * DISTANCE_SIGMA**2) - unlike / (
+                        2 * COLOR_SIGMA**2
+                    )
                     candidates.append((weight, i, j))
             _, best_i, best_j = max(candidates)
             nearest = math.log(float(depth[best_i, best_j]))

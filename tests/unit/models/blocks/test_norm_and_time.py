@@ -5,7 +5,7 @@ import torch
 
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
 from diff4splat.models.blocks.norm import ChannelRmsNorm
-from diff4splat.models.blocks.time_embedding import level_embedding, octave_embedding
+from diff4splat.models.blocks.time_embedding import fourier_embedding, level_embedding
 
 
 def test_channel_norm_follows_the_formula() -> None:
@@ -41,15 +41,15 @@ def test_level_embedding_is_float32_even_for_half_levels() -> None:
         assert level_embedding(torch.tensor([0.5], dtype=torch.bfloat16), 4).dtype == torch.float32
 
 
-def test_octave_embedding_follows_the_formula() -> None:
-    got = octave_embedding(torch.tensor([0.3]), 3)[0]
+def test_fourier_embedding_follows_the_formula() -> None:
+    got = fourier_embedding(torch.tensor([0.3]), 3)[0]
     angles = [math.pi * 2**k * 0.3 for k in range(3)]
     want = [math.sin(a) for a in angles] + [math.cos(a) for a in angles]
     torch.testing.assert_close(got, torch.tensor(want), atol=1e-6, rtol=0)
 
 
 def test_octaves_tell_apart_the_ends_of_the_clip() -> None:
-    start, stop = octave_embedding(torch.tensor([0.0, 1.0]), 10)
+    start, stop = fourier_embedding(torch.tensor([0.0, 1.0]), 10)
     assert (start - stop).abs().max() > 1
 
 

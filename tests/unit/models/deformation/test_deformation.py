@@ -6,7 +6,7 @@ import torch
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.deformation.network import DeformationNetwork, enlarge
+from diff4splat.models.deformation.network import DeformationNetwork, upsample_bilinear
 
 
 def with_stride(stride: int) -> ModelConfig:
@@ -92,9 +92,11 @@ def test_sum_over_levels_is_one_convolution_over_stacked_levels() -> None:
 
 
 @pytest.mark.parametrize("scale", [1, 2, 4])
-def test_enlarge_matches_a_loop(scale: int) -> None:
+def test_upsampling_matches_a_loop(scale: int) -> None:
     maps = torch.randn(1, 2, 3, 4, dtype=torch.float64)
-    torch.testing.assert_close(enlarge(maps, scale)[0], oracle.upsampled_bilinear(maps[0], scale))
+    torch.testing.assert_close(
+        upsample_bilinear(maps, scale)[0], oracle.upsampled_bilinear(maps[0], scale)
+    )
 
 
 def test_batch_elements_have_their_own_time() -> None:

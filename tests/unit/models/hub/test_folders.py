@@ -113,7 +113,7 @@ def test_facts_of_a_folder(tmp_path: Path) -> None:
         "ldrm": "trained",
         "deformation": "trained",
     }
-    assert (facts.place, facts.weights_sha256) == (str(folder), weights_sha256(folder))
+    assert (facts.location, facts.weights_sha256) == (str(folder), weights_sha256(folder))
     assert (facts.config, facts.provenance.license) == (tiny_size(), "MIT")
     (folder / "SHA256SUMS").unlink()
     part_file(folder, "vae").unlink()

@@ -1,4 +1,4 @@
-"""Pixels followed through a video: flow, rates per slot, and which slots speak for a time."""
+"""Optical flow, rates per slot, and the weights of slots at a time."""
 
 import math
 
@@ -15,7 +15,7 @@ from diff4splat.models.ldrm.refinement.motion_features import (
     DISTANCES,
     RATE_UNIT,
     SLOTS,
-    slot_shares,
+    slot_weights,
     warped_flow,
 )
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
@@ -128,10 +128,10 @@ def test_slots_speak_for_the_times_they_are_at_and_share_those_between() -> None
     for slot, distance in enumerate(DISTANCES):
         for sign, place in ((1, slot), (-1, half + slot)):
             want = torch.eye(SLOTS)[place]
-            torch.testing.assert_close(slot_shares(torch.tensor(float(sign * distance))), want)
-    shares = slot_shares(torch.linspace(-20, 20, 81))
+            torch.testing.assert_close(slot_weights(torch.tensor(float(sign * distance))), want)
+    shares = slot_weights(torch.linspace(-20, 20, 81))
     torch.testing.assert_close(shares.sum(-1), torch.ones(81))
     assert bool((shares >= 0).all())
-    torch.testing.assert_close(slot_shares(torch.tensor(0.0)), torch.eye(SLOTS)[0])
-    middle = slot_shares(torch.tensor(math.sqrt(8.0)))
+    torch.testing.assert_close(slot_weights(torch.tensor(0.0)), torch.eye(SLOTS)[0])
+    middle = slot_weights(torch.tensor(math.sqrt(8.0)))
     torch.testing.assert_close(middle[1:3], torch.full((2,), 0.5))

@@ -1,4 +1,4 @@
-"""The motion branch: zero when fresh, led by words, frames of one sample agree, always finite."""
+"""The motion U-Net: zero when fresh, conditioned on text, frames interact, always finite."""
 
 import pytest
 import torch
@@ -18,10 +18,10 @@ TEXT = TextConfig(width=8, blocks=1, heads=2, feedforward_width=16)
 TEXT_WIDTH, TOKENS = TEXT.width, 5
 
 
-def branch(awake: bool = True) -> MotionUNet:
+def motion_unet(trained: bool = True) -> MotionUNet:
     torch.manual_seed(0)
     network = MotionUNet(8, 2, TEXT, frequency_width=16)
-    return randomised(network) if awake else network
+    return randomised(network) if trained else network
 
 
 def inputs(
@@ -48,21 +48,21 @@ def difference(one: Tensor, other: Tensor) -> float:
 
 @settings(max_examples=8, deadline=None)
 @given(st.integers(1, 3), st.integers(1, 4), st.integers(1, 3), st.integers(1, 3), st.booleans())
-def test_a_fresh_branch_answers_zero_at_any_size(
-    batch: int, frames: int, rows: int, columns: int, told: bool
+def test_a_fresh_network_gives_zero_at_any_size(
+    batch: int, frames: int, rows: int, columns: int, with_text: bool
 ) -> None:
     given_inputs = inputs(batch, frames, (16 * rows, 16 * columns))
-    answer = branch(awake=False)(*given_inputs, some_text(batch) if told else None)
-    assert answer.shape == (batch, 3, frames, 4 * rows, 4 * columns)
-    assert answer.dtype == torch.float32 and not answer.any()
+    output = motion_unet(trained=False)(*given_inputs, some_text(batch) if with_text else None)
+    assert output.shape == (batch, 3, frames, 4 * rows, 4 * columns)
+    assert output.dtype == torch.float32 and not output.any()
 
 
-def test_conditions_and_words_act_on_nothing_at_first() -> None:
-    network = branch(awake=False)
+def test_conditions_and_text_change_nothing_at_first() -> None:
+    network = motion_unet(trained=False)
     torch.nn.init.normal_(network.motion_head.weight)
-    picture, noisy, level = inputs()
-    plain = network(picture, noisy, level)
-    assert difference(plain, network(picture, noisy, 1 - level, some_text())) == 0
+    image, noisy, level = inputs()
+    plain = network(image, noisy, level)
+    assert difference(plain, network(image, noisy, 1 - level, some_text())) == 0
 
 
 def test_a_block_is_scaled_and_shifted_between_its_convolutions() -> None:
@@ -85,10 +85,10 @@ def test_a_block_is_scaled_and_shifted_between_its_convolutions() -> None:
 
 
 def test_every_parameter_has_a_gradient() -> None:
-    network = branch()
+    network = motion_unet()
     mask = torch.tensor([[True] * TOKENS, [False] * TOKENS])
-    motion, moves = network.predict_motion_and_mask(*inputs(), some_text(), mask)
-    (motion.square().sum() + moves.square().sum()).backward()
+    motion, mask_logits = network.predict_motion_and_mask(*inputs(), some_text(), mask)
+    (motion.square().sum() + mask_logits.square().sum()).backward()
     still = [
         name
         for name, value in network.named_parameters()
@@ -98,25 +98,25 @@ def test_every_parameter_has_a_gradient() -> None:
     assert still == []
 
 
-def test_the_motion_is_the_same_with_and_without_the_other_answer() -> None:
-    network = branch()
-    motion, moves = network.predict_motion_and_mask(*inputs(), some_text())
+def test_the_motion_is_the_same_with_and_without_the_mask() -> None:
+    network = motion_unet()
+    motion, mask_logits = network.predict_motion_and_mask(*inputs(), some_text())
     assert torch.equal(motion, network(*inputs(), some_text()))
-    assert moves.shape == inputs()[0][:, 0].shape
+    assert mask_logits.shape == inputs()[0][:, 0].shape
 
 
 def test_every_input_matters() -> None:
-    network, (picture, noisy, level) = branch(), inputs()
+    network, (image, noisy, level) = motion_unet(), inputs()
     text = some_text()
-    plain = network(picture, noisy, level, text)
-    assert difference(plain, network(1 - picture, noisy, level, text)) > 1e-3
-    assert difference(plain, network(picture, -noisy, level, text)) > 1e-3
-    assert difference(plain, network(picture, noisy, 1 - level, text)) > 1e-3
-    assert difference(plain, network(picture, noisy, level, text.flip(0))) > 1e-3
+    plain = network(image, noisy, level, text)
+    assert difference(plain, network(1 - image, noisy, level, text)) > 1e-3
+    assert difference(plain, network(image, -noisy, level, text)) > 1e-3
+    assert difference(plain, network(image, noisy, 1 - level, text)) > 1e-3
+    assert difference(plain, network(image, noisy, level, text.flip(0))) > 1e-3
 
 
-def test_words_say_where_and_not_only_what() -> None:
-    network, given_inputs, text = branch(), inputs(), some_text()
+def test_text_acts_on_single_cells() -> None:
+    network, given_inputs, text = motion_unet(), inputs(), some_text()
     with torch.no_grad():
         network.pooled_text.weight.zero_()
     change = network(*given_inputs, text) - network(*given_inputs, text.roll(1, 0))
@@ -124,7 +124,7 @@ def test_words_say_where_and_not_only_what() -> None:
 
 
 def test_padding_changes_nothing() -> None:
-    network, (*given_inputs, text) = branch().double(), widened(*inputs(), some_text())
+    network, (*given_inputs, text) = motion_unet().double(), widened(*inputs(), some_text())
     mask = torch.arange(TOKENS) < torch.tensor([[3], [TOKENS]])
     plain = network(*given_inputs, text, mask)
     other = torch.where(mask[..., None], text, torch.full_like(text, 1e4))
@@ -136,134 +136,134 @@ def test_padding_changes_nothing() -> None:
 
 
 def test_no_text_runs_no_attention(monkeypatch: pytest.MonkeyPatch) -> None:
-    network, (*given_inputs, text) = branch().double(), widened(*inputs(), some_text())
+    network, (*given_inputs, text) = motion_unet().double(), widened(*inputs(), some_text())
     masked = network(*given_inputs, text, torch.zeros(2, TOKENS, dtype=torch.bool))
     empty = network(*given_inputs, text[:, :0])
     monkeypatch.delattr(Attention, "forward")
     alone = network(*given_inputs)
-    for untold in (masked, empty):
-        torch.testing.assert_close(untold, alone, rtol=0, atol=1e-9)
+    for without in (masked, empty):
+        torch.testing.assert_close(without, alone, rtol=0, atol=1e-9)
 
 
-def test_what_is_learnt_for_no_text_is_used_for_no_text_alone() -> None:
-    network, given_inputs, text = branch(), inputs(), some_text()
-    told, alone = network(*given_inputs, text), network(*given_inputs)
+def test_the_null_embedding_is_used_without_text_alone() -> None:
+    network, given_inputs, text = motion_unet(), inputs(), some_text()
+    with_text, alone = network(*given_inputs, text), network(*given_inputs)
     with torch.no_grad():
         network.null_text_embedding.add_(1)
-    assert difference(network(*given_inputs, text), told) == 0
+    assert difference(network(*given_inputs, text), with_text) == 0
     assert difference(network(*given_inputs), alone) > 1e-3
 
 
-def test_frames_see_each_other_and_know_their_time() -> None:
-    network, (picture, noisy, level) = branch(), inputs(frames=3)
+def test_frames_interact_and_depend_on_their_time() -> None:
+    network, (image, noisy, level) = motion_unet(), inputs(frames=3)
     other = noisy.clone()
     other[:, :, 2] += 1
-    plain, changed = network(picture, noisy, level), network(picture, other, level)
+    plain, changed = network(image, noisy, level), network(image, other, level)
     assert difference(plain[:, :, 0], changed[:, :, 0]) > 1e-3
-    alike = network(picture, noisy[:, :, :1].expand(-1, -1, 3, -1, -1), level)
+    alike = network(image, noisy[:, :, :1].expand(-1, -1, 3, -1, -1), level)
     assert difference(alike[:, :, 0], alike[:, :, 2]) > 1e-3
 
 
 def test_time_is_a_share_of_the_clip() -> None:
-    network, (picture, noisy, level) = branch(), inputs(frames=1)
+    network, (image, noisy, level) = motion_unet(), inputs(frames=1)
     one = network._condition(level, 1, None)
     four = network._condition(level, 4, None).unflatten(0, (2, 4))
     two = network._condition(level, 2, None).unflatten(0, (2, 2))
     torch.testing.assert_close(four[:, 3], one)
     torch.testing.assert_close(four[:, 1], two[:, 0])
-    assert bool(network(picture, noisy, level).any())
+    assert bool(network(image, noisy, level).any())
 
 
-def test_samples_of_a_batch_do_not_meet() -> None:
-    network = branch().double()
-    picture, noisy, level, text = widened(*inputs(3), some_text(3))
-    for values in (picture, noisy, level, text):
+def test_samples_of_a_batch_do_not_interact() -> None:
+    network = motion_unet().double()
+    image, noisy, level, text = widened(*inputs(3), some_text(3))
+    for values in (image, noisy, level, text):
         values[2] = values[0]
     mask = torch.arange(TOKENS) < torch.tensor([[3], [0], [3]])
-    together = network(picture, noisy, level, text, mask)
-    alone = network(picture[:1], noisy[:1], level[:1], text[:1], mask[:1])
+    together = network(image, noisy, level, text, mask)
+    alone = network(image[:1], noisy[:1], level[:1], text[:1], mask[:1])
     torch.testing.assert_close(together[2], together[0], rtol=0, atol=1e-9)
     torch.testing.assert_close(together[:1], alone, rtol=0, atol=1e-9)
 
 
-def test_places_run_from_edge_to_edge_of_the_picture() -> None:
+def test_coordinates_run_from_edge_to_edge() -> None:
     x, y = cell_coordinates(torch.zeros(2, 3, 1, 2, 4))[1]
     torch.testing.assert_close(x, torch.tensor([[-0.75, -0.25, 0.25, 0.75]] * 2))
     torch.testing.assert_close(y, torch.tensor([[-0.5] * 4, [0.5] * 4]))
 
 
 @pytest.mark.parametrize("channel", [-2, -1])
-def test_places_matter(channel: int) -> None:
-    network, given_inputs = branch(), inputs()
+def test_coordinates_matter(channel: int) -> None:
+    network, given_inputs = motion_unet(), inputs()
     plain = network(*given_inputs)
     with torch.no_grad():
         network.input_image.weight[:, channel] = 0
     assert difference(plain, network(*given_inputs)) > 1e-3
 
 
-def test_what_may_be_read_is_never_nothing() -> None:
+def test_the_attention_mask_is_never_empty() -> None:
     mask = torch.tensor([[True, False], [False, False]])
-    words = text_tokens(torch.ones(2, 2, 3), mask)
-    assert words.told.tolist() == [True, False]
-    assert words.readable.tolist() == [[True, False], [True, True]]
-    untold = torch.full((3,), 7.0)
-    assert words.pooled(untold).tolist() == [[1.0] * 3, [7.0] * 3]
+    tokens = text_tokens(torch.ones(2, 2, 3), mask)
+    assert tokens.has_text.tolist() == [True, False]
+    assert tokens.attention_mask.tolist() == [[True, False], [True, True]]
+    null = torch.full((3,), 7.0)
+    assert tokens.pooled(null).tolist() == [[1.0] * 3, [7.0] * 3]
 
 
 @pytest.mark.parametrize("size", [0.0, 1e4])
 @pytest.mark.parametrize("level", [0.0, 1.0])
 @pytest.mark.parametrize("real", [0, 1, TOKENS])
 def test_extremes_are_finite(size: float, level: float, real: int) -> None:
-    network, (picture, noisy, _) = branch(), inputs()
-    given_inputs = [picture.round(), noisy * size, torch.full((2,), level), some_text() * size]
+    network, (image, noisy, _) = motion_unet(), inputs()
+    given_inputs = [image.round(), noisy * size, torch.full((2,), level), some_text() * size]
     for values in given_inputs:
         values.requires_grad_()
-    answer = network(*given_inputs, (torch.arange(TOKENS) < real).expand(2, -1))
-    answer.sum().backward()
+    output = network(*given_inputs, (torch.arange(TOKENS) < real).expand(2, -1))
+    output.sum().backward()
     gradients = [value.grad for value in (*given_inputs, *network.parameters())]
-    assert bool(answer.isfinite().all())
+    assert bool(output.isfinite().all())
     assert all(bool(found.isfinite().all()) for found in gradients if found is not None)
 
 
-def test_wrong_sizes_are_told() -> None:
-    picture, noisy, level = inputs()
-    network = branch()
+def test_wrong_sizes_are_refused() -> None:
+    image, noisy, level = inputs()
+    network = motion_unet()
     with pytest.raises(ShapeError, match="multiples of 16"):
-        network(picture[:, :, :24], noisy[:, :, :, :6], level)
+        network(image[:, :, :24], noisy[:, :, :, :6], level)
     with pytest.raises(ShapeError, match=r"\(8, 4\) cells"):
-        network(picture, noisy[:, :, :, :4], level)
+        network(image, noisy[:, :, :, :4], level)
     with pytest.raises(ShapeError, match="at least one latent frame"):
-        network(picture, noisy[:, :, :0], level)
+        network(image, noisy[:, :, :0], level)
     with pytest.raises(ConfigError, match="multiple of 8 for 4 heads"):
         MotionUNet(12, 4, TEXT)
 
 
 def two_squares() -> tuple[Tensor, Tensor, Tensor]:
     """A red and a blue square, also swapped, and two texts: one says red moves, the other blue."""
-    picture, target = torch.zeros(4, 3, 32, 32), torch.zeros(4, 3, 2, 8, 8)
+    image, target = torch.zeros(4, 3, 32, 32), torch.zeros(4, 3, 2, 8, 8)
     texts = torch.randn(2, TOKENS, TEXT_WIDTH, generator=torch.Generator().manual_seed(0))
     for sample in range(4):
-        swapped, told = divmod(sample, 2)
+        swapped, moving = divmod(sample, 2)
         for color in range(2):
             left = 16 * (color ^ swapped) + 4
-            picture[sample, 2 * color, 12:20, left : left + 8] = 1
-            if color == told:
+            image[sample, 2 * color, 12:20, left : left + 8] = 1
+            if color == moving:
                 target[sample, 0, :, 3:5, left // 4 : left // 4 + 2] = 1
-    return picture, target, texts.repeat(2, 1, 1)
+    return image, target, texts.repeat(2, 1, 1)
 
 
-def test_it_learns_which_square_the_words_mean() -> None:
-    picture, target, text = two_squares()
+def test_it_learns_which_square_the_text_names() -> None:
+    image, target, text = two_squares()
     torch.manual_seed(0)
     network = MotionUNet(16, 2, TEXT, frequency_width=16)
     optimiser = torch.optim.Adam(network.parameters(), lr=3e-3)
     losses = []
     for _ in range(80):
         optimiser.zero_grad()
-        answer = network(picture, torch.randn_like(target), torch.ones(4), text)
-        loss = (answer - target).square().mean()
+        output = network(image, torch.randn_like(target), torch.ones(4), text)
+        loss = (output - target).square().mean()
         loss.backward()
         optimiser.step()
         losses.append(float(loss.detach()))
-    # Half is what a branch reaches that does not know which of the two is meant.
+    # Half is what a network reaches that ignores the text.
     assert losses[-1] < losses[0] / 3

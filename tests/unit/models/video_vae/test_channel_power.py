@@ -1,4 +1,4 @@
-"""How much of a picture hangs on each channel of a linear code."""
+"""The power that each channel of a PCA shortcut adds to the pixels."""
 
 from dataclasses import replace
 
@@ -11,27 +11,27 @@ CONFIG = replace(tiny_size().vae, pca_shortcut=True)
 
 
 def test_energy_is_what_a_step_along_the_channel_changes() -> None:
-    code = PcaShortcut(CONFIG)
-    energy, latent = code.energy(), torch.randn(1, 4, 2, 3, 5)
-    assert energy.shape == (4,) and not energy.requires_grad
+    shortcut = PcaShortcut(CONFIG)
+    power, latent = shortcut.channel_power(), torch.randn(1, 4, 2, 3, 5)
+    assert power.shape == (4,) and not power.requires_grad
     for channel in range(4):
         step = torch.zeros_like(latent)
         step[:, channel, 1, 2, 3] = 1.0
-        change = (code.decode(latent + step) - code.decode(latent)).square().sum()
-        torch.testing.assert_close(change.detach(), energy[channel], rtol=1e-4, atol=1e-6)
+        change = (shortcut.decode(latent + step) - shortcut.decode(latent)).square().sum()
+        torch.testing.assert_close(change.detach(), power[channel], rtol=1e-4, atol=1e-6)
 
 
 def test_of_components_it_is_their_variance() -> None:
-    code, std = PcaShortcut(CONFIG), torch.tensor([3.0, 2.0, 1.0, 0.5])
-    values = code.to_latent.in_features
+    shortcut, std = PcaShortcut(CONFIG), torch.tensor([3.0, 2.0, 1.0, 0.5])
+    values = shortcut.to_latent.in_features
     components = torch.linalg.qr(torch.randn(values, 4)).Q.mT
-    code.set_components(torch.randn(values), components, std)
-    torch.testing.assert_close(code.energy(), std.square())
+    shortcut.set_components(torch.randn(values), components, std)
+    torch.testing.assert_close(shortcut.channel_power(), std.square())
 
 
 def test_the_mean_of_pictures_does_not_count() -> None:
-    code = PcaShortcut(CONFIG)
-    before = code.energy()
+    shortcut = PcaShortcut(CONFIG)
+    before = shortcut.channel_power()
     with torch.no_grad():
-        code.to_block.bias.add_(7.0)
-    assert torch.equal(code.energy(), before)
+        shortcut.to_block.bias.add_(7.0)
+    assert torch.equal(shortcut.channel_power(), before)

@@ -1,4 +1,4 @@
-"""The motion that a video model learns to tell is that of the objects in the first frame."""
+"""The true motion is that of the objects in the first frame."""
 
 from dataclasses import replace
 
@@ -11,7 +11,6 @@ from diff4splat.training.batches.augment import mirrored
 from diff4splat.training.batches.motion_targets import (
     cell_means,
     extend_to_all_cells,
-    motion_targets,
     moving_mask,
     pixel_motion,
 )
@@ -45,8 +44,13 @@ def square(way: tuple[float, float, float]) -> Clip:
     return Clip(note=note, times_s=torch.arange(FRAMES) / 8, views=(view,), tracks=tracks)
 
 
+def cell_motion(clip: Clip, input_stride: int) -> torch.Tensor:
+    """Means of the pixels' motion over cells."""
+    return cell_means(pixel_motion(clip, input_stride))
+
+
 def test_an_object_goes_where_its_points_go() -> None:
-    found = motion_targets(square((0.8, 0.0, -0.4)), 1)
+    found = cell_motion(square((0.8, 0.0, -0.4)), 1)
     assert found.shape == (3, 3, 4, 4)
     wanted = torch.tensor([0.8, 0.0, -0.4]) / DEPTH / UNIT
     for time, share in enumerate((0.0, 0.5, 1.0)):
@@ -56,7 +60,7 @@ def test_an_object_goes_where_its_points_go() -> None:
 
 
 def test_videos_may_skip_frames() -> None:
-    whole, halved = (motion_targets(square((0.8, 0.0, 0.0)), stride) for stride in (1, 2))
+    whole, halved = (cell_motion(square((0.8, 0.0, 0.0)), stride) for stride in (1, 2))
     assert halved.shape[1] == 2
     torch.testing.assert_close(halved[:, 1], whole[:, 2])
 
@@ -64,9 +68,7 @@ def test_videos_may_skip_frames() -> None:
 def test_in_a_mirror_it_goes_the_other_way() -> None:
     clip = square((0.8, 0.2, 0.0))
     flip = torch.tensor([-1.0, 1.0, 1.0])[:, None, None, None]
-    torch.testing.assert_close(
-        motion_targets(mirrored(clip), 1), flip * motion_targets(clip, 1).flip(-1)
-    )
+    torch.testing.assert_close(cell_motion(mirrored(clip), 1), flip * cell_motion(clip, 1).flip(-1))
 
 
 def test_without_depth_masks_or_tracks_nothing_moves() -> None:
@@ -79,17 +81,21 @@ def test_without_depth_masks_or_tracks_nothing_moves() -> None:
         replace(clip, views=(blind,)),
         replace(clip, views=(maskless,)),
     ):
-        found = motion_targets(poor, 1)
+        found = cell_motion(poor, 1)
         assert not bool(found.any()) and bool(found.isfinite().all())
 
 
 def test_what_hardly_moves_stands() -> None:
-    assert not bool(motion_targets(square((0.01, 0.0, 0.0)), 1).any())
+    assert not bool(cell_motion(square((0.01, 0.0, 0.0)), 1).any())
 
 
 def test_cells_are_means_of_pixels() -> None:
-    clip = square((0.8, 0.3, -0.4))
-    torch.testing.assert_close(cell_means(pixel_motion(clip, 1)), motion_targets(clip, 1))
+    motion = pixel_motion(square((0.8, 0.3, -0.4)), 1)
+    cells = cell_means(motion)
+    for row in range(4):
+        for column in range(4):
+            own = motion[:, :, 4 * row : 4 * row + 4, 4 * column : 4 * column + 4]
+            torch.testing.assert_close(cells[:, :, row, column], own.mean((2, 3)))
 
 
 def test_what_moves_is_told_pixel_by_pixel() -> None:

@@ -16,7 +16,7 @@ from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
-from diff4splat.models.hub.model import Model
+from diff4splat.models.hub.model import Model, load_model, save_model
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.latents import encode
@@ -31,11 +31,10 @@ RIGHT = "a red ball rolls to the right, the camera circles left"
 WORDS = ("someone turns left.", "someone turns right.")
 
 
-def tiny_model(draft: bool = False) -> Model:
+def tiny_model(rendered: bool = False) -> Model:
     config: ModelConfig = recipe_by_name("test").model
-    config = replace(config, dit=replace(config.dit, draft=draft))
-    networks = create_networks(config)
-    return Model(config=config, networks=networks, weights_sha256="weights")
+    config = replace(config, dit=replace(config.dit, render_condition=rendered))
+    return Model(config=config, networks=create_networks(config))
 
 
 def told(clip: Clip, caption: str) -> Clip:
@@ -55,22 +54,22 @@ def shards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_clips(tmp_path_factory.mktemp("shards"), *clips)
 
 
-def job(clips: Path, folder: Path, mirror: bool = True, draft: bool = False) -> EncodingJob:
+def job(clips: Path, folder: Path, mirror: bool = True, rendered: bool = False) -> EncodingJob:
     return EncodingJob(
-        model=tiny_model(draft), data=RECIPE.data, clips=clips, folder=folder, mirror=mirror
+        model=tiny_model(rendered), data=RECIPE.data, clips=clips, folder=folder, mirror=mirror
     )
 
 
 @pytest.fixture(scope="module")
 def encoded(shards: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("latents")
-    assert encode_clips(job(shards, folder, draft=True), Phases()) == 4
+    assert encode_clips(job(shards, folder, rendered=True), Phases()) == 4
     return folder
 
 
 def test_each_clip_is_followed_by_its_mirror_image(encoded: Path) -> None:
     pack = read_packs(encoded)
-    assert (pack.versions, pack.model, len(pack)) == (2, "weights", 4)
+    assert (pack.versions, pack.model, len(pack)) == (2, "none", 4)
     assert pack.captions == (*WORDS, LEFT, RIGHT)
     assert pack.is_static.tolist() == [True, True, False, False]
 
@@ -102,34 +101,50 @@ def as_sample(place: int) -> Clip:
 @pytest.mark.parametrize("place", [0, 1])
 def test_the_video_model_sees_what_it_would_see_of_the_clip(encoded: Path, place: int) -> None:
     pack = read_packs(encoded)
-    stage = make_stage(RECIPE, model=tiny_model(draft=True).config)
+    stage = make_stage(RECIPE, model=tiny_model(rendered=True).config)
     origin = Origin(key=SampleKey(0, "video_diffusion", 0, "sample"), source="made")
     seen = stage.encoded(make_sample(as_sample(place), RECIPE.data, origin))
     own = slice(2 * place, 2 * place + 1)
     torch.testing.assert_close(pack.latent[own], seen.latent)
-    torch.testing.assert_close(pack.render_condition[own], seen.render_condition)
+    torch.testing.assert_close(pack.render_latent[own], seen.render_latent)
+    assert torch.equal(pack.validity[own].float(), seen.validity)
     for name in ("focal_px", "center_px", "world_from_camera"):
         torch.testing.assert_close(getattr(pack.cameras[own], name), getattr(seen.cameras, name))
     assert pack.captions[2 * place] == seen.captions[0]
 
 
-def test_drafts_begin_with_the_true_picture_and_go_on_otherwise(encoded: Path) -> None:
+def test_render_conditions_begin_with_the_true_image_and_then_differ(encoded: Path) -> None:
     pack = read_packs(encoded)
-    assert pack.render_condition.shape == pack.latent.shape
-    torch.testing.assert_close(pack.render_condition[:, :, 0], pack.latent[:, :, 0])
-    assert not torch.allclose(pack.render_condition[:, :, 1:], pack.latent[:, :, 1:])
-    assert not torch.allclose(pack.render_condition[::2], pack.render_condition[1::2])
+    rendered = pack.render_latent
+    assert rendered.shape == pack.latent.shape
+    torch.testing.assert_close(rendered[:, :, 0], pack.latent[:, :, 0])
+    assert not torch.allclose(rendered[:, :, 1:], pack.latent[:, :, 1:])
+    assert not torch.allclose(rendered[::2], rendered[1::2])
 
 
-def test_models_without_drafts_get_none(shards: Path, tmp_path: Path) -> None:
+def test_validity_is_that_of_pixels_and_is_complete_in_the_first_frame(encoded: Path) -> None:
+    validity = read_packs(encoded).validity
+    assert validity.shape == (4, 1, 5, 32, 32)
+    assert bool(validity[:, :, 0].all()) and not validity[:, :, -1].flatten(1).all(1).any()
+
+
+def test_models_without_render_conditions_get_none(shards: Path, tmp_path: Path) -> None:
     encode_clips(job(shards, tmp_path), Phases())
-    assert read_packs(tmp_path).render_condition is None
+    pack = read_packs(tmp_path)
+    assert pack.render_latent is None and pack.validity is None
+
+
+def test_packs_name_the_weights_of_a_stored_model(shards: Path, tmp_path: Path) -> None:
+    save_model(tiny_model(), tmp_path / "model")
+    stored = load_model(tmp_path / "model")
+    encode_clips(replace(job(shards, tmp_path / "out"), model=stored), Phases())
+    assert read_packs(tmp_path / "out").model == stored.weights_sha256() != "none"
 
 
 def test_a_second_run_writes_nothing(shards: Path, encoded: Path) -> None:
     (file,) = encoded.iterdir()
     before = file.read_bytes(), file.stat().st_mtime_ns
-    assert encode_clips(job(shards, encoded, draft=True), Phases()) == 0
+    assert encode_clips(job(shards, encoded, rendered=True), Phases()) == 0
     assert (file.read_bytes(), file.stat().st_mtime_ns) == before
     assert list(encoded.iterdir()) == [file]
 
@@ -169,7 +184,7 @@ def test_clips_that_are_too_short_are_left_out(tmp_path: Path) -> None:
 def test_what_is_encoded_can_be_learnt_from(encoded: Path) -> None:
     sample = LatentSamples(learning_from(latents_of(encoded, 0.0)), 0)[0]
     assert sample.captions[0] in (LEFT, RIGHT)
-    terms = make_stage(RECIPE, model=tiny_model(draft=True).config)(sample)
+    terms = make_stage(RECIPE, model=tiny_model(rendered=True).config)(sample)
     assert bool(torch.isfinite(terms["flow"]).all())
 
 

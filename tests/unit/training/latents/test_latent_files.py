@@ -30,9 +30,11 @@ def assert_same(one: LatentPack, other: LatentPack) -> None:
     pairs = [(one.latent, other.latent), (one.is_static, other.is_static)]
     for name in ("focal_px", "center_px", "world_from_camera"):
         pairs.append((getattr(one.cameras, name), getattr(other.cameras, name)))
-    assert (one.render_condition is None) == (other.render_condition is None)
-    if one.render_condition is not None and other.render_condition is not None:
-        pairs.append((one.render_condition, other.render_condition))
+    for name in ("render_latent", "validity"):
+        mine, theirs = getattr(one, name), getattr(other, name)
+        assert (mine is None) == (theirs is None)
+        if mine is not None:
+            pairs.append((mine, theirs))
     for left, right in pairs:
         torch.testing.assert_close(left, right, rtol=0, atol=0)
     assert one.cameras.size_px == other.cameras.size_px
@@ -40,9 +42,9 @@ def assert_same(one: LatentPack, other: LatentPack) -> None:
     assert told[0] == told[1]
 
 
-@pytest.mark.parametrize("draft", [True, False])
-def test_what_is_written_is_read_back(tmp_path: Path, draft: bool) -> None:
-    pack = make_pack([True, False, False, True], draft=draft, versions=2)
+@pytest.mark.parametrize("rendered", [True, False])
+def test_what_is_written_is_read_back(tmp_path: Path, rendered: bool) -> None:
+    pack = make_pack([True, False, False, True], rendered=rendered, versions=2)
     assert not has_pack(tmp_path, 0)
     write_pack(pack, tmp_path / "new", 0)
     assert has_pack(tmp_path / "new", 0) and not has_pack(tmp_path / "new", 1)
@@ -51,11 +53,12 @@ def test_what_is_written_is_read_back(tmp_path: Path, draft: bool) -> None:
 
 def test_half_precision_is_stored_in_single(tmp_path: Path) -> None:
     pack = make_pack([True])
-    condition = pack.render_condition.bfloat16()
-    half = replace(pack, latent=pack.latent.bfloat16(), render_condition=condition)
+    names = ("latent", "render_latent")
+    half = replace(pack, **{name: getattr(pack, name).bfloat16() for name in names})
     found = read_packs(latent_folder(tmp_path, half))
-    assert found.latent.dtype == found.render_condition.dtype == torch.float32
-    torch.testing.assert_close(found.render_condition, pack.render_condition)
+    for name in names:
+        assert getattr(found, name).dtype == torch.float32
+        torch.testing.assert_close(getattr(found, name), getattr(pack, name))
 
 
 def test_equal_packs_give_equal_bytes(tmp_path: Path) -> None:
@@ -73,11 +76,11 @@ def test_packs_are_read_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     assert_same(found, join_packs(packs))
 
 
-@pytest.mark.parametrize("draft", [True, False])
-def test_joined_packs_are_one_after_the_other(draft: bool) -> None:
-    whole = make_pack([True, False, True], draft=draft, versions=2)
-    parts = [make_pack([True], draft=draft, versions=2)]
-    parts.append(make_pack([False, True], first=1, draft=draft, versions=2))
+@pytest.mark.parametrize("rendered", [True, False])
+def test_joined_packs_are_one_after_the_other(rendered: bool) -> None:
+    whole = make_pack([True, False, True], rendered=rendered, versions=2)
+    parts = [make_pack([True], rendered=rendered, versions=2)]
+    parts.append(make_pack([False, True], first=1, rendered=rendered, versions=2))
     assert_same(join_packs(parts), whole)
     assert len(join_packs(parts)) == 3
 
@@ -117,7 +120,7 @@ def test_a_file_without_a_tensor_is_named(tmp_path: Path, name: str) -> None:
     tensors, metadata = read_tensors(file), read_metadata(file)
     del tensors[name]
     write_tensors(TensorFile(tensors=tensors, metadata=metadata), file)
-    with pytest.raises(FileFormatError, match=rf"{FILE}: expected latent, draft, .* encode the"):
+    with pytest.raises(FileFormatError, match=rf"{FILE}: expected latent, focal_px, .* encode the"):
         read_packs(tmp_path)
 
 
@@ -142,9 +145,50 @@ def test_a_file_with_other_text_is_named(tmp_path: Path, change: dict) -> None:
         read_packs(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["render_latent", "validity"])
+def test_half_of_a_render_condition_is_refused(tmp_path: Path, name: str) -> None:
+    file = latent_folder(tmp_path, make_pack([True])) / FILE
+    tensors, metadata = read_tensors(file), read_metadata(file)
+    del tensors[name]
+    write_tensors(TensorFile(tensors=tensors, metadata=metadata), file)
+    with pytest.raises(FileFormatError, match=rf"{FILE}: expected .* encode the clips again"):
+        read_packs(tmp_path)
+
+
+def of_an_earlier_release(file: Path, rendered: bool) -> None:
+    """The same file as that release wrote it: motion channels, and no validity."""
+    tensors, metadata = read_tensors(file), read_metadata(file)
+    if rendered:
+        tensors["draft"] = tensors.pop("render_latent")
+        del tensors["validity"]
+    tensors["motion"] = torch.zeros_like(tensors["latent"])
+    write_tensors(TensorFile(tensors=tensors, metadata=metadata), file)
+
+
+def test_render_conditions_of_an_earlier_release_are_refused(tmp_path: Path) -> None:
+    file = latent_folder(tmp_path, make_pack([True, False])) / FILE
+    of_an_earlier_release(file, rendered=True)
+    with pytest.raises(FileFormatError, match=rf"{FILE}: expected .* with validity, got those of "):
+        read_packs(tmp_path)
+    with pytest.raises(FileFormatError, match="earlier release; encode the clips again"):
+        read_packs(tmp_path)
+
+
+def test_latents_alone_of_an_earlier_release_are_read(tmp_path: Path) -> None:
+    pack = make_pack([True, False], rendered=False)
+    of_an_earlier_release(latent_folder(tmp_path, pack) / FILE, rendered=False)
+    assert_same(read_packs(tmp_path), pack)
+
+
+def test_folders_with_and_without_render_conditions_do_not_mix(tmp_path: Path) -> None:
+    latent_folder(tmp_path, make_pack([True]), make_pack([True], rendered=False))
+    with pytest.raises(InputError, match=r"latents that one model made .* encode the clips ag"):
+        read_packs(tmp_path)
+
+
 def test_captions_may_hold_any_letters(tmp_path: Path) -> None:
     captions = ('a "red"\nball', "ein grüner Würfel")
     pack = replace(make_pack([True, False]), captions=captions)
     file = latent_folder(tmp_path, pack) / FILE
     assert read_packs(tmp_path).captions == captions
-    assert json.loads(read_metadata(file)["size_px"]) == [24, 26]
+    assert json.loads(read_metadata(file)["size_px"]) == [24, 24]

@@ -42,9 +42,11 @@ def test_everything_of_a_sample_belongs_to_one_clip(folder: Path) -> None:
     sample = LatentSamples(learning_from(latents_of(folder)), 0)[3]
     number = float(sample.latent.mean())
     assert len(sample) == 1 and sample.sample_index.tolist() == [3]
-    assert bool((sample.latent == number).all()) and bool(
-        (sample.render_condition == number + 0.5).all()
-    )
+    assert bool((sample.latent == number).all())
+    condition = sample.render_condition
+    assert condition is not None and bool((condition.latent == number + 0.5).all())
+    hidden = (condition.validity == 0).nonzero()
+    assert {tuple(place) for place in hidden[:, [2, 4]].tolist()} == {(4, int(number) % 24)}
     assert sample.captions == (f"clip {number:.0f}, “said”",)
     assert sample.source == (str(folder),)
     assert sample.cameras.batch_shape == (1, FRAMES)
@@ -134,9 +136,9 @@ def test_a_folder_without_a_kind_that_is_asked_for_is_refused_at_once(
     LatentSamples(learning_from(latents_of(tmp_path, float(is_static[0]))), 0)
 
 
-@pytest.mark.parametrize("draft", [True, False])
-def test_batches_are_samples_one_after_the_other(tmp_path: Path, draft: bool) -> None:
-    latent_folder(tmp_path, make_pack(KINDS, draft=draft, versions=2))
+@pytest.mark.parametrize("rendered", [True, False])
+def test_batches_are_samples_one_after_the_other(tmp_path: Path, rendered: bool) -> None:
+    latent_folder(tmp_path, make_pack(KINDS, rendered=rendered, versions=2))
     samples = LatentSamples(learning_from(latents_of(tmp_path)), 0)
     alone = [samples[index] for index in range(3)]
     both = collate_latents(alone)
@@ -144,8 +146,10 @@ def test_batches_are_samples_one_after_the_other(tmp_path: Path, draft: bool) ->
     torch.testing.assert_close(both.latent, torch.cat([one.latent for one in alone]))
     assert both.captions == tuple(text for one in alone for text in one.captions)
     assert both.cameras.batch_shape == (3, FRAMES) and len(both.source) == 3
-    if draft:
-        torch.testing.assert_close(both.render_condition, both.latent + 0.5)
+    if rendered:
+        torch.testing.assert_close(both.render_condition.latent, both.latent + 0.5)
+        for index, one in enumerate(alone):
+            assert torch.equal(both.render_condition.validity[index], one.validity[0])
     else:
         assert both.render_condition is None
 
@@ -153,8 +157,8 @@ def test_batches_are_samples_one_after_the_other(tmp_path: Path, draft: bool) ->
 def test_batches_move_whole(folder: Path) -> None:
     batch = LatentSamples(learning_from(latents_of(folder)), 0)[0]
     moved = batch.to(torch.device("meta"))
-    tensors = (moved.sample_index, moved.latent, moved.render_condition, moved.cameras.focal_px)
-    assert all(tensor.is_meta for tensor in tensors)
+    tensors = (moved.sample_index, moved.latent, moved.render_latent, moved.validity)
+    assert all(tensor.is_meta for tensor in (*tensors, moved.cameras.focal_px))
     assert moved.captions == batch.captions
 
 

@@ -127,15 +127,6 @@ def test_a_power_of_zero_or_no_code_counts_all_channels_alike() -> None:
     torch.testing.assert_close(without_code.flow._channels, alike)
 
 
-def test_channels_of_motion_count_as_much_as_the_recipe_says() -> None:
-    model = recipe_by_name("test").model
-    model = replace(model, dit=replace(model.dit, motion=True))
-    stage = make_stage(stage_recipe("video_diffusion", motion_channel_weight=7.0), model=model)
-    torch.testing.assert_close(stage.flow._channels, torch.tensor([1.0] * 4 + [7.0] * 12))
-    batch = make_batch(stage_recipe("video_diffusion"))
-    assert stage.flow.noisy(stage.encoded(batch)).clean.shape[1] == 16
-
-
 def test_video_diffusion_weighs_its_channels() -> None:
     batch = make_batch(stage_recipe("video_diffusion"))
     stage = coded(1.0)

@@ -133,10 +133,13 @@ def test_stages_that_do_not_exist_are_refused() -> None:
             "stages.dynamic.data.keyframe_stride=1",
             "dynamic: .* expected 4 with a refinement",
         ),
-        ("model.detail.width=0", "stage posed_video_pretrain: expected a refinement decoder"),
+        (
+            "model.refinement.channels=0",
+            "stage posed_video_pretrain: expected a refinement decoder",
+        ),
     ],
 )
-def test_detail_needs_what_it_sees_by(change: str, message: str) -> None:
+def test_stages_require_data_and_networks_that_fit(change: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         override(recipe_by_name("small"), [change])
 
@@ -146,7 +149,7 @@ def test_clips_reach_from_the_first_input_frame_to_the_last() -> None:
     assert (data.frames, data.input_stride, data.clip_frames) == (9, 2, 17)
 
 
-def test_moments_are_for_motion_branches_and_few() -> None:
+def test_only_motion_diffusion_may_read_keyframes_alone() -> None:
     branch = recipe_by_name("small").stage("motion_diffusion")
     data = replace(branch.data, keyframes_only=True)
     assert (data.clip_frames, data.keyframe_spacing) == (3, 8)
@@ -156,7 +159,7 @@ def test_moments_are_for_motion_branches_and_few() -> None:
 
 
 @pytest.mark.parametrize("name", ["video_diffusion", "motion_diffusion"])
-def test_stages_that_learn_where_things_go_follow_points(name: str) -> None:
+def test_stages_that_read_motion_have_tracks(name: str) -> None:
     assert recipe_by_name("small").stage(name).data.tracks > 0
 
 

@@ -1,4 +1,4 @@
-"""The stage in which single pictures tell their depth."""
+"""The stage that trains the depth of single images."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from depth_stages import MODEL, depth_recipe, with_sky
 from stage_fixtures import make_batch, make_stage, shake_heads
 
 from diff4splat.errors import ConfigError
+from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.stage import TOTAL
@@ -36,7 +37,7 @@ def test_terms_are_finite_and_only_the_pictures_depth_learns() -> None:
     assert all(term.shape == (2,) and bool(term.isfinite().all()) for term in terms.values())
     terms[TOTAL].sum().backward()
     learnt = {name for name, p in stage.named_parameters() if p.grad is not None}
-    assert learnt and all(name.startswith("ldrm.detail.picture_depth.") for name in learnt)
+    assert learnt and all(name.startswith("monocular_depth.") for name in learnt)
 
 
 def test_the_total_is_the_weighted_sum() -> None:
@@ -63,7 +64,7 @@ def test_sky_that_is_far_enough_costs_nothing() -> None:
     near = float(stage(batch)["sky_margin"].detach())
     assert near == pytest.approx(float(torch.tensor(SKY_DEPTH / PLANE_DEPTH).log()), rel=1e-4)
     with torch.no_grad():
-        stage.ldrm.detail.picture_depth.head.bias += 10
+        stage.monocular_depth.head.bias += 10
     assert float(stage(batch)["sky_margin"].detach()) == 0
 
 
@@ -97,7 +98,7 @@ def test_light_is_drawn_anew_for_every_picture_and_alike_every_time() -> None:
 def test_a_step_learns_and_a_panel_shows_it() -> None:
     recipe = depth_recipe()
     stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0, 1)))
-    optimizer = torch.optim.Adam(stage.ldrm.detail.picture_depth.parameters(), 1e-2)
+    optimizer = torch.optim.Adam(stage.monocular_depth.parameters(), 1e-2)
     losses = []
     for _ in range(12):
         optimizer.zero_grad()
@@ -111,8 +112,12 @@ def test_a_step_learns_and_a_panel_shows_it() -> None:
     assert set(stage.measure(batch)) == {"depth_error", "depth_correlation"}
 
 
-@pytest.mark.parametrize("missing", ["width", "picture_width"])
-def test_a_recipe_without_the_network_is_refused(missing: str) -> None:
-    without = replace(MODEL, detail=replace(MODEL.detail, **{missing: 0}))
-    with pytest.raises(ConfigError, match="picture_width: expected a depth network for its kind"):
+def test_the_depth_network_is_the_only_part() -> None:
+    stage = make_stage(depth_recipe(), model=MODEL)
+    assert [name for name, _ in stage.named_children()] == ["monocular_depth"]
+
+
+def test_a_recipe_without_the_network_is_refused() -> None:
+    without = replace(MODEL, monocular_depth=MonocularDepthConfig())
+    with pytest.raises(ConfigError, match=r"monocular_depth\.channels: expected a depth network"):
         Recipe(name="test", seed=0, model=without, stages=(depth_recipe(),))

@@ -7,7 +7,7 @@ import torch
 from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.model import ModelConfig, MotionUNetConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.recipe.losses import MotionDiffusionLosses
@@ -16,7 +16,7 @@ from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import TOTAL
 
 BASE = tiny_size()
-MODEL: ModelConfig = replace(BASE, dit=replace(BASE.dit, motion=True, motion_width=8))
+MODEL: ModelConfig = replace(BASE, motion_unet=MotionUNetConfig(width=16, heads=2))
 
 
 def motion_recipe() -> StageRecipe:
@@ -24,7 +24,7 @@ def motion_recipe() -> StageRecipe:
         stage_recipe("video_diffusion"),
         name="motion_diffusion",
         kind="motion_diffusion",
-        trained=("dit",),
+        trained=("motion_unet",),
         losses=MotionDiffusionLosses(motion_mask=0.5),
     )
 
@@ -47,7 +47,7 @@ def test_terms_and_gradients_are_finite_and_only_the_motion_network_learns() -> 
     assert set(terms) == {"flow", "motion_mask", TOTAL}
     terms[TOTAL].sum().backward()
     gradients = {name: p.grad for name, p in stage.named_parameters() if p.grad is not None}
-    assert gradients and all(name.startswith("dit.motion_branch.") for name in gradients)
+    assert gradients and all(name.startswith("motion_unet.") for name in gradients)
     assert all(bool(gradient.isfinite().all()) for gradient in gradients.values())
 
 
@@ -86,7 +86,11 @@ def test_panels_and_measures() -> None:
     assert set(stage.measure(batch)) == {"flow_error", "motion_share"}
 
 
+def test_only_the_text_encoder_runs_beside_the_motion_network() -> None:
+    stage = make_stage(motion_recipe(), model=MODEL)
+    assert [name for name, _ in stage.named_children()] == ["text_encoder", "motion_unet"]
+
+
 def test_the_kind_needs_a_motion_network() -> None:
-    without = replace(MODEL, dit=replace(MODEL.dit, motion_width=0))
-    with pytest.raises(ConfigError, match="motion_width: expected a motion network"):
-        Recipe(name="x", seed=0, model=without, stages=(motion_recipe(),))
+    with pytest.raises(ConfigError, match=r"motion_unet\.width: expected a motion network"):
+        Recipe(name="x", seed=0, model=BASE, stages=(motion_recipe(),))

@@ -1,4 +1,4 @@
-"""Stages of a model with a detail decoder: what it sees, what it learns from."""
+"""Stages of a model with a refinement decoder: its input and its losses."""
 
 from dataclasses import replace
 
@@ -7,19 +7,19 @@ import torch
 from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.config.model import DetailConfig, ModelConfig
+from diff4splat.models.config.model import ModelConfig, RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.latents.video_latents import encode_video, zero_latents
 from diff4splat.training.recipe.losses import MotionLosses, ReconstructionLosses
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import TOTAL
 
-DETAIL = DetailConfig(width=6, match_channels=4, depths=4, surroundings=4)
-MODEL: ModelConfig = replace(tiny_size(), detail=DETAIL)
+REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
+MODEL: ModelConfig = replace(tiny_size(), refinement=REFINEMENT)
 PRETRAIN, MOTION = "posed_video_pretrain", "motion"
 
 
-def detailed(name: str) -> StageRecipe:
+def refined(name: str) -> StageRecipe:
     """The stage with key frames and with their depth in the loss."""
     like = {PRETRAIN: "static-low", MOTION: "dynamic"}.get(name, name)
     recipe, losses = stage_recipe(like), ReconstructionLosses(depth_log=1.0)
@@ -37,7 +37,7 @@ def detailed(name: str) -> StageRecipe:
 
 @pytest.mark.parametrize("name", [PRETRAIN, "static-low", "dynamic", "joint"])
 def test_terms_and_gradients_are_finite_and_reach_what_learns(name: str) -> None:
-    recipe = detailed(name)
+    recipe = refined(name)
     stage = make_stage(recipe, model=MODEL)
     shake_heads(stage)
     terms = stage(make_batch(recipe, (0, 1)))
@@ -49,10 +49,10 @@ def test_terms_and_gradients_are_finite_and_reach_what_learns(name: str) -> None
 
 
 def test_motion_alone_is_the_dynamic_stage_without_pictures() -> None:
-    stages = [make_stage(detailed(name), model=MODEL) for name in (MOTION, "dynamic")]
+    stages = [make_stage(refined(name), model=MODEL) for name in (MOTION, "dynamic")]
     for stage in stages:
         shake_heads(stage)
-    batch = make_batch(detailed("dynamic"), (0, 1))
+    batch = make_batch(refined("dynamic"), (0, 1))
     alone, whole = (stage(batch) for stage in stages)
     assert set(alone) == {"motion", TOTAL}
     torch.testing.assert_close(alone["motion"], whole["motion"])
@@ -65,9 +65,9 @@ def test_motion_alone_is_the_dynamic_stage_without_pictures() -> None:
 
 
 def test_many_times_at_once_are_the_same_as_each_alone() -> None:
-    stage = make_stage(detailed(MOTION), model=MODEL)
+    stage = make_stage(refined(MOTION), model=MODEL)
     shake_heads(stage)
-    tokens = torch.rand(2, stage.deformation.enter.in_channels, 2, 8, 8)
+    tokens = torch.rand(2, stage.deformation.input_conv.in_channels, 2, 8, 8)
     times = torch.tensor([[0.0, 0.3], [0.5, 1.0]])
     together = stage.deformation.at_times(tokens, times)
     for time, found in zip(times, together, strict=True):
@@ -75,7 +75,7 @@ def test_many_times_at_once_are_the_same_as_each_alone() -> None:
 
 
 def test_pictures_alone_need_no_autoencoder() -> None:
-    recipe = detailed(PRETRAIN)
+    recipe = refined(PRETRAIN)
     stage = make_stage(recipe, model=MODEL)
     assert not hasattr(stage, "vae")
     latent = zero_latents(MODEL, make_batch(recipe))
@@ -84,7 +84,7 @@ def test_pictures_alone_need_no_autoencoder() -> None:
 
 @pytest.mark.parametrize("use_ground_truth_frames", [True, False])
 def test_the_first_picture_is_always_the_true_one(use_ground_truth_frames: bool) -> None:
-    recipe = replace(detailed("static-low"), use_ground_truth_frames=use_ground_truth_frames)
+    recipe = replace(refined("static-low"), use_ground_truth_frames=use_ground_truth_frames)
     stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe)
     video = stage.scenes.posed_video(batch, encode_video(stage.vae, batch))
     seen = video.rgb.movedim(1, -1)
@@ -93,14 +93,14 @@ def test_the_first_picture_is_always_the_true_one(use_ground_truth_frames: bool)
     assert torch.equal(seen[:, 1:], truth[:, 1:]) == use_ground_truth_frames
 
 
-def test_without_a_detail_decoder_there_is_nothing_to_see() -> None:
+def test_without_a_refinement_decoder_there_is_no_posed_video() -> None:
     recipe = stage_recipe("static-low")
     stage, batch = make_stage(recipe), make_batch(recipe)
     assert stage.scenes.posed_video(batch, encode_video(stage.vae, batch)) is None
 
 
 def test_followed_points_are_those_of_key_frames() -> None:
-    batch = make_batch(detailed("dynamic"))
+    batch = make_batch(refined("dynamic"))
     frames = batch.track_cell[..., 0][batch.track_valid]
     assert set(frames.tolist()) <= {0, 4}
     assert batch.depth.shape[1] == 2

@@ -1,0 +1,102 @@
+"""One generation, validated: everything that can be refused is refused before weights are read."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+
+from diff4splat.generation.image_size import (
+    default_side_px,
+    downsampling_factor,
+    image_plan,
+    size_multiple_px,
+)
+from diff4splat.generation.input_cameras import (
+    reconcile_intrinsics,
+    resample_to_model_frames,
+    to_camera_path,
+)
+from diff4splat.generation.input_image import InputImage, downsample, load_image
+from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
+from diff4splat.generation.settings import GenerationSettings, require_seed
+from diff4splat.models.hub.model import Model
+from diff4splat.models.text_encoder.prompt import require_prompt
+from diff4splat.paths.camera_path import CameraPath
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UserInput:
+    """What a generation is asked for."""
+
+    image: InputImage | Path | str
+    path: CameraPath | str
+    prompt: str | None
+    seed: int
+    settings: GenerationSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """The same, at sizes that the networks can take, with the plan."""
+
+    image: InputImage
+    small: InputImage
+    """The copy that the networks see."""
+    path: CameraPath
+    """Along which the scene is shown."""
+    small_path: CameraPath
+    """As many cameras as the model was made for, at the size of the copy."""
+    prompt: str | None
+    seed: int
+    settings: GenerationSettings
+    plan: GenerationPlan
+
+
+def prepare_request(model: Model, user: UserInput, device: torch.device) -> Request:
+    """Check and resize the input, and plan which networks run.
+
+    Raises:
+        InputError: the image, the path or the prompt cannot be used.
+        ConfigError: a setting that this model cannot satisfy.
+    """
+    config, settings = model.config, user.settings
+    if user.prompt is not None:
+        require_prompt(user.prompt, config.text.max_bytes)
+    image = _load(model, user)
+    image, path = reconcile_intrinsics(image, to_camera_path(user.path, image.camera))
+    facts = RequestFacts(
+        prompt=user.prompt is not None,
+        fill=settings.fill,
+        still=settings.still,
+        frames=config.frames,
+    )
+    plan = plan_generation(config, model.trained, facts)
+    image = image.to(device)
+    small = downsample(image, downsampling_factor(config, plan, image.camera.size_px))
+    return Request(
+        image=image,
+        small=small,
+        path=path,
+        small_path=_network_path(path, config.frames, small).to(device),
+        prompt=user.prompt,
+        seed=require_seed(user.seed),
+        settings=settings,
+        plan=plan,
+    )
+
+
+def _load(model: Model, user: UserInput) -> InputImage:
+    """The image at a size that the model can take, in single precision."""
+    config, image = model.config, user.image
+    if not isinstance(image, InputImage):
+        plan = image_plan(config, model.trained, user.settings.fill)
+        side_px = default_side_px(config, plan)
+        multiple_px = size_multiple_px(config, plan, side_px)
+        image = load_image(Path(image), side_px, multiple_px=multiple_px)
+    config.latent_grid(config.frames, image.camera.size_px)
+    return replace(image, rgb=image.rgb.float(), camera=image.camera.to(torch.float32))
+
+
+def _network_path(path: CameraPath, frames: int, small: InputImage) -> CameraPath:
+    sampled = resample_to_model_frames(path, frames)
+    return replace(sampled, cameras=sampled.cameras.resized(small.camera.size_px))
