@@ -102,8 +102,8 @@ def trained_networks(
     networks = create_networks(recipe.model, seed=recipe.seed)
     _take(networks, start, PARTS)
     done = frozenset(part for stage in finished for part in stage.trained)
-    ready = frozenset() if start is None else start.trained - sources.keys()
-    return _filled(networks, sources, folder), done | ready
+    ready = frozenset() if start is None else start.trained.intersection(dict(networks.parts()))
+    return _filled(networks, sources, folder), done | (ready - sources.keys())
 
 
 def _take(networks: Networks, start: Model | None, parts: Collection[str]) -> None:

@@ -9,7 +9,8 @@ from packed_models import TRAINED, trained_folder
 from training_commands import contents, refusal, rows
 
 from diff4splat.cli.main import run
-from diff4splat.models.factory import PARTS
+from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
+from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.model import load_model
 from diff4splat.training.latents.latent_shards import read_packs
 
@@ -43,8 +44,8 @@ def test_every_clip_is_encoded_with_its_mirror_image(latents: Path, start: Path)
     assert len(pack) == 2 * 8
     assert pack.latent.shape[1:] == (4, 2, 4, 4)
     assert pack.versions == 2
-    assert pack.model == load_model(start).weights_sha256
-    assert pack.render_condition is None, "the test size sees no drafts"
+    assert pack.model == load_model(start).weights_sha256()
+    assert pack.render_latent is None, "the test size takes no render condition"
 
 
 def test_a_second_call_leaves_the_files_as_they_are(
@@ -76,7 +77,7 @@ def test_the_video_model_learns_from_latents_alone(
     (stage,) = [one for one in written["stages"] if one["name"] == "video_diffusion"]
     assert stage["data"]["sources"][0]["folder"] == str(latents)
     whole, given = load_model(tmp_path / "model"), load_model(start)
-    assert whole.trained == set(PARTS)
+    assert whole.trained == set(model_parts(whole.config))
     for part in TRAINED:
         theirs = getattr(given.networks, part).state_dict()
         for key, value in getattr(whole.networks, part).state_dict().items():
@@ -104,9 +105,22 @@ def test_a_folder_without_latents_is_refused(
     assert not (tmp_path / "video_diffusion").exists()
 
 
-def test_a_model_that_sees_drafts_refuses_latents_without(
+def test_a_model_with_render_conditions_refuses_latents_without(
     latents: Path, start: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    drafts = ("--set", "model.dit.draft=true")
-    assert train(tmp_path, latents, "--from-model", str(start), *drafts) == 2
-    assert "draft" in refusal(capsys)
+    rendered = ("--set", "model.dit.render_condition=true")
+    assert train(tmp_path, latents, "--from-model", str(start), *rendered) == 2
+    assert "render condition" in refusal(capsys)
+
+
+def test_render_conditions_of_an_earlier_release_are_refused(
+    latents: Path, start: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (file,) = latents.iterdir()
+    tensors = read_tensors(file)
+    tensors["draft"] = tensors["latent"]
+    old = TensorFile(tensors=tensors, metadata=read_metadata(file))
+    write_tensors(old, tmp_path / "old" / file.name)
+    assert train(tmp_path / "run", tmp_path / "old", "--from-model", str(start)) == 2
+    line = refusal(capsys)
+    assert "earlier release" in line and "encode the clips again" in line

@@ -152,8 +152,9 @@ def test_priors_that_the_recipes_model_lacks_are_left_out(start: Model, tmp_path
     networks = replace(start.networks, monocular_depth=prior)
     rich = replace(start, config=config, networks=networks)
     rich = as_trained(rich, *TRAINED, "monocular_depth")
-    networks, _ = trained_networks(recipe, tmp_path, rich)
+    networks, done = trained_networks(recipe, tmp_path, rich)
     assert networks.monocular_depth is None and same(networks.ldrm, start.networks.ldrm)
+    assert done == set(TRAINED)
     recipe = replace(recipe, model=config)
     networks, done = trained_networks(recipe, tmp_path, rich)
     assert same(networks.monocular_depth, prior) and "monocular_depth" in done
