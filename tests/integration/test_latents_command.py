@@ -9,7 +9,12 @@ from packed_models import TRAINED, trained_folder
 from training_commands import contents, refusal, rows
 
 from diff4splat.cli.main import run
-from diff4splat.io.tensor_file import TensorFile, read_metadata, read_tensors, write_tensors
+from diff4splat.io.scene_files.tensor_file import (
+    TensorFile,
+    read_metadata,
+    read_tensors,
+    write_tensors,
+)
 from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.model import load_model
 from diff4splat.training.latents.latent_shards import read_packs
