@@ -17,7 +17,7 @@ from torch import Tensor
 
 from diff4splat.evaluation.protocols.datasets import open_clips
 from diff4splat.evaluation.protocols.protocol_json import load_protocol
-from diff4splat.generation.input_image import choose_focal, prepare_image
+from diff4splat.generation.inputs.input_image import choose_focal, prepare_image
 from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.metrics.image import psnr

@@ -26,9 +26,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.image_size import find_image_size
-from diff4splat.generation.input_cameras import path_frame
-from diff4splat.generation.input_image import InputImage, choose_focal, prepare_image
+from diff4splat.generation.inputs.image_size import find_image_size
+from diff4splat.generation.inputs.input_cameras import path_frame
+from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject

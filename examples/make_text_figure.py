@@ -9,8 +9,8 @@ from pathlib import Path
 import torch
 
 from diff4splat import Diff4SplatPipeline
-from diff4splat.generation.image_size import find_image_size
-from diff4splat.generation.input_image import load_image
+from diff4splat.generation.inputs.image_size import find_image_size
+from diff4splat.generation.inputs.input_image import load_image
 from diff4splat.io.photos.images import write_png
 from diff4splat.render.api import render
 

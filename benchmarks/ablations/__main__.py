@@ -19,9 +19,9 @@ from ablations.options import Options
 from ablations.results import Row, store, stored_rows
 from ablations.tables import to_json, to_markdown
 from ablations.variants import STATIC, Variant, chosen_variants, recipe_of, reduced
-from diff4splat.cli.console import ConsolePhases
-from diff4splat.cli.installation import single_gaussian
-from diff4splat.cli.precompile import precompile_renderer, precompile_sources
+from diff4splat.cli.common.console import ConsolePhases
+from diff4splat.cli.common.installation import single_gaussian
+from diff4splat.cli.common.precompile import precompile_renderer, precompile_sources
 from diff4splat.errors import Diff4SplatError
 from diff4splat.io.atomic import write_text
 from diff4splat.io.figures.plots import require_matplotlib

@@ -17,7 +17,7 @@ from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol
 from diff4splat.flow.guidance import Guidance
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video_sampling import Conditions, sample_video
+from diff4splat.generation.video.video_sampling import Conditions, sample_video
 from diff4splat.metrics.image import psnr
 from diff4splat.models.hub.model import Model
 from diff4splat.models.video_dit.render_condition import RenderCondition

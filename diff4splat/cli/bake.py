@@ -28,7 +28,7 @@ class Bake:
 
     def run(self) -> None:
         """Load, bake, report the error, write."""
-        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.io.scene_files.scene_file import load_scene, save_scene
         from diff4splat.scene.motion.bake import bake, bake_within
 

@@ -36,7 +36,7 @@ class Convert:
 
     def run(self) -> None:
         """Read, convert, write; existing files are replaced only by complete ones."""
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
         from diff4splat.io.checkpoints.import_scene import import_scene
 
         require_inputs_kept((self.scene,), (self.out,))
@@ -55,14 +55,14 @@ class Convert:
             self._write_sequence(imported.scene)
 
     def _write_scene(self, scene: "Scene") -> None:
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
         from diff4splat.io.scene_files.scene_file import save_scene
 
         save_scene(scene, self.out)
         note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians)")
 
     def _write_ply(self, scene: "Scene") -> None:
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
         from diff4splat.io.ply.ply_file import write_ply
 
         _note_dilation(scene)
@@ -74,7 +74,7 @@ class Convert:
         note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians at {time_s:g} s)")
 
     def _write_sequence(self, scene: "Scene") -> None:
-        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.io.ply.ply_file import write_ply_sequence
 
         _note_dilation(scene)
@@ -99,7 +99,7 @@ def file_times_s(scene: "Scene", fps: float) -> list[float]:
 
 
 def _note_dilation(scene: "Scene") -> None:
-    from diff4splat.cli.console import note
+    from diff4splat.cli.common.console import note
     from diff4splat.scene.scene import DILATION_PX2
 
     if scene.dilation_px2 < DILATION_PX2:

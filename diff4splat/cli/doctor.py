@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from diff4splat.cli import installation
-from diff4splat.cli.precompile import (
+from diff4splat.cli.common import installation
+from diff4splat.cli.common.precompile import (
     HEXPLANE,
     RASTER,
     RASTERIZER,
@@ -71,7 +71,7 @@ def precompile_all() -> None:
 
 def precompile_group(name: str) -> None:
     """Compile one group of kernels, with a bar and a line of its own."""
-    from diff4splat.cli.console import ConsolePhases, note
+    from diff4splat.cli.common.console import ConsolePhases, note
     from diff4splat.progress.precompile import precompile
 
     phases, group = ConsolePhases(), kernel_group(name)

@@ -42,9 +42,9 @@ class Evaluate:
         """Check everything cheap first, then measure, write, and print the table."""
         from dataclasses import replace
 
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import single_gaussian
-        from diff4splat.cli.precompile import precompile_renderer, precompile_sources
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer, precompile_sources
         from diff4splat.evaluation.evaluate import OUTPUT_FILES, RunLimits, evaluate
         from diff4splat.evaluation.measure_item import Setup
         from diff4splat.evaluation.measures.captions import grammar_caption

@@ -75,9 +75,9 @@ class Fit:
 
     def run(self) -> None:
         """Check, read, fit, write."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import single_gaussian
-        from diff4splat.cli.precompile import precompile_renderer, precompile_tracer
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
         from diff4splat.fitting.checkpoint import CHECKPOINT_FILE
         from diff4splat.fitting.fit import fit_scene
         from diff4splat.fitting.fit_types import FitRequest

@@ -16,7 +16,7 @@ from diff4splat.cli.options.camera import CameraOptions, choose_path
 from diff4splat.cli.options.guard_overwrite import require_inputs_kept
 
 if TYPE_CHECKING:
-    from diff4splat.generation.input_image import InputImage
+    from diff4splat.generation.inputs.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
 
 
@@ -63,10 +63,10 @@ class Generate:
 
     def run(self) -> None:
         """Check everything cheap first, then generate, render and write."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.precompile import precompile_renderer
-        from diff4splat.cli.skipped_gaussians import skipped_gaussians
-        from diff4splat.generation.input_cameras import path_frame, reconcile_intrinsics
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.precompile import precompile_renderer
+        from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
+        from diff4splat.generation.inputs.input_cameras import path_frame, reconcile_intrinsics
         from diff4splat.generation.pipeline import Diff4SplatPipeline
         from diff4splat.io.atomic import atomic_folder
         from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
@@ -128,8 +128,8 @@ class Generate:
 
     def picture(self) -> "InputImage":
         """The photograph at the model's size."""
-        from diff4splat.generation.image_size import find_image_size
-        from diff4splat.generation.input_image import load_image
+        from diff4splat.generation.inputs.image_size import find_image_size
+        from diff4splat.generation.inputs.input_image import load_image
 
         side_px, multiple_px = find_image_size(self.model, self.resolution, self.fill)
         return load_image(self.image, side_px, self.fov, self.convert, multiple_px)

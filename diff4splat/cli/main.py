@@ -85,12 +85,12 @@ def run(arguments: list[str]) -> int:
         require_readable(arguments)
         command.run()
     except Diff4SplatError as error:
-        from diff4splat.cli.console import fail
+        from diff4splat.cli.common.console import fail
 
         fail(error)
         return BAD_INPUT
     except KeyboardInterrupt:
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
 
         note("diff4splat: stopped; no half-written file was left")
         return INTERRUPTED

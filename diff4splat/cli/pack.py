@@ -29,7 +29,7 @@ class Pack:
 
     def run(self) -> None:
         """Check, write, and print the size of each part."""
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
         from diff4splat.models.hub.export import export_model
         from diff4splat.models.hub.model import load_model
 

@@ -33,7 +33,7 @@ class PreviewPath:
 
     def run(self) -> None:
         """Print statistics of the path, then write the drawing."""
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
         from diff4splat.geometry.camera import focal_from_fov, pinhole
         from diff4splat.outputs.path_plot import save_path_preview
         from diff4splat.paths.settings import PathFrame

@@ -46,7 +46,7 @@ class PrepareSynthetic:
 
     def run(self) -> None:
         """Render the clips, write them, and write a contact sheet."""
-        from diff4splat.cli.console import ConsolePhases, note
+        from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.data_prep.clip_sheet import write_clip_sheet
         from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
         from diff4splat.data_prep.synthetic.worlds import WorldRecipe
@@ -97,9 +97,9 @@ class PrepareLatents:
 
     def run(self) -> None:
         """Encode and write."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import single_gaussian
-        from diff4splat.cli.precompile import precompile_renderer
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer
         from diff4splat.configs.recipes import find_recipe
         from diff4splat.models.hub.model import load_model
         from diff4splat.training.latents.encode import EncodingJob, encode_clips
@@ -131,7 +131,7 @@ class PrepareCheck:
         Raises:
             InputError: a clip exceeds the tolerance of exact ground truth.
         """
-        from diff4splat.cli.console import ConsolePhases
+        from diff4splat.cli.common.console import ConsolePhases
         from diff4splat.data_prep.checking import check_folder
 
         print(check_folder(self.folder, self.most, ConsolePhases()))

@@ -43,9 +43,9 @@ class Render:
 
     def run(self) -> None:
         """Load, choose cameras and times, render, write."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.precompile import precompile_renderer
-        from diff4splat.cli.skipped_gaussians import skipped_gaussians
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.precompile import precompile_renderer
+        from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
         from diff4splat.io.scene_files.scene_file import load_scene
         from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, write_view
         from diff4splat.progress.run_log import RunLog
@@ -79,7 +79,7 @@ class Render:
 
     def render_physical(self, scene: "Scene", path: "CameraPath", log: "RunLog") -> None:
         """Render with a physical camera."""
-        from diff4splat.cli.console import note
+        from diff4splat.cli.common.console import note
         from diff4splat.cli.render_physical import render_dataset, render_file
         from diff4splat.outputs.photo_sequence import freeze_time
 

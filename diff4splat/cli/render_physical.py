@@ -28,7 +28,7 @@ def render_file(
 
     A PNG holds only ``frame``.
     """
-    from diff4splat.cli.console import note
+    from diff4splat.cli.common.console import note
     from diff4splat.cli.options.physical_path import choose_optics, to_photo_settings
     from diff4splat.outputs.physical_view import require_view_suffix, write_physical_view
 
@@ -56,7 +56,7 @@ def render_dataset(
     log: "RunLog",
 ) -> None:
     """Write each effect, and all effects combined, to folders in ``out``."""
-    from diff4splat.cli.console import note
+    from diff4splat.cli.common.console import note
     from diff4splat.cli.options.physical_path import choose_effects, to_photo_settings
     from diff4splat.outputs.camera_dataset.writer import (
         DatasetJob,
@@ -84,7 +84,7 @@ def precompile_renderers(
     phases: "Phases",
 ) -> None:
     """Compile what will draw, with a progress bar, unless that is done."""
-    from diff4splat.cli.precompile import precompile_renderer, precompile_tracer
+    from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
     from diff4splat.outputs.photo_sequence import needs_rays
 
     traced = [needs_rays(scene, filmed, settings) for filmed in sequences]

@@ -17,9 +17,9 @@ class ErrorTime:
 
     def run(self) -> None:
         """Measure, write, and print the table."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import single_gaussian
-        from diff4splat.cli.precompile import precompile_renderer
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer
         from diff4splat.error_time import report as error_time
 
         phases = ConsolePhases()

@@ -44,9 +44,9 @@ class Train:
 
     def run(self) -> None:
         """Train, then print step and metrics."""
-        from diff4splat.cli.console import ConsolePhases, note
-        from diff4splat.cli.installation import single_gaussian
-        from diff4splat.cli.precompile import precompile_renderer, precompile_sources
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer, precompile_sources
         from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
         from diff4splat.training.recipe.overrides import override
         from diff4splat.training.train_stage import StageRequest, is_main_process, train_stage

@@ -17,7 +17,7 @@ from torch import Tensor
 from diff4splat.flow.guidance import UNGUIDED, CallCount, guided
 from diff4splat.flow.path import velocity_from_clean
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.networks import MOTION_CELL_PX

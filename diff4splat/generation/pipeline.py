@@ -17,17 +17,17 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.inputs.request import Request, UserInput, prepare_request
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.motion_sampling import MotionRequest
 from diff4splat.generation.plan import GenerationPlan
 from diff4splat.generation.priors import image_maps
-from diff4splat.generation.request import Request, UserInput, prepare_request
 from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
-from diff4splat.generation.video_fill import FillRequest, fill_hidden
+from diff4splat.generation.video.video_fill import FillRequest, fill_hidden
 from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog

@@ -3,7 +3,8 @@
     depth prior          if the model has one; else the image lies on a plane
     motion prior         if the model has one and a prompt asks for motion; else the image is static
     text encoder         if a prompt is given and something takes it
-    VAE, DiT, LDRM, deformation    only where hidden regions are filled by the video model
+    VAE, DiT, LDRM       only where hidden regions are filled by the video model
+    deformation          only where such a fill may move
 
 What the plan leaves out is neither loaded nor run, and the card says why.
 """
@@ -21,6 +22,7 @@ FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 """What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
+NO_MOTION = "no prompt asks for motion"
 UNTRAINED_FILL = "the video model is not trained"
 
 
@@ -97,11 +99,12 @@ def plan_generation(
     }
     fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys(FILL_PARTS, fill)
-    if facts.still and not fill:
-        reasons["deformation"] = "nothing may move"
+    if not fill:
+        reasons["deformation"] = _deformation_reason(config, facts)
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
     unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
-    reasons["text_encoder"] = "no prompt" if not facts.prompt else unread
+    asked = _untrained("text_encoder", trained) or unread
+    reasons["text_encoder"] = asked if facts.prompt else "no prompt"
     parts = model_parts(config)
     skipped = [
         SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] == WORSE_FILL)
@@ -122,7 +125,14 @@ def _motion_reason(facts: RequestFacts) -> str:
         return "nothing may move"
     if facts.frames < 2:
         return "the camera path has one frame"
-    return "" if facts.prompt else "no prompt asks for motion"
+    return "" if facts.prompt else NO_MOTION
+
+
+def _deformation_reason(config: ModelConfig, facts: RequestFacts) -> str:
+    """Without a motion prior, motion is the video model's alone, prompted or not."""
+    if facts.still:
+        return "nothing may move"
+    return NO_MOTION if config.motion_unet.used and not facts.prompt else ""
 
 
 def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFacts) -> str:

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
 from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion

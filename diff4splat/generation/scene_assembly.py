@@ -8,9 +8,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.hidden_cells import FillGrid
 from diff4splat.generation.layered_image.gaussians import GaussianSet
-from diff4splat.generation.video_fill import VideoFill
+from diff4splat.generation.video.hidden_cells import FillGrid
+from diff4splat.generation.video.video_fill import VideoFill
 from diff4splat.geometry.camera import project
 from diff4splat.scene.gaussians import concatenate
 from diff4splat.scene.motion.keyframe_algebra import join

@@ -8,11 +8,11 @@ import torch
 
 from diff4splat.errors import ShapeError
 from diff4splat.flow.path import add_noise, velocity
-from diff4splat.generation.canonical_scene import CanonicalScene
-from diff4splat.generation.deformation_motion import deform
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
+from diff4splat.generation.video.canonical_scene import CanonicalScene
+from diff4splat.generation.video.deformation_motion import deform
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole, project
 from diff4splat.geometry.depth import depth_from_distance, distance_from_depth, unproject

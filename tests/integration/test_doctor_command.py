@@ -12,10 +12,11 @@ import pytest
 import torch
 from PIL import Image
 
-from diff4splat.cli import doctor, installation
-from diff4splat.cli.console import ConsolePhases
+from diff4splat.cli import doctor
+from diff4splat.cli.common import installation
+from diff4splat.cli.common.console import ConsolePhases
+from diff4splat.cli.common.precompile import GROUPS, precompile_sources
 from diff4splat.cli.main import run
-from diff4splat.cli.precompile import GROUPS, precompile_sources
 from diff4splat.data_prep.synthetic.renderer.jit import GROUP as WORLDS
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole

@@ -19,7 +19,7 @@ from weight_folders import (
 
 from diff4splat.cli.main import run
 from diff4splat.errors import CheckpointError, FileFormatError
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import WORSE_FILL, RequestFacts, plan_generation
 from diff4splat.generation.settings import GenerationSettings

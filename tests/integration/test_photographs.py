@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from diff4splat.generation.input_image import InputImage, choose_focal, prepare_image
+from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import project

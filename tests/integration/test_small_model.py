@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from diff4splat.cli.main import run
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import pinhole

@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath

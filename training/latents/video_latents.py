@@ -9,10 +9,10 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.priors import image_depth
-from diff4splat.generation.render_condition import encode_condition, render_layered_image
+from diff4splat.generation.video.render_condition import encode_condition, render_layered_image
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import plucker_map
 from diff4splat.io.pixels import unit_rgb

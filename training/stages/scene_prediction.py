@@ -14,12 +14,12 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from diff4splat.generation.canonical_scene import (
+from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.video.canonical_scene import (
     CanonicalScene,
     reconstruct,
     reconstruct_refined,
 )
-from diff4splat.generation.input_image import InputImage
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb

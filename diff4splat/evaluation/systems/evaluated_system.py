@@ -11,11 +11,11 @@ from torch import Tensor
 
 from diff4splat.data.clip import Clip
 from diff4splat.evaluation.protocols.sample import EvalSample
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import RequestFacts, plan_generation
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video_to_scene import scene_from_video
+from diff4splat.generation.video.video_to_scene import scene_from_video
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.model import Model

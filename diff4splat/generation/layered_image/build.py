@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.background_layer import background_layer
 from diff4splat.generation.layered_image.border_extension import (
     border_extension,

@@ -5,7 +5,7 @@ import torch
 from image_layers import input_image, random_rgb
 
 from diff4splat.flow.guidance import CallCount, Guidance
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.motion_sampling import (
     MotionRequest,
     MotionSample,

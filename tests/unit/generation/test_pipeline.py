@@ -7,10 +7,10 @@ import pytest
 import torch
 
 from diff4splat.errors import CheckpointError, ConfigError, InputError
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video_sampling import Conditions, initial_noise
+from diff4splat.generation.video.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.models.config.sizes import small_size
@@ -127,7 +127,7 @@ def test_a_prompt_changes_the_scene_and_loads_the_text_encoder(
 def test_the_image_latent_survives_sampling_unchanged(
     pipeline: Diff4SplatPipeline, image: InputImage
 ) -> None:
-    from diff4splat.generation.video_sampling import sample_video
+    from diff4splat.generation.video.video_sampling import sample_video
 
     randomize(pipeline, "dit")
     image = torch.randn(1, 4, 1, 4, 4)

@@ -7,7 +7,7 @@ import pytest
 import torch
 from image_layers import input_image, random_rgb
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
 from diff4splat.generation.motion_sampling import MotionRequest

@@ -5,11 +5,11 @@ import torch
 from image_layers import FOCAL_PX
 from torch import Tensor
 
-from diff4splat.generation.hidden_cells import FillGrid
 from diff4splat.generation.layered_image.gaussians import GaussianSet
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.generation.scene_assembly import OCCLUSION_MARGIN, combine, hides_fill, joined
-from diff4splat.generation.video_fill import VideoFill
+from diff4splat.generation.video.hidden_cells import FillGrid
+from diff4splat.generation.video.video_fill import VideoFill
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.ldrm.gaussian_head import PixelBase
 from diff4splat.scene.gaussians import Gaussians

@@ -121,7 +121,7 @@ def test_only_what_a_stage_trains_is_in_its_checkpoints(course: Run) -> None:
 
 
 def test_the_model_folder_loads_and_makes_a_scene(course: Run) -> None:
-    from diff4splat.generation.input_image import InputImage
+    from diff4splat.generation.inputs.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
     from diff4splat.geometry.camera import pinhole
 

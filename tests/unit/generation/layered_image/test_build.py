@@ -5,7 +5,7 @@ import torch
 from image_layers import FAR_RANGES, input_image, is_finite, random_depth, random_rgb
 from torch import Tensor
 
-from diff4splat.generation.input_image import downsample
+from diff4splat.generation.inputs.input_image import downsample
 from diff4splat.generation.layered_image.build import (
     PIXEL_FOOTPRINT_PX,
     ImageMaps,

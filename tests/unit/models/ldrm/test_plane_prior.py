@@ -5,7 +5,7 @@ from dataclasses import replace
 import torch
 
 from diff4splat.generation.color_matching import InputView, match_input_view
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole, project

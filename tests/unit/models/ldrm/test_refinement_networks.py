@@ -7,7 +7,7 @@ import torch
 from oracles_models import randomised
 
 from diff4splat.errors import ShapeError
-from diff4splat.generation.canonical_scene import reconstruct_refined
+from diff4splat.generation.video.canonical_scene import reconstruct_refined
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import plucker_map
 from diff4splat.models.config.model import RefinementConfig

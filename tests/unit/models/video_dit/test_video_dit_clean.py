@@ -11,7 +11,7 @@ from diff4splat.errors import ShapeError
 from diff4splat.flow.path import clean_from_velocity
 from diff4splat.flow.samplers import SAMPLERS
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video_sampling import Conditions, sample_video
+from diff4splat.generation.video.video_sampling import Conditions, sample_video
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.video_dit.dit import VideoDiT

@@ -7,7 +7,7 @@ import torch
 
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.data.clip import Clip, ClipMetadata, Tracks, View
-from diff4splat.generation.render_condition import RenderedImage
+from diff4splat.generation.video.render_condition import RenderedImage
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.models.factory import create_networks

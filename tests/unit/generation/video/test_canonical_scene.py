@@ -7,14 +7,14 @@ import torch
 from image_layers import FOCAL_PX
 
 from diff4splat.errors import ConfigError
-from diff4splat.generation.canonical_scene import (
+from diff4splat.generation.layered_image.visibility import visible_in_earlier_frame
+from diff4splat.generation.video.canonical_scene import (
     CanonicalScene,
     keyframe_plane_prior,
     prune_cells,
     reconstruct,
     reconstruct_refined,
 )
-from diff4splat.generation.layered_image.visibility import visible_in_earlier_frame
 from diff4splat.geometry.camera import pinhole, project
 from diff4splat.models.config.networks import ActivationConfig
 from diff4splat.models.ldrm.plane_prior import OPAQUE, PLANE_DEPTH

@@ -6,8 +6,8 @@ import pytest
 import torch
 from image_layers import input_image, random_rgb
 
-from diff4splat.generation.canonical_scene import CanonicalScene, reconstruct
-from diff4splat.generation.deformation_motion import deform
+from diff4splat.generation.video.canonical_scene import CanonicalScene, reconstruct
+from diff4splat.generation.video.deformation_motion import deform
 from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.deformation.keyframes import DeformationUnits
 from diff4splat.models.deformation.network import DeformationNetwork

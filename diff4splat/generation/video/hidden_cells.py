@@ -13,7 +13,7 @@ from diff4splat.generation.layered_image.visibility import (
     nearest_pixel,
     visible_in_earlier_frame,
 )
-from diff4splat.generation.render_condition import RenderedImage
+from diff4splat.generation.video.render_condition import RenderedImage
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.depth import depth_from_distance
 from diff4splat.models.config.networks import ActivationConfig

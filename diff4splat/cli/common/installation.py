@@ -64,7 +64,7 @@ def load_libraries() -> None:
 
 def unsupported_reason(backend: str, device: str) -> str | None:
     """Why a back end does not draw float32 on a device."""
-    from diff4splat.cli.precompile import small_job
+    from diff4splat.cli.common.precompile import small_job
     from diff4splat.render.backends import BACKENDS
 
     return import_module(BACKENDS[backend]).unsupported_reason(small_job(single_gaussian(device)))
@@ -72,14 +72,14 @@ def unsupported_reason(backend: str, device: str) -> str | None:
 
 def backend_readiness(backend: str) -> str:
     """Whether a back end can render at once."""
-    from diff4splat.cli.precompile import RASTER, RASTERIZER, readiness
+    from diff4splat.cli.common.precompile import RASTER, RASTERIZER, readiness
 
     return readiness(RASTERIZER) if backend == RASTER else "ready"
 
 
 def tracer_readiness() -> str:
     """Whether rays can be traced at once, or at all."""
-    from diff4splat.cli.precompile import TRACER, readiness
+    from diff4splat.cli.common.precompile import TRACER, readiness
     from diff4splat.render.trace.support import unsupported_reason as tracer_reason
 
     if (reason := tracer_reason(single_gaussian("cpu"))) is not None:
@@ -95,7 +95,7 @@ def self_test() -> str:
     """
     import torch
 
-    from diff4splat.cli.precompile import RASTER, RASTERIZER, kernel_group, small_job
+    from diff4splat.cli.common.precompile import RASTER, RASTERIZER, kernel_group, small_job
     from diff4splat.render.api import render
 
     ready = unsupported_reason(RASTER, "cpu") is None and kernel_group(RASTERIZER).is_ready()

@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 import torch
 
-from diff4splat.generation.input_cameras import (
+from diff4splat.generation.inputs.input_cameras import (
     reconcile_intrinsics,
     resample_to_model_frames,
     to_camera_path,
 )
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.paths.camera_path import CameraPath

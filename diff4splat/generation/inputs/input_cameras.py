@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH

@@ -9,13 +9,13 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.errors import ShapeError
-from diff4splat.generation.canonical_scene import prune_cells
-from diff4splat.generation.deformation_motion import deform
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.plan import RECONSTRUCTION_PARTS
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
-from diff4splat.generation.video_to_gaussians import VideoLatent, video_gaussians
+from diff4splat.generation.video.canonical_scene import prune_cells
+from diff4splat.generation.video.deformation_motion import deform
+from diff4splat.generation.video.video_to_gaussians import VideoLatent, video_gaussians
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.deformation.keyframes import DeformationUnits
 from diff4splat.models.hub.model import Model, model_device, with_parts

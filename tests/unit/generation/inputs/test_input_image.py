@@ -6,7 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.generation.input_image import FocalChoice, choose_focal, model_size, prepare_image
+from diff4splat.generation.inputs.input_image import (
+    FocalChoice,
+    choose_focal,
+    model_size,
+    prepare_image,
+)
 from diff4splat.geometry.camera import focal_from_35mm, focal_from_fov, pinhole
 from diff4splat.geometry.rays import camera_rays
 

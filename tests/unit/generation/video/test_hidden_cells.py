@@ -7,7 +7,7 @@ import torch
 from image_layers import FOCAL_PX, random_depth
 from torch import Tensor
 
-from diff4splat.generation.hidden_cells import (
+from diff4splat.generation.video.hidden_cells import (
     FillGrid,
     at_grid,
     depth_ratio,
@@ -15,7 +15,7 @@ from diff4splat.generation.hidden_cells import (
     in_front_of_image,
     whole_grid,
 )
-from diff4splat.generation.render_condition import RenderedImage
+from diff4splat.generation.video.render_condition import RenderedImage
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.models.config.networks import ActivationConfig

@@ -10,7 +10,7 @@ from torch import Tensor
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.types import LayeredImage
-from diff4splat.generation.render_condition import (
+from diff4splat.generation.video.render_condition import (
     MIN_COVERAGE,
     UNDILATED,
     RenderedImage,

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.canonical_scene import CanonicalScene
+from diff4splat.generation.video.canonical_scene import CanonicalScene
 from diff4splat.models.deformation.keyframes import (
     DeformationUnits,
     deformation_state,

@@ -9,7 +9,7 @@ from image_layers import input_image, random_rgb, sliding_path
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video_fill import FillRequest, VideoFill, fill_hidden
+from diff4splat.generation.video.video_fill import FillRequest, VideoFill, fill_hidden
 from diff4splat.geometry.camera import project
 from diff4splat.models.config.sizes import small_size
 from diff4splat.models.config.sizes import test_size as tiny_size

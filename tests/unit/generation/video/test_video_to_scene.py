@@ -8,7 +8,7 @@ from image_layers import FOCAL_PX, sliding_path
 
 from diff4splat.errors import InputError, ShapeError
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video_to_scene import scene_from_video
+from diff4splat.generation.video.video_to_scene import scene_from_video
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.hub.model import Model

@@ -9,8 +9,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.canonical_scene import CanonicalScene, reconstruct, reconstruct_refined
-from diff4splat.generation.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.video.canonical_scene import (
+    CanonicalScene,
+    reconstruct,
+    reconstruct_refined,
+)
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.geometry.rays import plucker_map, relative_to_first
 from diff4splat.models.hub.model import Model

@@ -8,7 +8,7 @@ import torch
 from image_layers import random_rgb
 
 from diff4splat.errors import ConfigError
-from diff4splat.generation.image_size import (
+from diff4splat.generation.inputs.image_size import (
     DEFAULT_SIDE_PX,
     default_side_px,
     downsampling_factor,
@@ -16,7 +16,7 @@ from diff4splat.generation.image_size import (
     image_plan,
     size_multiple_px,
 )
-from diff4splat.generation.input_image import InputImage, downsample
+from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.plan import FILL_PARTS
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import camera_rays

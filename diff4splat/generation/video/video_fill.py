@@ -14,26 +14,26 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.canonical_scene import (
+from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.layered_image.gaussians import GaussianSet
+from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
+from diff4splat.generation.settings import GenerationSettings, why_unguided
+from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
+from diff4splat.generation.video.canonical_scene import (
     CanonicalScene,
     keyframe_plane_prior,
     prune_cells,
     reconstruct,
 )
-from diff4splat.generation.deformation_motion import deform
-from diff4splat.generation.hidden_cells import FillGrid, at_grid, hidden_grid, whole_grid
-from diff4splat.generation.input_image import InputImage
-from diff4splat.generation.layered_image.gaussians import GaussianSet
-from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
-from diff4splat.generation.render_condition import (
+from diff4splat.generation.video.deformation_motion import deform
+from diff4splat.generation.video.hidden_cells import FillGrid, at_grid, hidden_grid, whole_grid
+from diff4splat.generation.video.render_condition import (
     RenderedImage,
     encode_condition,
     render_layered_image,
 )
-from diff4splat.generation.settings import GenerationSettings, why_unguided
-from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
-from diff4splat.generation.video_sampling import Conditions, sample_video
-from diff4splat.generation.video_to_gaussians import (
+from diff4splat.generation.video.video_sampling import Conditions, sample_video
+from diff4splat.generation.video.video_to_gaussians import (
     RawVideoMaps,
     VideoLatent,
     image_plane_base,
@@ -95,6 +95,9 @@ def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill:
         least = request.settings.min_opacity
         # Where the image is shown, its own Gaussians are left in any case.
         canonical = prune_cells(canonical, least, log, may_be_empty=request.hidden_only)
+    if not len(canonical.gaussians):
+        why = "no key frame of this path sees what the image hides"
+        log.record_skipped("filled Gaussians", why, "their place in the scene")
     return VideoFill(gaussians=_with_motion(model, request, canonical, log), grid=grid)
 
 

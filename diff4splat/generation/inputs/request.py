@@ -5,18 +5,18 @@ from pathlib import Path
 
 import torch
 
-from diff4splat.generation.image_size import (
+from diff4splat.generation.inputs.image_size import (
     default_side_px,
     downsampling_factor,
     image_plan,
     size_multiple_px,
 )
-from diff4splat.generation.input_cameras import (
+from diff4splat.generation.inputs.input_cameras import (
     reconcile_intrinsics,
     resample_to_model_frames,
     to_camera_path,
 )
-from diff4splat.generation.input_image import InputImage, downsample, load_image
+from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
 from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
 from diff4splat.generation.settings import GenerationSettings, require_seed
 from diff4splat.models.hub.model import Model
