@@ -11,7 +11,7 @@ MOUNTED = ("models", "data_prep", "training", "configs")
 LAYERS = [  # lower may never import higher; the same row may not import each other
     {"errors"},
     {"kernels"},
-    {"geometry", "flow", "metrics", "progress"},
+    {"captions", "geometry", "flow", "metrics", "progress"},
     {"paths"},
     {"scene"},
     {"render"},

@@ -33,7 +33,7 @@ SHORT_STEPS = {
     "static-low": (40, 0.12),
     "static-high": (40, 0.12),
     "dynamic": (190, 0.28),
-    "generator": (100, 0.45),
+    "video_diffusion": (100, 0.45),
     "joint": (80, 0.5),
 }
 """Steps and the share of the first loss that may remain.
