@@ -95,7 +95,9 @@ def plan_generation(
     """
     reasons = {
         "monocular_depth": _untrained("monocular_depth", trained),
-        "motion_unet": _untrained("motion_unet", trained) or _motion_reason(facts),
+        "motion_unet": _untrained("motion_unet", trained)
+        or _motion_reason(facts)
+        or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
     fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys(FILL_PARTS, fill)

@@ -58,7 +58,9 @@ CASES = {
     "no prompt": Case(prompt=None, parts=frozenset({"monocular_depth"})),
     "still": Case(prompt=PROMPT, parts=frozenset({"monocular_depth"}), still=True),
     "video": Case(prompt=PROMPT, parts=PRIORS | VIDEO, fill="video"),
-    "video, no prompt": Case(prompt=None, parts=VIDEO | {"monocular_depth"}, fill="video"),
+    "video, no prompt": Case(
+        prompt=None, parts=(VIDEO | {"monocular_depth"}) - {"deformation"}, fill="video"
+    ),
     "video, still": Case(
         prompt=PROMPT,
         parts=(PRIORS | VIDEO) - {"motion_unet", "deformation"},

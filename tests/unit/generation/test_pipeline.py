@@ -259,7 +259,7 @@ def test_a_model_without_trained_priors_shows_the_image_on_a_plane(
 
 @pytest.mark.parametrize(
     ("trained", "untrained"),
-    [((), True), (PARTS, False), (("monocular_depth",), False), (("motion_unet",), True)],
+    [((), True), (PARTS, False), (("monocular_depth",), False), (("motion_unet",), False)],
 )
 def test_a_scene_is_untrained_if_a_network_that_ran_is(
     image: InputImage, trained: tuple[str, ...], untrained: bool

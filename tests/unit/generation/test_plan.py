@@ -29,7 +29,7 @@ TABLE = [
     ("small", PARTS, {"prompt": True, "frames": 1}, DEPTH),
     ("small", PARTS, {"prompt": True, "fill": "none"}, PRIORS),
     ("small", PARTS, {"prompt": True, "fill": "video"}, PRIORS | VIDEO),
-    ("small", PARTS, {"prompt": False, "fill": "video"}, DEPTH | VIDEO),
+    ("small", PARTS, {"prompt": False, "fill": "video"}, (DEPTH | VIDEO) - {"deformation"}),
     (
         "small",
         PARTS,
