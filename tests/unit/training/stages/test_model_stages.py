@@ -6,7 +6,9 @@ import pytest
 import torch
 from stage_fixtures import STAGES, make_batch, make_stage, shake_heads, stage_recipe
 
+from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import ConfigError
+from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.training.recipe.losses import (
     DynamicLosses,
     MotionLosses,
@@ -162,6 +164,28 @@ def test_half_precision_networks_keep_geometry_and_losses_in_single(name: str) -
     exact = make_stage(recipe)(batch)
     assert terms[TOTAL].dtype == torch.float32
     torch.testing.assert_close(terms[TOTAL], exact[TOTAL], rtol=0.1, atol=0.05)
+
+
+@pytest.mark.parametrize("name", ["video_diffusion", "joint"])
+def test_render_conditions_run_the_depth_prior_frozen(name: str) -> None:
+    model = recipe_by_name("test").model
+    model = replace(
+        model,
+        dit=replace(model.dit, render_condition=True),
+        monocular_depth=MonocularDepthConfig(channels=4),
+    )
+    recipe = stage_recipe(name)
+    stage = make_stage(recipe, model=model)
+    shake_heads(stage)
+    calls = []
+    stage.monocular_depth.register_forward_hook(lambda *_: calls.append(1))
+    terms = stage(make_batch(recipe, (0, 1)))
+    terms[TOTAL].sum().backward()
+    assert calls and bool(terms[TOTAL].isfinite().all())
+    assert all(parameter.grad is None for parameter in stage.monocular_depth.parameters())
+    embedding = stage.dit.condition_embedding
+    assert all(bool(parameter.grad.any()) for parameter in embedding.parameters())
+    assert "hidden_error" in stage.measure(make_batch(recipe))
 
 
 def test_parts_that_a_stage_does_not_run_cannot_be_trained() -> None:

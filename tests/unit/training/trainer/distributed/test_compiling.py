@@ -17,7 +17,7 @@ from diff4splat.training.trainer.distributed.compiling import compile_networks
 from diff4splat.training.trainer.distributed.parallel import parallelise
 from diff4splat.training.trainer.distributed.processes import Processes
 
-SUPPORT = Path(__file__).parents[3] / "support"
+SUPPORT = Path(__file__).parents[4] / "support"
 PROGRAM = """
 import torch
 from depth_stages import MODEL, depth_recipe, with_sky
