@@ -78,7 +78,7 @@ VARIANTS = (
     Variant(
         name="pictures",
         title="true pictures instead of latents",
-        changes=("model.ldrm.reads=frames", *_each(STAGES, "use_ground_truth_frames=true")),
+        changes=("model.ldrm.input=frames", *_each(STAGES, "use_ground_truth_frames=true")),
         use_ground_truth_frames=True,
     ),
     Variant(

@@ -8,6 +8,7 @@ Axes: ``b c t h w`` inside networks, images ``h w 3`` outside; this file is wher
     scene ◄─ match colours ◄─ combine ◄──────────────────────────────────────────────┘
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,8 @@ from diff4splat.models.hub.model import Model, load_model, save_model, with_part
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
+
+UNKNOWN_LICENSE = "unknown"
 
 
 class Diff4SplatPipeline:
@@ -186,5 +189,10 @@ class Diff4SplatPipeline:
             weights_sha256=self.model.weights_sha256(request.plan.parts),
             seed=request.seed,
             prompt=request.prompt,
+            license=self._license(request.plan.parts),
             untrained=not self.model.trained.issuperset(request.plan.parts),
         )
+
+    def _license(self, parts: Collection[str]) -> str:
+        """That of the weights that ran; a scene of no trained network has none."""
+        return self.model.license if self.model.trained.intersection(parts) else UNKNOWN_LICENSE

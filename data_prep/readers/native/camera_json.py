@@ -72,11 +72,11 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
         notes=(*_notes(records, folders), *repeated),
     )
     capture = replace(assemble_capture(draft, options), license=_licenses(records))
-    optics = first.filmed.optics
+    optics = first.physical_path.optics
     if optics_json(optics) == optics_json(Optics()):
         return capture
-    height, width = first.filmed.path.cameras.size_px
-    tracks = {number: record.filmed.track for number, record in enumerate(records)}
+    height, width = first.physical_path.path.cameras.size_px
+    tracks = {number: record.physical_path.track for number, record in enumerate(records)}
     return replace(
         capture,
         optics=downscale_optics(optics, (height, width), options.downscale, location.name),
@@ -86,11 +86,11 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
 
 def _shots(record: CameraRecord, folder: Path, number: int) -> list[Shot]:
     _require_frames_on_track(record, folder / FILE)
-    path, where = record.filmed.path, str(folder / FILE)
+    path, where = record.physical_path.path, str(folder / FILE)
     mask = None if record.valid is None else _existing(folder, record.valid, where)
     return [
         Shot(
-            image=ImageFile(file=_existing(folder, taken.picture, where)),
+            image=ImageFile(file=_existing(folder, taken.image, where)),
             lens=Intrinsics(
                 focal_px=tuple(path.cameras.focal_px[index].tolist()),
                 center_px=tuple(path.cameras.center_px[index].tolist()),

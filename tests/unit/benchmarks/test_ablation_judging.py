@@ -55,7 +55,7 @@ def test_a_clip_is_drawn_once() -> None:
 
 
 def test_true_pictures_come_back_as_they_went_in_with_the_latents_of_the_autoencoder() -> None:
-    vae = create_networks(size_by_name("test"), with_text=False).vae.eval()
+    vae = create_networks(size_by_name("test")).vae.eval()
     vae.set_statistics(torch.full((4,), 0.5), torch.full((4,), 2.0))
     video = torch.rand(1, 3, 5, 32, 32, generator=torch.Generator().manual_seed(0)) * 2 - 1
     found = TruePictures(vae).eval()

@@ -128,15 +128,15 @@ def test_without_order_one_stage_starts_from_nothing_at_the_rate_of_what_does() 
 
 def test_pictures_are_true_in_training_and_judging() -> None:
     found = recipe("pictures")
-    assert found.model.ldrm.reads == "frames"
+    assert found.model.ldrm.input == "frames"
     assert all(found.stage(stage).use_ground_truth_frames for stage in STAGES)
     assert [one.name for one in VARIANTS if one.use_ground_truth_frames] == ["pictures"]
 
 
 def test_parts_of_the_detail_decoder_are_left_out_one_at_a_time() -> None:
-    detail = BASE.model.detail
-    assert recipe("no-comparison").model.detail == replace(detail, depths=0)
-    assert recipe("no-surroundings").model.detail == replace(detail, surroundings=0)
+    refinement = BASE.model.refinement
+    assert recipe("no-comparison").model.refinement == replace(refinement, cost_volume_depths=0)
+    assert recipe("no-surroundings").model.refinement == replace(refinement, border_cells=0)
 
 
 def test_static_stages_are_shared_exactly_where_nothing_in_them_differs() -> None:
@@ -154,7 +154,7 @@ def test_static_stages_are_shared_exactly_where_nothing_in_them_differs() -> Non
         (f"stages.{MOTION}.losses.weight=1", False),
         # The motion stage itself is the same, but not the networks that it starts with.
         (f"stages.{STATIC}.losses.depth=0", False),
-        ("model.detail.depths=0", False),
+        ("model.refinement.cost_volume_depths=0", False),
     ],
 )
 def test_motion_stages_are_shared_where_the_static_ones_are(change: str, shared: bool) -> None:
@@ -176,7 +176,7 @@ def test_a_recipe_that_cannot_be_changed_says_which_variant() -> None:
     test = recipe_by_name("test")
     stages = (*test.stages, motion_stage(test.stage(STATIC), tracks=32))
     without_detail = reduced(replace(test, stages=stages), STEPS)
-    with pytest.raises(ConfigError, match=r"variant pictures: .*detail decoder"):
+    with pytest.raises(ConfigError, match=r"variant pictures: .*refinement decoder"):
         recipe_of(variant("pictures"), without_detail)
 
 
