@@ -93,7 +93,7 @@ class PrepareLatents:
     config: str = "small"
     """Recipe whose video_diffusion stage sets the frames and their size."""
     mirror: bool = True
-    """Also encode each clip mirrored left to right, in images and caption."""
+    """Encode each clip twice: as it is, and mirrored left to right with its caption."""
 
     def run(self) -> None:
         """Encode and write."""

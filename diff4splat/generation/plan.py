@@ -77,7 +77,8 @@ class GenerationPlan:
         return self.has_depth or not self.fills
 
     def record(self, config: ModelConfig, log: RunLog) -> None:
-        """Note what is skipped, with the weights that this saves."""
+        """Note what runs, and what is skipped with the weights that this saves."""
+        log.networks.extend(part for part in model_parts(config) if part in self.parts)
         counts = parameter_counts(config)
         for skipped in self.skipped:
             saved = f"{counts[skipped.part]:,} weights neither loaded nor run"

@@ -71,6 +71,7 @@ def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: Ru
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
         "seconds_total": round(math.fsum(seconds.values()), 3),
         "peak_memory_bytes": peak_memory_bytes(),
+        "networks_run": log.networks,
         "left_out": log.skipped.to_json(),
         "versions": {name: version(name) for name in LIBRARIES},
         "machine": {

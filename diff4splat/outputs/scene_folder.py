@@ -78,12 +78,11 @@ def write_scene_folder(
 
 def preview(result: Result, frames: Frames, facts: SheetFacts) -> Float[Tensor, "h w 3"]:
     """The contact sheet."""
-    depth = frames.rgb.new_zeros(frames.rgb.shape[:3]) if frames.depth is None else frames.depth
     return contact_sheet(
         SheetContent(
             photo=result.photo,
             frames=frames.rgb,
-            depth=depth,
+            depth=frames.depth,
             times_s=result.scene.path.times_s,
             facts=facts,
             note=UNTRAINED if result.scene.provenance.untrained else None,

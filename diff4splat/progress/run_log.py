@@ -1,4 +1,4 @@
-"""Log of a run: seconds per phase, and skipped work."""
+"""Log of a run: seconds per phase, networks that ran, and skipped work."""
 
 from dataclasses import dataclass, field
 
@@ -12,6 +12,8 @@ class RunLog:
 
     phases: Phases = field(default_factory=Phases)
     skipped: SkippedWorkList = field(default_factory=SkippedWorkList)
+    networks: list[str] = field(default_factory=list)
+    """Names of the networks that ran, in order."""
 
     def record_skipped(self, what: str, why: str, saved: str, error: float | None = 0.0) -> None:
         """Record work that this run did not need."""

@@ -57,6 +57,7 @@ def test_the_card_says_what_was_done_and_left_out(folder: Path) -> None:
     assert card["scene"]["gaussians"] > 100
     assert card["scene"]["moving_gaussians"] == 0
     assert card["peak_memory_bytes"] > 0
+    assert card["networks_run"] == ["vae", "dit", "ldrm", "deformation"]
     assert {"sample video", "reconstruct", "render", "write files"} <= set(card["seconds"])
     left_out = {entry["what"] for entry in card["left_out"]}
     assert {"text_encoder", "guidance pass", "deformation network"} <= left_out

@@ -22,6 +22,8 @@ SIDE_MULTIPLE = 16
 """Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""
 MAX_SIDE_PX = 1024
 """Seventeen frames of more pixels do not fit into 8 GiB."""
+SMALLEST_CROP = 0.005
+"""Share of a side below which a crop is not worth a note."""
 DEFAULT_FOCAL_35MM = 30.0
 """What phones see with their main lens, when nothing is known."""
 
@@ -79,7 +81,8 @@ def load_image(
     photo = read_photo(file, convert)
     size_px = (photo.rgb.shape[0], photo.rgb.shape[1])
     focal = choose_focal(size_px, fov_deg, photo.focal_35mm)
-    return replace(prepare_image(photo.rgb, focal, side_px, multiple_px), notes=photo.notes)
+    image = prepare_image(photo.rgb, focal, side_px, multiple_px)
+    return replace(image, notes=(*photo.notes, *image.notes))
 
 
 def choose_focal(
@@ -162,7 +165,23 @@ def prepare_image(
         camera=camera,
         focal_source=focal.source,
         focal_known=focal.known,
+        notes=_crop_notes(photo_size, crop, size),
     )
+
+
+def _crop_notes(
+    photo_size: tuple[int, int], crop: tuple[int, int], size: tuple[int, int]
+) -> tuple[str, ...]:
+    """What a crop cost, in words; nothing where every pixel is used."""
+    cut = [1 - kept / whole for kept, whole in zip(crop, photo_size, strict=True)]
+    axes = [
+        f"{share:.0%} of the {name}"
+        for share, name in zip(cut, ("height", "width"), strict=True)
+        if share >= SMALLEST_CROP
+    ]
+    if not axes:
+        return ()
+    return (f"cropped by {' and '.join(axes)} to {size[1]}×{size[0]} pixels",)
 
 
 def _resize(

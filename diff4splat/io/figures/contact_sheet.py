@@ -42,7 +42,8 @@ class SheetContent:
 
     photo: Float[Tensor, "h w 3"]
     frames: Float[Tensor, "t fh fw 3"]
-    depth: Float[Tensor, "t fh fw"]
+    depth: Float[Tensor, "t fh fw"] | None
+    """None leaves the row of depth out."""
     times_s: Float[Tensor, " t"]
     alpha: Float[Tensor, "t fh fw"] | None = None
     title: str = "diff4splat"
@@ -71,7 +72,9 @@ def contact_sheet(content: SheetContent) -> Float[Tensor, "h w 3"]:
     _require_consistent(content)
     shown = torch.linspace(0, len(content.frames) - 1, min(len(content.frames), _MAX_COLUMNS))
     index = shown.round().long().unique()
-    blocks = [_head(content), _frame_row(content, index), _depth_row(content, index)]
+    blocks = [_head(content), _frame_row(content, index)]
+    if content.depth is not None:
+        blocks.append(_depth_row(content, index))
     if content.alpha is not None:
         covered = content.alpha[index][..., None].expand(-1, -1, -1, 3)
         blocks.append(_row("Coverage", covered, [""] * len(index)))
@@ -87,9 +90,9 @@ def _require_consistent(content: SheetContent) -> None:
     want = tuple(content.frames.shape[:3])
     if want[0] == 0:
         raise InputError("contact sheet: expected at least one frame, got none")
-    got = {"depth": tuple(content.depth.shape), "times_s": (*content.times_s.shape, *want[1:])}
-    if content.alpha is not None:
-        got["alpha"] = tuple(content.alpha.shape)
+    got = {"times_s": (*content.times_s.shape, *want[1:])}
+    maps = {"depth": content.depth, "alpha": content.alpha}
+    got |= {name: tuple(one.shape) for name, one in maps.items() if one is not None}
     for name, shape in got.items():
         if shape != want:
             raise ShapeError(f"contact sheet {name}: expected {want} as in frames, got {shape}")

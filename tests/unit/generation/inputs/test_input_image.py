@@ -83,3 +83,10 @@ def test_enlarging_stays_in_range_and_the_right_size_is_left_alone() -> None:
     assert float(enlarged.rgb.max()) <= 1
     exact = torch.rand(64, 64, 3)
     torch.testing.assert_close(prepare_image(exact, focal, 64).rgb, exact, rtol=0, atol=0)
+
+
+def test_a_crop_is_announced_and_a_whole_image_is_not() -> None:
+    focal = choose_focal((300, 451), None, None)
+    notes = prepare_image(torch.rand(300, 451, 3), focal, 256, 64).notes
+    assert len(notes) == 1 and notes[0].startswith("cropped by ") and "320×192" in notes[0]
+    assert prepare_image(torch.rand(64, 64, 3), focal, 64, 16).notes == ()
