@@ -106,7 +106,7 @@ def plan_generation(
         reasons["deformation"] = _deformation_reason(config, facts)
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
     unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
-    asked = _untrained("text_encoder", trained) or unread
+    asked = unread or _untrained("text_encoder", trained)
     reasons["text_encoder"] = asked if facts.prompt else "no prompt"
     parts = model_parts(config)
     skipped = [
