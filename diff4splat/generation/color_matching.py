@@ -2,15 +2,16 @@
 
 Neighbouring footprints overlap, so Gaussians that carry the pixels' colours render a softened image
 (25 to 33 dB). Blending is linear in colour, and a Gaussian on its own pixel of the input view is
-what that pixel shows most of, so Richardson iteration on the render itself undoes the blur:
+what that pixel shows most of. So iteration on the render itself undoes the blur:
 
-    colour_i += image_i − render_i
+    colour_i += step_i,    step = ρ step + σ (image − render)
 
-Three steps give 30 to 44 dB on the same photographs, and more where pixels are smaller. Colours
-stay in [0, 1]: what sharpens the input view must not ring in other views.
+The factors are those of the Chebyshev iteration for eigenvalues of the blur in [SMALLEST_SHARE, 1]
+(Saad 2003, §12.3.2). Five of its steps give what twelve plain ones do (σ = 1, ρ = 0). Colours stay
+in [0, 1]: what sharpens the input view must not ring in other views.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import torch
@@ -25,6 +26,9 @@ from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import color_from_dc, dc_from_color
 from diff4splat.scene.scene import Scene
+
+SMALLEST_SHARE = 0.3
+"""Of a pixel's colour that its own Gaussian gives; below it the iteration converges more slowly."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,12 +64,27 @@ def matched_colors(
 ) -> Float[Tensor, "n c 3"]:
     """Harmonics with which ``gaussians``, as they are at the first time, show the image."""
     rows = (view.pixel_index != NO_PIXEL).nonzero()[:, 0]
-    for _ in range(steps):
+    step = torch.zeros_like(gaussians.sh[rows, 0])
+    for momentum, rate in chebyshev_factors(steps):
         seen = render(gaussians, view.camera, settings=settings).rgb
         residual = _per_cell(view.rgb.to(seen) - seen, view.stride)
-        gaussians = _add_color(gaussians, rows, residual[view.pixel_index[rows]])
+        step = momentum * step + rate * residual[view.pixel_index[rows]]
+        gaussians = _add_color(gaussians, rows, step)
         advance()
     return gaussians.sh
+
+
+def chebyshev_factors(steps: int) -> Iterator[tuple[float, float]]:
+    """(momentum, rate) of every step for eigenvalues in [SMALLEST_SHARE, 1]."""
+    middle, half = (1 + SMALLEST_SHARE) / 2, (1 - SMALLEST_SHARE) / 2
+    previous = half / middle
+    for index in range(steps):
+        if index == 0:
+            yield 0.0, 1 / middle
+            continue
+        current = 1 / (2 * middle / half - previous)
+        yield current * previous, 2 * current / half
+        previous = current
 
 
 def _per_cell(image: Float[Tensor, "h w 3"], stride: int) -> Float[Tensor, "c 3"]:

@@ -6,7 +6,13 @@ import pytest
 import torch
 from image_layers import layer, layered, random_rgb, sliding_path
 
-from diff4splat.generation.color_matching import InputView, match_input_view, matched_colors
+from diff4splat.generation.color_matching import (
+    SMALLEST_SHARE,
+    InputView,
+    chebyshev_factors,
+    match_input_view,
+    matched_colors,
+)
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.metrics.image import psnr
@@ -17,6 +23,9 @@ from diff4splat.scene.harmonics import color_from_dc
 from diff4splat.scene.scene import Provenance, Scene
 
 SIZE_PX = (12, 16)
+
+FIRST_RATE = 2 / (1 + SMALLEST_SHARE)
+"""Of the first step: one over the middle of the eigenvalues."""
 
 
 def blurred(pixels: int | None = None) -> GaussianSet:
@@ -61,7 +70,7 @@ def test_one_step_adds_the_residual_of_each_pixel() -> None:
     residual = image.rgb - render(gathered.gaussians, image.camera).rgb
     before = color_from_dc(gathered.gaussians.sh[:, 0])
     after = color_from_dc(matched_colors(gathered.gaussians, image, 1)[:, 0])
-    wanted = (before + residual.flatten(0, 1)).clamp(0, 1)
+    wanted = (before + FIRST_RATE * residual.flatten(0, 1)).clamp(0, 1)
     torch.testing.assert_close(after, wanted, atol=1e-5, rtol=0)
 
 
@@ -75,7 +84,7 @@ def test_cells_of_several_pixels_take_their_mean_residual() -> None:
     cells = residual.unflatten(0, (6, 2)).unflatten(2, (8, 2)).mean((1, 3)).flatten(0, 1)
     before = color_from_dc(coarse.gaussians.sh[:, 0])
     after = color_from_dc(matched_colors(coarse.gaussians, image, 1)[:, 0])
-    torch.testing.assert_close(after, (before + cells).clamp(0, 1), atol=1e-5, rtol=0)
+    torch.testing.assert_close(after, (before + FIRST_RATE * cells).clamp(0, 1), atol=1e-5, rtol=0)
 
 
 def test_gaussians_that_show_no_pixel_keep_their_colour() -> None:
@@ -102,3 +111,18 @@ def test_without_pixels_or_steps_the_scene_is_the_same(pixels: int | None, steps
     scene = scene_of(gathered)
     assert match_input_view(scene, view(gathered), steps, log) is scene
     assert "match colours" not in log.phases.seconds
+
+
+def test_chebyshev_factors_solve_any_blur_in_their_interval_faster_than_plain_steps() -> None:
+    eigenvalues = torch.linspace(SMALLEST_SHARE, 1.0, 50, dtype=torch.float64)
+    solution, step = torch.zeros_like(eigenvalues), torch.zeros_like(eigenvalues)
+    for momentum, rate in chebyshev_factors(5):
+        step = momentum * step + rate * (1 - eigenvalues * solution)
+        solution = solution + step
+    error = (1 - eigenvalues * solution).abs().max()
+    plain = (1 - eigenvalues).pow(5).max()
+    # The minimal maximum over all polynomials of this degree: 1 / T_5((1 + a) / (1 - a)).
+    ratio = torch.tensor((1 + SMALLEST_SHARE) / (1 - SMALLEST_SHARE), dtype=torch.float64)
+    best = 1 / torch.cosh(5 * torch.acosh(ratio))
+    torch.testing.assert_close(error, best, rtol=1e-9, atol=0)
+    assert error < plain / 30
