@@ -93,7 +93,7 @@ class PrepareLatents:
     config: str = "small"
     """Recipe whose video_diffusion stage sets the frames and their size."""
     mirror: bool = True
-    """Encode each clip twice: as it is, and mirrored left to right with its caption."""
+    """Leave out the second version of each clip, mirrored left to right with its caption."""
 
     def run(self) -> None:
         """Encode and write."""
