@@ -22,7 +22,7 @@ from diff4splat.io.scene_files.tensor_file import (
 from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
 from diff4splat.scene.motion.static import StaticMotion
 
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "scene-format.md"
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "scene-format.md"
 
 
 @pytest.fixture

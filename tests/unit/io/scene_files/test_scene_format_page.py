@@ -10,7 +10,7 @@ import pytest
 from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.io.scene_files.tensor_file import read_tensors
 
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "scene-format.md"
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "scene-format.md"
 
 
 def test_the_printed_reader_runs_and_is_short(
