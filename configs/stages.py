@@ -19,7 +19,7 @@ from diff4splat.training.recipe.losses import (
 )
 from diff4splat.training.recipe.stage import Gate, StageRecipe
 
-STILL = (SourceSettings(still_share=1.0),)
+STATIC_ONLY = (SourceSettings(still_share=1.0),)
 """Clips in which only the camera moves."""
 MIXED = (SourceSettings(still_share=0.25),)
 """Static clips keep their share in the dynamic stage: 20 to 30 % (ours, after MoVieS)."""
@@ -27,7 +27,7 @@ MIXED = (SourceSettings(still_share=0.25),)
 
 def static_data(data: DataSettings) -> DataSettings:
     """The same samples from clips in which nothing moves, without tracks."""
-    return replace(data, sources=STILL, tracks=0)
+    return replace(data, sources=STATIC_ONLY, tracks=0)
 
 
 def dynamic_data(data: DataSettings) -> DataSettings:

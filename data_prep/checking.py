@@ -19,7 +19,7 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.progress.phases import Phases
 
 USUAL_SIDE_PX, THIN_SHARE = 128, 0.05
-"""At this picture side, as many points may lie on leaves and posts thinner than a pixel."""
+"""At this image side, as many points may lie on leaves and posts thinner than a pixel."""
 
 
 def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
@@ -49,7 +49,7 @@ def tolerances_for(clip: Clip) -> Tolerances:
     """What the clip's kind of truth may differ by.
 
     What is thinner than a pixel shows and hides points that no pixel centre sees, and the smaller
-    the picture, the more is. Visibility itself is tested against every triangle elsewhere.
+    the image, the more is. Visibility itself is tested against every triangle elsewhere.
     """
     if clip.note.metric != "exact":
         return MEASURED

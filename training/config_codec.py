@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from diff4splat.errors import Diff4SplatError
 
-MOST_SHOWN = 60
+MAX_QUOTED_CHARACTERS = 60
 """Characters of a refused value."""
 
 
@@ -18,9 +18,9 @@ MOST_SHOWN = 60
 class TypedReader:
     """How values are read and refused."""
 
-    refusal: type[Diff4SplatError]
+    error_type: type[Diff4SplatError]
     """Raised for a value that does not fit, with the dotted place where it stands."""
-    own: Mapping[type, Callable[[Any], Any]] = field(default_factory=dict)
+    readers: Mapping[type, Callable[[Any], Any]] = field(default_factory=dict)
     """Readers of classes that know better how they are stored."""
     dependent: Mapping[type, Callable[[Mapping[str, Any]], Mapping[str, Any]]] = field(
         default_factory=dict
@@ -29,8 +29,8 @@ class TypedReader:
 
     def read(self, kind: Any, value: Any, where: str) -> Any:
         """``value`` as an instance of the annotated ``kind``."""
-        if kind in self.own:
-            return self.own[kind](value)
+        if kind in self.readers:
+            return self.readers[kind](value)
         if is_dataclass(kind):
             return self._record(kind, value, where)
         if get_origin(kind) is tuple:
@@ -71,5 +71,5 @@ class TypedReader:
 
     def _require(self, holds: bool, where: str, expected: str, got: Any) -> None:
         if not holds:
-            shown = "none" if got is None else repr(got)[:MOST_SHOWN]
-            raise self.refusal(f"{where}: expected {expected}, got {shown}; correct it")
+            shown = "none" if got is None else repr(got)[:MAX_QUOTED_CHARACTERS]
+            raise self.error_type(f"{where}: expected {expected}, got {shown}; correct it")

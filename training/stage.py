@@ -1,6 +1,6 @@
 """What the trainer knows of a stage: a module that turns batches into losses.
 
-Axes: ``b`` batch, ``h w`` picture. Everything random inside a step is drawn from generators seeded
+Axes: ``b`` batch, ``h w`` image. Everything random inside a step is drawn from generators seeded
 by ``SampleKey``, never from global state, so that a run resumes exactly on any number of processes.
 """
 
@@ -50,7 +50,7 @@ class Stage(nn.Module):
         raise NotImplementedError
 
     def panel(self, batch: Batch) -> Float[Tensor, "h w 3"]:
-        """A picture for people: input, prediction, truth, depth, motion; RGB in [0, 1]."""
+        """An image for people: input, prediction, truth, depth, motion; RGB in [0, 1]."""
         raise NotImplementedError
 
 

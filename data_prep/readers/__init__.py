@@ -1,1 +1,1 @@
-"""Readers of captures: posed, timed pictures in the layouts that data sets and tools use."""
+"""Readers of captures: posed, timed images in the layouts that data sets and tools use."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diff4splat.data.capture.capture import Capture
-from diff4splat.data.capture.checks import require_usable_capture
+from diff4splat.data.capture.checks import require_valid_capture
 from diff4splat.data_prep.readers.camera_rig import neu3d
 from diff4splat.data_prep.readers.colmap import reader as colmap
 from diff4splat.data_prep.readers.common.assembly import assemble_capture
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft
+from diff4splat.data_prep.readers.common.undecoded_capture import UndecodedCapture
 from diff4splat.data_prep.readers.files.file_discovery import CaptureLocation, locate_capture
 from diff4splat.data_prep.readers.native import camera_json, clips
 from diff4splat.data_prep.readers.nerfies import reader as nerfies
@@ -22,7 +22,7 @@ from diff4splat.errors import InputError
 class _Reader:
     expected_files: str
     matches: Callable[[Path], bool]
-    read: Callable[[CaptureLocation, ReadOptions], CaptureDraft | Capture]
+    read: Callable[[CaptureLocation, ReadOptions], UndecodedCapture | Capture]
 
 
 _READERS: dict[FormatName, _Reader] = {
@@ -50,8 +50,8 @@ def read_capture(path: Path | str, options: ReadOptions | None = None) -> Captur
     options, location = options or ReadOptions(), locate_capture(path)
     name = _detected(location) if options.format == "auto" else options.format
     found = _READERS[name].read(location, options)
-    return require_usable_capture(
-        assemble_capture(found, options) if isinstance(found, CaptureDraft) else found
+    return require_valid_capture(
+        assemble_capture(found, options) if isinstance(found, UndecodedCapture) else found
     )
 
 

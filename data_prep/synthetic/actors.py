@@ -53,7 +53,7 @@ class StageArea:
         return self.distance_m * self.camera.size_px[1] / focal
 
 
-def place_movers(area: StageArea, count: int, rng: Rng) -> list[PlacedObject]:
+def place_moving_objects(area: StageArea, count: int, rng: Rng) -> list[PlacedObject]:
     """Place up to ``count`` moving objects; fewer if there is no room."""
     placed_objects: list[PlacedObject] = []
     for number in range(count):
@@ -68,7 +68,7 @@ def place_movers(area: StageArea, count: int, rng: Rng) -> list[PlacedObject]:
 
 
 def _try_mover(area: StageArea, count: int, number: int, rng: Rng) -> PlacedObject | None:
-    name, family = area.sampler.sample_mover(rng, is_lead=number == 0)
+    name, family = area.sampler.sample_moving_object(rng, is_lead=number == 0)
     motion = MOTIONS[name]
     size = area.radius_m * rng.uniform(0.5, 0.95) * (1.0, 0.8, 0.68)[min(count, 3) - 1]
     shape = shape_of_size(family, size, rng, motion.heights_m)

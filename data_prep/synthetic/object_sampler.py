@@ -66,7 +66,7 @@ class ObjectSampler:
             return motion in ("bounces", "drops", "swings", "hops")
         return motion == "swims"
 
-    def sample_mover(self, rng: Rng, *, is_lead: bool) -> tuple[str, str]:
+    def sample_moving_object(self, rng: Rng, *, is_lead: bool) -> tuple[str, str]:
         """Sample a motion and a family; the first object prefers motions absent from training."""
         pairs = self.motion_pairs()
         if is_lead and self.split.motions.new:

@@ -98,4 +98,4 @@ class World:
     light: Light
     sky: Sky
     views: tuple[Camera, ...]
-    """Batches of shape (t,), float64, one picture size; the first is the input view."""
+    """Batches of shape (t,), float64, one image size; the first is the input view."""

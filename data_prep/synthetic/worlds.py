@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diff4splat.data_prep.synthetic.actors import StageArea, freeze, place_movers
+from diff4splat.data_prep.synthetic.actors import StageArea, freeze, place_moving_objects
 from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
 from diff4splat.data_prep.synthetic.camera_rig import rig_views
 from diff4splat.data_prep.synthetic.cameras import LensSpec, camera_batch, sample_path, sample_views
@@ -194,7 +194,7 @@ def _moving(area: StageArea, rng: Rng, is_still: bool) -> list[PlacedObject]:
         area.plan.watched.append((0.0, 0.3 * radius, 0.0, 0.4 * radius))
         return []
     count = rng.weighted_choice((1, 2, 3), (5.0, 4.0, 2.0))
-    return place_movers(area, count, rng.child("act"))
+    return place_moving_objects(area, count, rng.child("act"))
 
 
 def world_identifier(recipe: WorldRecipe, index: int) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Bake:
         from diff4splat.io.scene_files.scene_file import load_scene, save_scene
         from diff4splat.scene.motion.bake import bake, bake_within
 
-        require_inputs_kept((self.scene,), (self.out,))
+        require_inputs_not_overwritten((self.scene,), (self.out,))
         if not self.tolerance_px > 0:
             raise ConfigError(f"--tolerance-px: expected more than 0, got {self.tolerance_px:g}")
         scene = load_scene(self.scene)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Convert:
         from diff4splat.cli.common.console import note
         from diff4splat.io.checkpoints.import_scene import import_scene
 
-        require_inputs_kept((self.scene,), (self.out,))
+        require_inputs_not_overwritten((self.scene,), (self.out,))
         suffix = self.out.suffix.lower()
         if self.time is not None and suffix != ".ply":
             kind = "a scene file" if suffix == SCENE_SUFFIX else "a folder"

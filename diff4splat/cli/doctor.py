@@ -25,7 +25,7 @@ from diff4splat.errors import Diff4SplatError
 
 EXTRAS = (
     ("matplotlib", "plots", "pip install 'diff4splat[plot]'"),
-    ("gsplat", "pictures on a GPU", "pip install 'diff4splat[cuda]'"),
+    ("gsplat", "images on a GPU", "pip install 'diff4splat[cuda]'"),
 )
 """(package, purpose, install command)."""
 _WIDTH = 20

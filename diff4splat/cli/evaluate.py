@@ -28,13 +28,13 @@ class Evaluate:
     out: Path = Path("evaluation")
     """Folder for the results."""
     items: int | None = None
-    """Measure only the first N clips; the table then says that it is a subset."""
+    """Measure only the first N clips; the table is then marked as a subset."""
     features: str | None = None
     """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
     steps: int | None = None
     """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
     fill: Literal["none", "video"] | None = None
-    """What fills hidden regions, as in `generate`. Default: as the model says."""
+    """What fills hidden regions, as in `generate`. Default: that of the model."""
     fresh: bool = False
     """Ignore the results of an earlier run in the same folder."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class CaptureOptions:
     format: str = "auto"
     """dnerf, neu3d, hypernerf, colmap, transforms, clips or cameras; auto detects it."""
     hold_out: tuple[int, ...] | None = None
-    """Cameras to hold out, from 0; if left out, the rule of the format."""
+    """Cameras to hold out, from 0. Default: the rule of the format."""
     downscale: int = 1
     """Downscale images by this factor."""
     frame_step: int = 1
@@ -87,7 +87,7 @@ class Fit:
 
         settings = self.settings()
         outputs = [self.out / name for name in (*RESULT_FILES, CHECKPOINT_FILE)]
-        require_inputs_kept([self.data, *([self.init] if self.init else [])], outputs)
+        require_inputs_not_overwritten([self.data, *([self.init] if self.init else [])], outputs)
         log = RunLog(phases=ConsolePhases())
         capture, initial = self.capture(), self.initial_scene()
         for line in capture.notes:
@@ -112,7 +112,7 @@ class Fit:
         result = fit_scene(request)
         report = FitReport(result=result, capture=capture, settings=settings, inputs=self.inputs())
         scene = write_results(report, self.out, log)
-        for line in result.omissions:
+        for line in result.skipped_work:
             note(f"left out: {line}")
         for line in recovered(result.learned):
             note(line)
@@ -166,12 +166,13 @@ class Fit:
 def recovered(learned: "Mapping[str, Mapping[str, object]]") -> list[str]:
     """One line per learned camera parameter."""
     return [
-        f"{name}: {shown(found['start'])} at the start, {shown(found['recovered'])} recovered"
-        for name, found in learned.items()
+        f"{name}: {format_value(record['start'])} at the start,"
+        f" {format_value(record['recovered'])} recovered"
+        for name, record in learned.items()
     ]
 
 
-def shown(value: "float | list[float]") -> str:
+def format_value(value: "float | list[float]") -> str:
     """One or several numbers with four digits."""
     values = value if isinstance(value, list) else [value]
     return ", ".join(f"{one:.4g}" for one in values)

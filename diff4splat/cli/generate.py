@@ -1,6 +1,6 @@
 """``diff4splat generate``: one photograph, a camera path and optional text to a scene folder.
 
-photograph ─ load_picture ─┐
+photograph ─ load_image ───┐
 --camera ── choose_path ───┼─ Diff4SplatPipeline ─ Scene ─ render_frames ─ write_scene_folder
 --prompt ── require_prompt ┘
 """
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from diff4splat.cli.options.camera import CameraOptions, choose_path
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 
 if TYPE_CHECKING:
     from diff4splat.generation.inputs.input_image import InputImage
@@ -40,20 +40,20 @@ class Generate:
     resolution: int | None = None
     """Image size: the side of a square with the same area, in pixels. Default: the model's."""
     fov: float | None = None
-    """Horizontal field of view in degrees; if left out, from EXIF, else a 30 mm lens."""
+    """Horizontal field of view in degrees. Default: from EXIF, else a 30 mm lens."""
     fill: Literal["none", "video"] | None = None
     """What shows where the image hides: extended layers (none), or what the video model generates
-    (video). If left out, the model decides; small: none."""
+    (video). Default: the model decides; small: none."""
     still: bool = False
-    """Nothing moves, whatever the prompt says."""
+    """Nothing moves, with or without a prompt."""
     steps: int | None = None
-    """Steps of the sampler. If left out, 1 for motion, 8 for video."""
+    """Steps of the sampler. Default: 1 for motion, 8 for video."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
     """ODE solver of the flow. `diff4splat report error-time` compares the solvers."""
     shift: float | None = None
-    """Above 1 spends more steps on noisy levels. If left out, 16 for motion, 1 for video."""
+    """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: float | None = None
-    """Classifier-free guidance weight, 1 is off. If left out, 1 for motion, 5 for video."""
+    """Classifier-free guidance weight, 1 is off. Default: 1 for motion, 5 for video."""
     min_opacity: float = 0.005
     """Gaussians of lower opacity are removed."""
     skip_depth: bool = False
@@ -76,25 +76,27 @@ class Generate:
         from diff4splat.progress.run_log import RunLog
 
         outputs = [self.out / name for name in OUTPUT_FILES]
-        require_inputs_kept((self.image, Path(self.camera)), outputs)
+        require_inputs_not_overwritten((self.image, Path(self.camera)), outputs)
         settings, log = self.settings(), RunLog(phases=ConsolePhases())
-        picture = self.picture()
-        asked = choose_path(self.camera, path_frame(picture.camera), self.options)
-        picture, path = reconcile_intrinsics(picture, asked)
-        note("; ".join((f"focal length: {picture.focal_source}", *picture.notes)))
+        input_image = self.read_image()
+        asked = choose_path(self.camera, path_frame(input_image.camera), self.options)
+        input_image, path = reconcile_intrinsics(input_image, asked)
+        note("; ".join((f"focal length: {input_image.focal_source}", *input_image.notes)))
         for warning in summarize(path, PLANE_DEPTH).warnings:
             note(f"camera path: {warning}")
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
             pipeline = Diff4SplatPipeline.from_pretrained(self.model)
-            scene = pipeline(picture, path, self.prompt, seed=self.seed, settings=settings, log=log)
+            scene = pipeline(
+                input_image, path, self.prompt, seed=self.seed, settings=settings, log=log
+            )
             precompile_renderer(scene.gaussians, log.phases)
             if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
                 note(skipped)
             frames = render_frames(scene, scene.path, log, with_depth=not self.skip_depth)
-            result = Result.of(scene, picture.rgb, frames.rgb[0])
-            facts = describe(result, self.camera, picture.focal_source)
+            result = Result.of(scene, input_image.rgb, frames.rgb[0])
+            facts = describe(result, self.camera, input_image.focal_source)
             write_scene_folder(folder, result, frames, facts, log.phases)
-            inputs = self.inputs(picture, settings, pipeline.model.config.fingerprint())
+            inputs = self.inputs(input_image, settings, pipeline.model.config.fingerprint())
             write_card(folder / "card.json", result, inputs, log)
         for line in (*(f"{name}: {value}" for name, value in facts), f"wrote {self.out}"):
             note(line)
@@ -126,7 +128,7 @@ class Generate:
             **given,
         )
 
-    def picture(self) -> "InputImage":
+    def read_image(self) -> "InputImage":
         """The photograph at the model's size."""
         from diff4splat.generation.inputs.image_size import find_image_size
         from diff4splat.generation.inputs.input_image import load_image
@@ -135,12 +137,12 @@ class Generate:
         return load_image(self.image, side_px, self.fov, self.convert, multiple_px)
 
     def inputs(
-        self, picture: "InputImage", settings: "GenerationSettings", model_fingerprint: str
+        self, input_image: "InputImage", settings: "GenerationSettings", model_fingerprint: str
     ) -> dict[str, object]:
         """Every setting as it was used, for the card."""
         given = {name: value for name, value in asdict(self).items() if name != "options"}
         given |= asdict(self.options) | {"generation": asdict(settings)}
-        given |= {"focal_source": picture.focal_source, "notes": picture.notes}
+        given |= {"focal_source": input_image.focal_source, "notes": input_image.notes}
         given |= {"image_sha256": file_sha256(self.image), "model_fingerprint": model_fingerprint}
         return {
             name: str(value) if isinstance(value, Path) else value for name, value in given.items()

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError
 
 MEGABYTE = 1e6
@@ -57,7 +57,7 @@ class Pack:
             raise ConfigError(
                 f"{self.model}: expected a model folder, got none; `diff4splat train` writes one"
             )
-        require_inputs_kept((self.model,), (self.out,))
+        require_inputs_not_overwritten((self.model,), (self.out,))
         for name, value in (("--license", self.license), ("--origin", self.origin)):
             if not value.strip() or len(value.splitlines()) > 1:
                 raise ConfigError(f"{name}: expected one line of text, got {value!r}")

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.options.camera import CameraOptions, choose_path
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.paths.summary import PathSummary
 
 PREVIEW_SIZE_PX = (360, 640)
-PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+IMAGE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +39,10 @@ class PreviewPath:
         from diff4splat.paths.settings import PathFrame
         from diff4splat.paths.summary import summarize
 
-        require_inputs_kept((Path(self.camera),), (self.out,))
-        if self.out.suffix.lower() not in PICTURE_SUFFIXES:
+        require_inputs_not_overwritten((Path(self.camera),), (self.out,))
+        if self.out.suffix.lower() not in IMAGE_SUFFIXES:
             raise ConfigError(
-                f"--out: expected a name ending in {', '.join(PICTURE_SUFFIXES)}, got {self.out}"
+                f"--out: expected a name ending in {', '.join(IMAGE_SUFFIXES)}, got {self.out}"
             )
         if not 1 <= self.fov <= 170:
             raise ConfigError(f"--fov: expected 1 to 170 degrees, got {self.fov:g}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from diff4splat.cli.options.camera import CameraOptions, choose_path
-from diff4splat.cli.options.guard_overwrite import require_inputs_kept
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.optics import OpticsOptions, require_consistent
 from diff4splat.cli.options.single_frame import select_frame
 from diff4splat.errors import ConfigError
@@ -52,7 +52,7 @@ class Render:
 
         if self.time is not None and not math.isfinite(self.time):
             raise ConfigError(f"--time: expected seconds, got {self.time:g}")
-        require_inputs_kept((self.scene, Path(self.camera or "")), (self.out,))
+        require_inputs_not_overwritten((self.scene, Path(self.camera or "")), (self.out,))
         if self.camera is None and self.options != CameraOptions():
             raise ConfigError("--frames, --fps, --amplitude, --easing: expected with --camera only")
         if self.dataset and self.frame:

@@ -16,7 +16,7 @@ _HOME_TOLERANCE = 1e-6
 """Of the first camera, which should be the identity."""
 
 
-def require_usable(clip: Clip, least_depth_share: float = 0.0) -> None:
+def require_valid_clip(clip: Clip, least_depth_share: float = 0.0) -> None:
     """Refuse a clip that contradicts itself; ``least_depth_share`` of all pixels must have depth.
 
     Raises:
@@ -75,7 +75,7 @@ def _require_times(clip: Clip) -> None:
 def _require_view(clip: Clip, view: View, where: str) -> None:
     if view.cameras.size_px != clip.size_px:
         raise InputError(
-            f"{where}: expected pictures of (height, width) {clip.size_px} like view 0, "
+            f"{where}: expected images of (height, width) {clip.size_px} like view 0, "
             f"got {view.cameras.size_px}"
         )
     shape = (clip.frames, *clip.size_px)

@@ -26,7 +26,7 @@ class Flow:
     """(x, y) in pixels; ``s`` = t − 1. Meaningless where ``known`` is False."""
     known: Bool[Tensor, "s h w"]
     visible: Bool[Tensor, "s h w"]
-    """Still seen in the next frame: inside the picture and not hidden."""
+    """Still seen in the next frame: inside the image and not hidden."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class View:
     flow: Flow | None = None
     track_uv: Float[Tensor, "t n 2"] | None = None
     track_visible: Bool[Tensor, "t n"] | None = None
-    """In front of the camera, inside the picture and not hidden."""
+    """In front of the camera, inside the image and not hidden."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,9 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from diff4splat.data.checks import require_usable
+from diff4splat.data.checks import require_valid_clip
 from diff4splat.data.clip import Clip
-from diff4splat.data.clip_part import WHOLE, ClipPart
+from diff4splat.data.clip_part import FULL_CLIP, ClipPart
 from diff4splat.data.codecs.decode import decode_clip, wanted_members
 from diff4splat.data.entry import ClipEntry
 from diff4splat.data.licenses import commercial_ok
@@ -88,7 +88,7 @@ class ClipFolder:
             and (wanted is None or entry.identifier in wanted)
         )
 
-    def clip(self, position: int, part: ClipPart = WHOLE) -> Clip:
+    def clip(self, position: int, part: ClipPart = FULL_CLIP) -> Clip:
         """Read one clip, or a part of it.
 
         Raises:
@@ -117,7 +117,7 @@ class ClipFolder:
     def _checked(self, clip: Clip) -> Clip:
         if self._verify:
             try:
-                require_usable(clip)
+                require_valid_clip(clip)
             except InputError as error:
                 raise FileFormatError(f"as stored, {error}; write it again") from error
         return clip

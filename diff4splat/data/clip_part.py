@@ -23,7 +23,7 @@ class ClipPart:
     tracks: bool = True
 
 
-WHOLE = ClipPart()
+FULL_CLIP = ClipPart()
 """Everything that is stored."""
 
 

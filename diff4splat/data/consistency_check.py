@@ -60,13 +60,13 @@ class Tolerances:
     share: float = 0.98
     visible_share: float = 0.98
     """Fraction of visible tracks at the depth of the map; lower for structures below a pixel."""
-    judge: Literal["max", "median"] = "max"
+    statistic: Literal["max", "median"] = "max"
     """Statistic of pixel and depth errors that is compared."""
 
 
 EXACT = Tolerances()
 """For synthetic data."""
-MEASURED = Tolerances(pixels=1.0, depth=0.03, share=0.8, visible_share=0.8, judge="median")
+MEASURED = Tolerances(pixels=1.0, depth=0.03, share=0.8, visible_share=0.8, statistic="median")
 """For data whose depth or tracks were measured or estimated."""
 
 
@@ -100,7 +100,7 @@ def require_consistency(clip: Clip, tolerances: Tolerances = EXACT) -> Consisten
         figure = getattr(figures, name)
         if figure is None:
             continue
-        always = {"rotation": "max", "reprojection": "median"}.get(name, tolerances.judge)
+        always = {"rotation": "max", "reprojection": "median"}.get(name, tolerances.statistic)
         low = isinstance(figure, TrueFraction)
         value = figure.share if low else getattr(figure, always)
         if value < limit if low else value > limit:

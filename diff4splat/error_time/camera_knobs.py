@@ -2,7 +2,7 @@
 
 Axes: ``n`` Gaussians, ``h w`` pixels. A seeded cloud turns around an upright axis, now faster, now
 slower, within one frame; its Gaussians turn along. The error is the root mean square difference of
-RGB values in [0, 1] from a converged picture: one chunk per line, many more samples of another
+RGB values in [0, 1] from a converged image: one chunk per line, many more samples of another
 seed, or rays that never stop.
 """
 
@@ -32,7 +32,7 @@ GAUSSIANS = 5_000
 SIZE_PX, SMALL_PX = (120, 160), (60, 80)
 FRAME_S = 1 / 24
 TURN_RAD = 0.25
-"""In one frame: what is at the edge of the picture goes by 20 pixels or so."""
+"""In one frame: what is at the edge of the image goes by 20 pixels or so."""
 MIDDLE_DEPTH = 4.0
 LENS_RADIUS = 0.15
 _ERROR_UNIT = "RMSE of RGB in [0, 1]"
@@ -41,7 +41,7 @@ _CONVERGED, _OTHER_SEED = 1024, 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimeSteps:
-    """How the time of a picture is split: so many lines to a chunk, or by a tolerance."""
+    """How the time of an image is split: so many lines to a chunk, or by a tolerance."""
 
     rows: int | None = None
     tolerance_px: float = 0.1
@@ -74,7 +74,7 @@ def chunk_knob() -> ApproximationSetting:
         ),
         default=TimeSteps(tolerance_px=PhotoSettings().tolerance_px),
         reference=TimeSteps(rows=1),
-        run=rolling_picture,
+        run=rolling_image,
         error=rmse,
         series=lambda steps: steps.kind,
         label=lambda steps: steps.label,
@@ -85,14 +85,14 @@ def chunk_knob() -> ApproximationSetting:
 def aperture_knob() -> ApproximationSetting:
     """How many rays of a pixel start from the lens."""
     return _samples_knob(
-        "aperture-samples", "averaging a few rays over the aperture", LENS_SAMPLES, blurred_picture
+        "aperture-samples", "averaging a few rays over the aperture", LENS_SAMPLES, blurred_image
     )
 
 
 def exposure_knob() -> ApproximationSetting:
     """How many moments of the exposure a pixel sees."""
     return _samples_knob(
-        "exposure-samples", "averaging a few moments", EXPOSURE_SAMPLES, exposed_picture
+        "exposure-samples", "averaging a few moments", EXPOSURE_SAMPLES, exposed_image
     )
 
 
@@ -105,7 +105,7 @@ def trace_light_knob() -> ApproximationSetting:
         settings=tuple(10.0**-power for power in (1, 2, 3, 4, 5, 6, 7)),
         default=TraceSettings().light_cutoff,
         reference=1e-30,
-        run=_layered_picture,
+        run=_layered_image,
         error=rmse,
         label=lambda cutoff: f"{cutoff:g}",
         label_meaning="light at which to stop",
@@ -126,19 +126,19 @@ def _samples_knob(name: str, summary: str, default: int, run) -> ApproximationSe
     )
 
 
-def rolling_picture(steps: TimeSteps) -> Float[Tensor, "h w 3"]:
+def rolling_image(steps: TimeSteps) -> Float[Tensor, "h w 3"]:
     """Read out over the whole frame."""
     settings = PhotoSettings(rows_per_chunk=steps.rows, tolerance_px=steps.tolerance_px)
     return _taken(SIZE_PX, Optics(shutter=Shutter(readout_s=FRAME_S)), settings)
 
 
-def blurred_picture(samples: int) -> Float[Tensor, "h w 3"]:
+def blurred_image(samples: int) -> Float[Tensor, "h w 3"]:
     """A wide aperture, focused in the middle of the cloud."""
     aperture = Aperture(radius=LENS_RADIUS, focus_distance=MIDDLE_DEPTH)
     return _taken(SMALL_PX, Optics(aperture=aperture), _sampled(samples))
 
 
-def exposed_picture(samples: int) -> Float[Tensor, "h w 3"]:
+def exposed_image(samples: int) -> Float[Tensor, "h w 3"]:
     """Open for the whole frame."""
     return _taken(SMALL_PX, Optics(exposure_s=FRAME_S), _sampled(samples))
 
@@ -147,7 +147,7 @@ def _sampled(samples: int) -> PhotoSettings:
     return PhotoSettings(samples=samples, seed=_OTHER_SEED if samples == _CONVERGED else 0)
 
 
-def _layered_picture(light_cutoff: float) -> Float[Tensor, "h w 3"]:
+def _layered_image(light_cutoff: float) -> Float[Tensor, "h w 3"]:
     """Half of it saturated, half haze."""
     settings = PhotoSettings(trace=TraceSettings(light_cutoff=light_cutoff))
     camera = PhysicalCamera(camera=pinhole(float(SIZE_PX[1]), SIZE_PX))

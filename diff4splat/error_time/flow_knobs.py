@@ -1,7 +1,7 @@
 """Knobs of the sampling loop, measured on a flow whose velocity is known exactly.
 
 The field is a mixture of eight Gaussians in 48 dimensions with standard deviations from 0.005 to
-0.5: thin in some directions, like latents of pictures, so that it is stiff near level 0. The error
+0.5: thin in some directions, like latents of images, so that it is stiff near level 0. The error
 is the median over 192 trajectories of |end - end of the reference| / |end of the reference|; the
 mean would be set by the few trajectories that end at another component. Seconds are those of the
 toy field; what carries over to a network is the number of calls, which labels the points.

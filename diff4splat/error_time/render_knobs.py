@@ -5,7 +5,7 @@ them never seen. The right half is faint: haze whose parts are barely above the 
 error is the root mean square difference of RGB values in [0, 1].
 
 What counts as exact is the renderer with the one approximation switched off, except for dilation.
-There it is the picture that a sensor would see: pixels that average over their square, as the mean
+There it is the image that a sensor would see: pixels that average over their square, as the mean
 of 8 × 8 samples without dilation. A pixel's square has a variance of 1/12 px² along both axes, so a
 dilation of that size, with opacities that compensate for it, is what a blur can do at best.
 """
@@ -35,7 +35,7 @@ EXACT_GAUSSIANS = 4_000
 """As many as the reference back end draws in float64 within a tenth of a second."""
 SIZE_PX = (240, 320)
 SAMPLES = 8
-"""Per pixel and axis, where a picture is averaged."""
+"""Per pixel and axis, where an image is averaged."""
 LEAST_CUTOFF = Fraction(1, 1_000_000)
 _DEFAULTS = RenderSettings()
 _DILATIONS_PX2 = (1 / 12, 0.2, 0.3)
@@ -49,7 +49,7 @@ class Dilation:
     variance_px2: float
     compensated: bool = False
     samples: int = 1
-    """Per pixel and axis; the picture is their mean."""
+    """Per pixel and axis; the image is their mean."""
 
     @property
     def kind(self) -> str:
@@ -78,7 +78,7 @@ def tile_knob() -> ApproximationSetting:
     """How many pixels share one list of Gaussians."""
     return ApproximationSetting(
         name="tile-size",
-        summary="cutting the picture into tiles, which should change nothing",
+        summary="cutting the image into tiles, which should change nothing",
         error_unit=_ERROR_UNIT,
         settings=TILE_SIZES_PX,
         default=DEFAULT_TILE_PX,
@@ -135,7 +135,7 @@ def dilation_knob() -> ApproximationSetting:
         settings=(Dilation(variance_px2=0.0), *settings),
         default=Dilation(variance_px2=_DEFAULTS.added_px2, compensated=_DEFAULTS.antialias),
         reference=Dilation(variance_px2=0.0, samples=SAMPLES),
-        run=lambda dilation: averaged_picture(fine_gaussians(GAUSSIANS), dilation),
+        run=lambda dilation: averaged_image(fine_gaussians(GAUSSIANS), dilation),
         error=rmse,
         series=lambda dilation: dilation.kind,
         label=lambda dilation: f"{dilation.variance_px2:.3g}",
@@ -154,7 +154,7 @@ def precision_knob() -> ApproximationSetting:
         settings=settings,
         default=settings[0],
         reference=settings[-1],
-        run=_computed_picture,
+        run=_computed_image,
         error=rmse,
     )
 
@@ -176,7 +176,7 @@ def fine_gaussians(count: int) -> Gaussians:
     return replace(cloud, scales=cloud.scales * shrink.exp())
 
 
-def averaged_picture(gaussians: Gaussians, dilation: Dilation) -> Float[Tensor, "h w 3"]:
+def averaged_image(gaussians: Gaussians, dilation: Dilation) -> Float[Tensor, "h w 3"]:
     """The mean of the samples of each pixel; every contribution counts, so that only these blur."""
     count = dilation.samples
     settings = RenderSettings(
@@ -184,22 +184,22 @@ def averaged_picture(gaussians: Gaussians, dilation: Dilation) -> Float[Tensor, 
         antialias=dilation.compensated,
         alpha_cutoff=float(LEAST_CUTOFF),
     )
-    rgb = _picture(gaussians, settings, samples=count)
+    rgb = _image(gaussians, settings, samples=count)
     return rgb.unflatten(1, (-1, count)).unflatten(0, (-1, count)).mean((1, 3))
 
 
-def _computed_picture(arithmetic: Arithmetic) -> Float[Tensor, "h w 3"]:
+def _computed_image(arithmetic: Arithmetic) -> Float[Tensor, "h w 3"]:
     """Where pixels never stop looking: what the reference back end does in any case."""
     cloud = half_faint_gaussians(EXACT_GAUSSIANS).to(arithmetic.dtype)
     settings = replace(_DEFAULTS, light_cutoff=LEAST_LIGHT)
-    return _picture(cloud, settings, backend=arithmetic.backend).double()
+    return _image(cloud, settings, backend=arithmetic.backend).double()
 
 
 def _half_faint(settings: RenderSettings) -> Float[Tensor, "h w 3"]:
-    return _picture(half_faint_gaussians(GAUSSIANS), settings)
+    return _image(half_faint_gaussians(GAUSSIANS), settings)
 
 
-def _picture(
+def _image(
     gaussians: Gaussians, settings: RenderSettings, samples: int = 1, backend: str = "raster"
 ) -> Float[Tensor, "h w 3"]:
     height, width = (side * samples for side in SIZE_PX)

@@ -2,7 +2,7 @@
 
 Axes: ``n`` Gaussians, ``h w`` pixels. The scene is a cloud in front of one camera whose opacities
 crowd towards 0, as those of pixel-aligned heads do. The error is the root mean square difference
-of RGB values in [0, 1] from the picture of the untouched scene.
+of RGB values in [0, 1] from the image of the untouched scene.
 """
 
 from dataclasses import replace
@@ -31,7 +31,7 @@ def pruning_knob() -> ApproximationSetting:
         settings=(0.0, MIN_OPACITY, 0.01, 0.02, 0.05, 0.1, 0.2),
         default=MIN_OPACITY,
         reference=0.0,
-        run=lambda min_opacity: picture(prune_gaussians(random_gaussians(), min_opacity)),
+        run=lambda min_opacity: image(prune_gaussians(random_gaussians(), min_opacity)),
         error=rmse,
         label=lambda min_opacity: f"{min_opacity:g}",
         label_meaning="smallest opacity kept",
@@ -47,7 +47,7 @@ def harmonics_knob() -> ApproximationSetting:
         settings=tuple(range(len(BAND_SIZES))),
         default=len(BAND_SIZES) - 1,
         reference=len(BAND_SIZES) - 1,
-        run=lambda degree: picture(truncate_harmonics(random_gaussians(), degree)),
+        run=lambda degree: image(truncate_harmonics(random_gaussians(), degree)),
         error=rmse,
         label_meaning="highest degree",
     )
@@ -83,7 +83,7 @@ def truncate_harmonics(gaussians: Gaussians, degree: int) -> Gaussians:
     return replace(gaussians, sh=gaussians.sh[:, : BAND_SIZES[degree]])
 
 
-def picture(gaussians: Gaussians) -> Tensor:
+def image(gaussians: Gaussians) -> Tensor:
     """RGB ``h w 3`` of the knobs' camera."""
     from diff4splat.render.api import render
 

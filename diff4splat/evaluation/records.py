@@ -64,7 +64,7 @@ def score(row: str, key: str, values: Iterable[float]) -> Score | Skip:
     parts = tuple(float(value) for value in values)
     finite = [value for value in parts if math.isfinite(value)]
     if not finite:
-        return Skip(row=row, key=key, why="no picture allows it")
+        return Skip(row=row, key=key, why="no image allows it")
     # Parts keep their index, so that they still belong to their images.
     rounded = tuple(round(value, 6) if math.isfinite(value) else None for value in parts)
     mean = round(math.fsum(finite) / len(finite), 6)

@@ -31,7 +31,7 @@ def comparison_sheet(
         top = _MARGIN_PX + _LABEL_PX + row * row_px
         difference = ((rendering - truth).abs() * DIFFERENCE_GAIN).clamp(0, 1)
         for column, image in enumerate((truth, rendering, difference)):
-            canvas.picture((_column_x(column), top), size, image)
+            canvas.image((_column_x(column), top), size, image)
         canvas.text((_column_x(0), top + size[1] + 4), label, Style(size_px=18))
     return canvas.to_rgb()
 

@@ -61,7 +61,7 @@ def _run_fine_stage(session: FitSession, loop: StageLoop) -> bool:
             continue
         skipped = prune_static(loop.model, session.capture, session.settings, loop.degree)
         if skipped is not None:
-            session.omissions.add(skipped)
+            session.skipped_work.add(skipped)
         loop.gradients.reset(len(loop.model))
         session.save(loop)
     return True
@@ -92,14 +92,14 @@ def _result(session: FitSession, loop: StageLoop, finished: bool) -> FitResult:
         cameras = model.cameras(learning=False)
         held_out, training = _evaluate(session, scene, cameras)
     if (skipped := skipped_static_motion(model)) is not None:
-        session.omissions.add(skipped)
+        session.skipped_work.add(skipped)
     return FitResult(
         gaussians=scene.gaussians,
         motion=scene.motion,
         split=session.split,
         held_out=held_out,
         training=training,
-        omissions=session.omissions,
+        skipped_work=session.skipped_work,
         renderer=session.renderer,
         cameras=cameras if session.settings.camera.learn else None,
         learned=session.optics.report(model.table),

@@ -49,7 +49,7 @@ class FitResult:
     held_out: list[FrameQuality]
     training: list[FrameQuality]
     """Quality on a few training frames."""
-    omissions: SkippedWorkList
+    skipped_work: SkippedWorkList
     renderer: FrameRenderer
     cameras: CameraModel | None
     """Optimised cameras; None if no camera parameter was learned."""

@@ -141,7 +141,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
         "seconds": {name: round(value, 3) for name, value in log.phases.seconds.items()},
         "seconds_fitting": round(result.seconds, 3),
         "peak_memory_bytes": peak_memory_bytes(),
-        "left_out": [*result.omissions.to_json(), *log.skipped.to_json()],
+        "left_out": [*result.skipped_work.to_json(), *log.skipped.to_json()],
         "versions": {name: version(name) for name in LIBRARIES},
         "machine": {
             "python": platform.python_version(),

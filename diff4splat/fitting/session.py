@@ -4,7 +4,7 @@ import time
 
 from torch import Tensor
 
-from diff4splat.data.capture.checks import require_usable_capture
+from diff4splat.data.capture.checks import require_valid_capture
 from diff4splat.data.capture.split import report_split
 from diff4splat.fitting.checkpoint import FitState, save_checkpoint
 from diff4splat.fitting.evaluator import Evaluator
@@ -34,7 +34,7 @@ class FitSession:
             ConfigError: the renderer or the learned camera parameters do not fit the capture.
         """
         self.request, self.settings = request, request.settings
-        self.capture = require_usable_capture(request.capture)
+        self.capture = require_valid_capture(request.capture)
         self.split = report_split(self.capture)
         request.note(f"{self.capture.name} ({self.capture.source}): {self.split}")
         self.renderer = FrameRenderer(
@@ -48,7 +48,7 @@ class FitSession:
         )
         self.evaluator = Evaluator(renderer=self.renderer, store=self.store)
         self.logger = FitLogger(folder=request.folder, note=request.note)
-        self.omissions = SkippedWorkList()
+        self.skipped_work = SkippedWorkList()
         self.fingerprint = fingerprint(self.capture, self.settings, request.init)
         self._start_s = time.perf_counter()
 

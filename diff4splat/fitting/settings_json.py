@@ -26,7 +26,7 @@ def apply_changes(settings: FitSettings, changes: Sequence[str]) -> FitSettings:
         for name in outer:
             target = _group(target, name, key)
         target[last] = _parsed(text.strip())
-    return TypedReader(refusal=ConfigError).read(FitSettings, data, "settings")
+    return TypedReader(error_type=ConfigError).read(FitSettings, data, "settings")
 
 
 def _group(parent: dict[str, Any], name: str, key: str) -> dict[str, Any]:

@@ -56,13 +56,13 @@ class CallCount:
 
     conditional: int = 0
     unconditional: int = 0
-    answers: int = 0
+    total: int = 0
     """Velocities asked for."""
 
     @property
     def saved(self) -> int:
         """Evaluations left out."""
-        return 2 * self.answers - self.conditional - self.unconditional
+        return 2 * self.total - self.conditional - self.unconditional
 
 
 def guided(
@@ -83,7 +83,7 @@ def guided(
         active = guidance.active(level)
         ask_unconditional = active or conditional is None
         ask_conditional = conditional is not None and not (active and guidance.weight == 0)
-        count.answers += 1
+        count.total += 1
         count.conditional += ask_conditional
         count.unconditional += ask_unconditional
         if ask_conditional and ask_unconditional:

@@ -142,8 +142,8 @@ class Diff4SplatPipeline:
         )
         if not request.plan.shows_image:
             return fill.gaussians
-        image, shown_count = self._image_gaussians(request, maps, log)
-        return combine(image, shown_count, fill)
+        image, visible_count = self._image_gaussians(request, maps, log)
+        return combine(image, visible_count, fill)
 
     def _image_gaussians(
         self, request: Request, maps: ImageMaps, log: RunLog
@@ -155,7 +155,7 @@ class Diff4SplatPipeline:
             found = image_gaussians(layered, request.small_path.times_s)
         threshold_px, camera = request.settings.static_threshold_px, request.image.camera
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
-        return replace(found, motion=motion), layered.shown_count
+        return replace(found, motion=motion), layered.visible_count
 
     def _fill_request(
         self, request: Request, maps: ImageMaps, text: Float[Tensor, "1 s d"] | None

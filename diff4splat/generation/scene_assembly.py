@@ -19,14 +19,14 @@ OCCLUSION_MARGIN = 1.05
 """Depth over that of a filled cell up to which a guess would hide it."""
 
 
-def combine(image: GaussianSet, shown_count: int, fill: VideoFill) -> GaussianSet:
+def combine(image: GaussianSet, visible_count: int, fill: VideoFill) -> GaussianSet:
     """The layered image's Gaussians without guesses that hide the fill, then the fill's.
 
-    The first ``shown_count`` Gaussians of ``image`` are shown by the image and stay.
+    The first ``visible_count`` Gaussians of ``image`` are shown by the image and stay.
     """
-    guesses = image.gaussians.means[shown_count:]
+    guesses = image.gaussians.means[visible_count:]
     kept = torch.ones(len(image.gaussians), dtype=torch.bool, device=guesses.device)
-    kept[shown_count:] = ~hides_fill(guesses, fill.grid)
+    kept[visible_count:] = ~hides_fill(guesses, fill.grid)
     first = GaussianSet(
         gaussians=image.gaussians.select(kept),
         motion=image.motion.select(kept),

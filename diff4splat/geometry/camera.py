@@ -21,12 +21,12 @@ FULL_FRAME_DIAGONAL_MM = math.hypot(36.0, 24.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """One pinhole camera, or a batch of cameras that share a picture size."""
+    """One pinhole camera, or a batch of cameras that share an image size."""
 
     focal_px: Float[Tensor, "*b 2"]
     """(f_x, f_y)"""
     center_px: Float[Tensor, "*b 2"]
-    """Principal point (c_x, c_y); the middle of the picture is (width / 2, height / 2)."""
+    """Principal point (c_x, c_y); the middle of the image is (width / 2, height / 2)."""
     world_from_camera: Float[Tensor, "*b 4 4"]
     size_px: tuple[int, int]
     """(height, width)"""
@@ -89,7 +89,7 @@ class Camera:
         )
 
     def resized(self, size_px: tuple[int, int]) -> "Camera":
-        """The same view in a picture of another (height, width)."""
+        """The same view in an image of another (height, width)."""
         factor = self.focal_px.new_tensor(
             [size_px[1] / self.size_px[1], size_px[0] / self.size_px[0]]
         )
@@ -132,7 +132,7 @@ def join_cameras(cameras: Sequence[Camera]) -> Camera:
 def _combined(cameras: Sequence[Camera], combine: Callable[[list[Tensor]], Tensor]) -> Camera:
     sizes = {camera.size_px for camera in cameras}
     if len(sizes) != 1:
-        raise ShapeError(f"cameras: expected one picture size, got {sorted(sizes)}; resize them")
+        raise ShapeError(f"cameras: expected one image size, got {sorted(sizes)}; resize them")
     return Camera(
         focal_px=combine([camera.focal_px for camera in cameras]),
         center_px=combine([camera.center_px for camera in cameras]),

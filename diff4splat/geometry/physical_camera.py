@@ -16,7 +16,7 @@ from diff4splat.geometry.pose_track import PoseTrack
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalCamera:
-    """One camera with its optics; ``track`` says where it is while the picture is taken.
+    """One camera with its optics; ``track`` says where it is while the image is taken.
 
     Raises:
         ShapeError: a batch of cameras.
@@ -34,9 +34,9 @@ class PhysicalCamera:
                 f"PhysicalCamera.camera: expected one camera, got {self.camera.batch_shape}"
             )
 
-    def moves_between(self, first_s: float, last_s: float) -> bool:
+    def is_moving_between(self, first_s: float, last_s: float) -> bool:
         """Whether the camera is in more than one place in an interval of time."""
-        return self.track is not None and not self.track.stands_between(first_s, last_s)
+        return self.track is not None and not self.track.is_static_between(first_s, last_s)
 
     def to(self, target: torch.device | torch.dtype) -> "PhysicalCamera":
         """Move or cast camera and optics; the track stays where it is."""

@@ -39,12 +39,12 @@ class PoseTrack:
             raise InputError("PoseTrack.times_s: expected finite times that increase")
 
     @property
-    def stands(self) -> bool:
+    def is_static(self) -> bool:
         """Whether all poses are the same."""
         poses = self.world_from_camera.detach()
         return bool((poses == poses[0]).all())
 
-    def stands_between(self, first_s: float, last_s: float) -> bool:
+    def is_static_between(self, first_s: float, last_s: float) -> bool:
         """Whether the camera is in one place in the whole of an interval."""
         poses, times_s = self.world_from_camera.detach(), self.times_s.detach()
         first = int((times_s <= first_s).sum()) - 1

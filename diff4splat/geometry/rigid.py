@@ -39,7 +39,7 @@ def look_at(
 ) -> Float[Tensor, "*b 4 4"]:
     """``world_from_camera`` of a camera at ``position`` that sees ``target`` in its centre.
 
-    ``down`` is the world direction that should point down in the picture; it must not be parallel
+    ``down`` is the world direction that should point down in the image; it must not be parallel
     to the viewing direction.
     """
     forward = torch.nn.functional.normalize(target - position, dim=-1)

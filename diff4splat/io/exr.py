@@ -26,7 +26,7 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.io.atomic import atomic_path
 from diff4splat.io.require_file import require_file
 from diff4splat.io.silence_stderr import silence_native_stderr
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 
 _REST = (
     "OpenCV axes (x right, y down, z forward); "
@@ -54,7 +54,7 @@ def write_depth_exr(
 
     Raises:
         InputError: there are no frames.
-        ShapeError: the path has another length or picture size.
+        ShapeError: the path has another length or image size.
         OutputError: the folder cannot be written, or the disk is full.
     """
     file = Path(file)
@@ -187,4 +187,6 @@ def _path(headers: list[dict[str, Any]], size_px: tuple[int, int]) -> CameraPath
         world_from_camera=take("world_from_camera", (4, 4)),
         size_px=(int(size_px[0]), int(size_px[1])),
     )
-    return require_usable(CameraPath(cameras=cameras, times_s=take("time_s", (1,))[:, 0]), "path")
+    return require_valid_path(
+        CameraPath(cameras=cameras, times_s=take("time_s", (1,))[:, 0]), "path"
+    )

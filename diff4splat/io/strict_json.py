@@ -80,7 +80,7 @@ def take_number(source: JsonObject, key: str, where: str) -> float:
     return value
 
 
-def take_whole(source: JsonObject, key: str, where: str, least: int = 0) -> int:
+def take_int(source: JsonObject, key: str, where: str, least: int = 0) -> int:
     """The whole number of at least ``least`` under ``key``."""
     value = source.get(key)
     fine = isinstance(value, int) and not isinstance(value, bool) and least <= value <= _FARTHEST
@@ -92,9 +92,9 @@ def take_whole(source: JsonObject, key: str, where: str, least: int = 0) -> int:
     return value
 
 
-def optional_whole(source: JsonObject, key: str, where: str, least: int = 0) -> int | None:
+def optional_int(source: JsonObject, key: str, where: str, least: int = 0) -> int | None:
     """The whole number under ``key``; None where there is none."""
-    return None if source.get(key) is None else take_whole(source, key, where, least)
+    return None if source.get(key) is None else take_int(source, key, where, least)
 
 
 def take_numbers(source: JsonObject, key: str, count: int, where: str) -> Float[Tensor, " n"]:

@@ -1,6 +1,6 @@
-"""How far a picture is from another one.
+"""How far an image is from another one.
 
-Axes: ``*b`` pictures, ``h w c`` the three axes of a picture in any order. RGB in [0, 1].
+Axes: ``*b`` images, ``h w c`` the three axes of an image in any order. RGB in [0, 1].
 """
 
 import torch
@@ -13,7 +13,7 @@ from diff4splat.errors import ShapeError
 def mse(
     image: Float[Tensor, "*b h w c"], reference: Float[Tensor, "*b h w c"]
 ) -> Float[Tensor, "*b"]:
-    """Mean squared error of each picture, in float32 or better.
+    """Mean squared error of each image, in float32 or better.
 
     Raises:
         ShapeError: the shapes differ, or there is no pixel.
@@ -29,7 +29,7 @@ def mse(
 def psnr(
     image: Float[Tensor, "*b h w c"], reference: Float[Tensor, "*b h w c"]
 ) -> Float[Tensor, "*b"]:
-    """Peak signal-to-noise ratio of each picture in dB, for a peak of 1; inf if identical.
+    """Peak signal-to-noise ratio of each image in dB, for a peak of 1; inf if identical.
 
     Raises:
         ShapeError: the shapes differ, or there is no pixel.

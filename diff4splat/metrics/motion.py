@@ -1,6 +1,6 @@
 """How far a motion is from another one.
 
-Axes: ``*b`` pictures, ``h w`` pixels, 2 for (x, y) in pixels.
+Axes: ``*b`` images, ``h w`` pixels, 2 for (x, y) in pixels.
 """
 
 import torch
@@ -19,7 +19,7 @@ def endpoint_error(
 
     Raises:
         ShapeError: the shapes differ.
-        InputError: a picture has no valid pixel.
+        InputError: an image has no valid pixel.
     """
     if flow.shape != reference.shape:
         raise ShapeError(f"flow: expected {tuple(reference.shape)}, got {tuple(flow.shape)}")
@@ -29,7 +29,7 @@ def endpoint_error(
         raise ShapeError(f"valid: expected {tuple(flow.shape[:-1])}, got {tuple(valid.shape)}")
     count = valid.sum((-2, -1))
     if bool((count == 0).any()):
-        raise InputError("endpoint_error: expected a valid pixel in every picture, got none")
+        raise InputError("endpoint_error: expected a valid pixel in every image, got none")
     # Masked first: what stands in invalid pixels may be NaN.
     apart = torch.where(valid[..., None], flow - reference, 0.0)
     return torch.linalg.vector_norm(apart, dim=-1).sum((-2, -1)) / count

@@ -1,6 +1,6 @@
-"""Perceptual distance of pictures in the layout of renders and files.
+"""Perceptual distance of images in the layout of renders and files.
 
-Axes: ``*b`` pictures, ``h w`` pixels. RGB in [0, 1].
+Axes: ``*b`` images, ``h w`` pixels. RGB in [0, 1].
 """
 
 from jaxtyping import Float
@@ -16,7 +16,7 @@ def perceptual_distance(
     reference: Float[Tensor, "*b h w 3"],
     features: PerceptualFeatures,
 ) -> Float[Tensor, "*b"]:
-    """Distance of each picture under ``features``; say ``features.name`` wherever it is shown.
+    """Distance of each image under ``features``; say ``features.name`` wherever it is shown.
 
     Raises:
         ShapeError: the shapes differ, or there is no pixel.
@@ -26,7 +26,6 @@ def perceptual_distance(
         raise ShapeError(f"image: expected h w 3 with a pixel, got {tuple(image.shape)}")
     batch, size = image.shape[:-3], image.shape[-3:]
     image, reference = (
-        picture.reshape(batch.numel(), *size).movedim(-1, 1)
-        for picture in promote(image, reference)
+        side.reshape(batch.numel(), *size).movedim(-1, 1) for side in promote(image, reference)
     )
     return features.distance(image, reference).reshape(batch)

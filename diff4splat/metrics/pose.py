@@ -25,7 +25,7 @@ PathAlignment = Literal["none", "rigid", "similarity"]
 FLATTEST = 1e-4
 """Spread of positions, as a share of their largest, below which they lie on a line or a point."""
 
-STILL = 1e-9
+MIN_RELATIVE_SPREAD = 1e-9
 """Extent of a path, as a share of its distance from the origin, below which it is rounding."""
 RIGID = 1e-3
 """How far a rotation matrix may be from orthonormal: poses come from rounded text."""
@@ -115,7 +115,9 @@ def align_path(
     if min(_spread(own), _spread(true)) < FLATTEST:
         rotation = _rotation_of((truth[:, :3, :3] @ estimated[:, :3, :3].mT).sum(0))
     scale = 1.0
-    if alignment == "similarity" and float(own.abs().max()) > STILL * float(own_mean.abs().max()):
+    if alignment == "similarity" and float(own.abs().max()) > MIN_RELATIVE_SPREAD * float(
+        own_mean.abs().max()
+    ):
         fitted = float((rotation * covariance).sum() / own.square().sum(-1).mean())
         # A path that goes the opposite way, or nowhere, has no scale at which it fits.
         scale = fitted if fitted > 0 else 1.0

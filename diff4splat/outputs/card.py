@@ -21,7 +21,7 @@ from diff4splat.scene.scene import Scene
 
 LIBRARIES = ("torch", "numpy", "safetensors", "opencv-contrib-python-headless", "OpenEXR", "pillow")
 BEST_PSNR_DB = 200.0
-"""Identical pictures have an infinite PSNR, which JSON cannot hold."""
+"""Identical images have an infinite PSNR, which JSON cannot hold."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Result:
 
 
 def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str, str], ...]:
-    """The few facts that belong beside the picture."""
+    """The few facts that belong beside the image."""
     scene, path = result.scene, result.scene.path
     height, width = path.cameras.size_px
     seconds = float(path.times_s[-1] - path.times_s[0])
@@ -52,7 +52,7 @@ def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str,
         ("Camera", f"{camera}, {len(path)} frames, {seconds:.2g} s"),
         *prompt,
         ("Lens", focal_source),
-        ("Picture", f"{width} by {height} px"),
+        ("Image", f"{width} by {height} px"),
         ("Gaussians", f"{len(scene.gaussians):,}, {moving:,} of them moving"),
         ("First view", f"{result.first_view_psnr_db:.1f} dB against the photograph"),
     )

@@ -14,9 +14,9 @@ from torch import Tensor
 
 from diff4splat.geometry import quaternion
 from diff4splat.io.figures.plots import new_figure, save_figure
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 
-SHOWN_CAMERAS = 7
+MAX_DRAWN_CAMERAS = 7
 """Frustums drawn along the path."""
 SMALLEST_EXTENT = 1e-6
 """Below this the cameras stand in one place and frustums get unit length."""
@@ -32,7 +32,7 @@ class _Sketch:
 
     centers: Float[Tensor, "t 3"]
     frustums: Float[Tensor, "s 4 3"]
-    """Far corners of the shown cameras, in order around the picture."""
+    """Far corners of the shown cameras, in order around the image."""
     apexes: Float[Tensor, "s 3"]
 
     def limits(self, axis: int) -> tuple[float, float]:
@@ -52,7 +52,7 @@ def save_path_preview(path: CameraPath, file: Path, title: str) -> None:
         MissingExtraError: matplotlib is not installed.
         OutputError: the file cannot be written.
     """
-    require_usable(path, "camera path")
+    require_valid_path(path, "camera path")
     figure = new_figure(7.6, 6.4)
     draw(figure, path, title)
     save_figure(figure, file)
@@ -100,7 +100,7 @@ def _sketch(path: CameraPath) -> _Sketch:
     centers = path.cameras.position.double()
     extent = float((centers.amax(0) - centers.amin(0)).max())
     depth = 0.2 * extent if extent > SMALLEST_EXTENT else 1.0
-    shown = torch.linspace(0, len(path) - 1, min(SHOWN_CAMERAS, len(path))).round().long()
+    shown = torch.linspace(0, len(path) - 1, min(MAX_DRAWN_CAMERAS, len(path))).round().long()
     height, width = path.cameras.size_px
     pixels = centers.new_tensor([[0, 0], [width, 0], [width, height], [0, height]])
     focal, middle = path.cameras.focal_px[shown].double(), path.cameras.center_px[shown].double()
@@ -136,7 +136,7 @@ def _draw_view(axes: Any, sketch: _Sketch, view: tuple[str, int, int]) -> None:
 
 
 def _outline(apex: Tensor, corners: Tensor) -> tuple[Tensor, Tensor]:
-    """The picture's border and the four edges that lead to the camera."""
+    """The image's border and the four edges that lead to the camera."""
     border = torch.stack([*corners, corners[0]])
     edges = torch.stack([point for corner in corners for point in (apex, corner)])
     return border, edges

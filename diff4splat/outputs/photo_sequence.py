@@ -32,7 +32,7 @@ class CaptureStats:
     interval_error_px: float = 0.0
     dropped: int = 0
     backends: list[str] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
+    skipped_effects: list[str] = field(default_factory=list)
     valid: Bool[Tensor, "h w"] | None = None
     """Pixels inside the field of view of the lens in every frame."""
 
@@ -44,7 +44,10 @@ class CaptureStats:
         self.dropped = max(self.dropped, photo.dropped_nonfinite)
         valid = photo.valid.cpu()
         self.valid = valid if self.valid is None else self.valid & valid
-        for names, new in ((self.backends, [photo.backend]), (self.left_out, photo.left_out)):
+        for names, new in (
+            (self.backends, [photo.backend]),
+            (self.skipped_effects, photo.skipped_effects),
+        ):
             names.extend(name for name in new if name not in names)
 
     @property
@@ -57,14 +60,14 @@ class CaptureStats:
         if "trace" in self.backends:
             facts = (
                 f"{_counted(self.samples, 'ray')} per pixel; time split into "
-                f"{_counted(self.intervals, 'interval')} per picture, at most "
+                f"{_counted(self.intervals, 'interval')} per image, at most "
                 f"{self.interval_error_px:.2g} px off"
             )
         else:
             facts = "no effect of the camera shows: drawn as a pinhole"
         if self.blind_share > 0:
-            facts += f"; the lens sees nothing in {100 * self.blind_share:.1f} % of the picture"
-        lines = [facts, *(f"left out: {what}" for what in self.left_out)]
+            facts += f"; the lens sees nothing in {100 * self.blind_share:.1f} % of the image"
+        lines = [facts, *(f"left out: {what}" for what in self.skipped_effects)]
         if self.dropped:
             lines.append(f"left out: {self.dropped:,} Gaussians that are not finite or too large")
         return lines

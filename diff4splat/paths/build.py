@@ -12,7 +12,7 @@ import torch
 
 from diff4splat.errors import InputError
 from diff4splat.geometry import rigid
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.easing import ease
 from diff4splat.paths.language import Segment, parse_path
 from diff4splat.paths.moves import Move, fixed_lens
@@ -32,7 +32,7 @@ def build_path(text: str, view: PathFrame, settings: PathSettings) -> CameraPath
     cameras = view.camera.with_pose(move.world_from_camera.to(like))
     cameras = replace(cameras, focal_px=cameras.focal_px * move.focal_factor.to(like)[:, None])
     times_s = torch.arange(settings.frames, dtype=torch.float64) / settings.fps
-    return require_usable(CameraPath(cameras=cameras, times_s=times_s.to(like)), "camera path")
+    return require_valid_path(CameraPath(cameras=cameras, times_s=times_s.to(like)), "camera path")
 
 
 def _require_short_of_near(segments: Sequence[Segment]) -> None:

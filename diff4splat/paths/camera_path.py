@@ -37,7 +37,7 @@ class CameraPath:
         return CameraPath(cameras=self.cameras.to(target), times_s=self.times_s.to(target))
 
 
-def require_usable(path: CameraPath, what: str) -> CameraPath:
+def require_valid_path(path: CameraPath, what: str) -> CameraPath:
     """Return ``path`` when a renderer can follow it.
 
     Raises:

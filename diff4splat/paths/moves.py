@@ -66,7 +66,7 @@ def spiral(progress: Float[Tensor, " t"], extent: float, focus_depth: float) -> 
 
 
 def figure8(progress: Float[Tensor, " t"], extent: float, focus_depth: float) -> Move:
-    """A lying eight of half width ``extent`` in the picture plane, looking at the focus point."""
+    """A lying eight of half width ``extent`` in the image plane, looking at the focus point."""
     angle = 2 * math.pi * progress
     across = extent * angle.sin() / (1 + angle.cos().square())
     return _watching(across, across * angle.cos(), focus_depth)

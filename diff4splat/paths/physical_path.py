@@ -1,4 +1,4 @@
-"""A camera path that is filmed through optics: the camera goes on moving while a picture is taken.
+"""A camera path that is filmed through optics: the camera goes on moving while an image is taken.
 
 Axes: ``t`` frames. Everything is float64, so that what a file holds is exactly what was filmed.
 """

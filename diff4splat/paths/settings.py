@@ -19,7 +19,7 @@ class PathFrame:
     """The view that a path starts from. Its pose is ignored: a path begins at the identity."""
 
     camera: Camera
-    """One camera (no batch); gives intrinsics, picture size and dtype."""
+    """One camera (no batch); gives intrinsics, image size and dtype."""
     near_depth: float
     """z of the nearest content, in scene units; amplitudes are shares of it."""
     focus_depth: float

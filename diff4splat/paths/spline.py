@@ -17,7 +17,7 @@ from torch import Tensor
 
 from diff4splat.errors import InputError
 from diff4splat.geometry import quaternion, rigid
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.settings import require_frames
 
 _SWEEPS = 60
@@ -42,7 +42,7 @@ def interpolate_keyframes(path: CameraPath, times_s: Float[Tensor, " n"]) -> Cam
     Raises:
         InputError: the key frames are not usable, or a requested time is not finite.
     """
-    require_usable(path, "key frames")
+    require_valid_path(path, "key frames")
     if not bool(torch.isfinite(times_s).all()):
         raise InputError("key frames: expected finite times to interpolate at, got NaN or infinity")
     keys = path.cameras.to(torch.float64)
@@ -67,14 +67,14 @@ def resample(path: CameraPath, frames: int, fps: float) -> CameraPath:
         InputError: as ``interpolate_keyframes``, or the frame count or rate makes no film.
     """
     require_frames(frames, fps)
-    require_usable(path, "key frames")
+    require_valid_path(path, "key frames")
     first, last = path.times_s.double()[[0, -1]]
     share = torch.linspace(0, 1, frames, dtype=torch.float64, device=path.times_s.device)
     exact = replace(path, cameras=path.cameras.to(torch.float64), times_s=path.times_s.double())
     between = interpolate_keyframes(exact, torch.lerp(first, last, share))
     times_s = torch.arange(frames, dtype=torch.float64) / fps
     cameras = between.cameras.to(path.cameras.focal_px.dtype)
-    return require_usable(
+    return require_valid_path(
         CameraPath(cameras=cameras, times_s=times_s.to(path.times_s)), "resampled path"
     )
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.geometry import quaternion
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 
 _LARGE_TURN_DEG = 45.0
 """Half the horizontal field of a wide lens: two such frames hardly overlap."""
@@ -41,7 +41,7 @@ class PathSummary:
 
 def summarize(path: CameraPath, near_depth: float | None = None) -> PathSummary:
     """Measure ``path``; with ``near_depth``, also judge its size."""
-    require_usable(path, "camera path")
+    require_valid_path(path, "camera path")
     position = path.cameras.position.double()
     steps = (position[1:] - position[:-1]).norm(dim=-1)
     turns = _turns_deg(path.cameras.world_from_camera[:, :3, :3].double())
@@ -104,5 +104,5 @@ def _size_warning(farthest: float, near_depth: float | None) -> list[str]:
         return []
     return [
         f"the camera goes {farthest / near_depth:.1f} near depths away from where it starts; "
-        "expect to see places that the picture does not show"
+        "expect to see places that the image does not show"
     ]

@@ -1,4 +1,4 @@
-"""Pictures of a scene: any camera, any time, any back end.
+"""Images of a scene: any camera, any time, any back end.
 
 Axes: ``h w`` pixels, ``t`` frames. Times are seconds.
 """
@@ -21,7 +21,7 @@ from diff4splat.render.settings import (
     require_outputs,
     stack_outputs,
 )
-from diff4splat.render.support import usable_gaussians
+from diff4splat.render.support import renderable_gaussians
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
@@ -42,10 +42,10 @@ def render(
     settings: RenderSettings = DEFAULTS,
     backend: str = "auto",
 ) -> RenderOutput:
-    """Pictures named in ``outputs``; the others are not computed.
+    """Images named in ``outputs``; the others are not computed.
 
-    One camera gives one picture of each. A batch of cameras, at one time or one each, gives
-    pictures with a leading axis. Times move scenes, not bare Gaussians, and have no gradient.
+    One camera gives one image of each. A batch of cameras, at one time or one each, gives
+    images with a leading axis. Times move scenes, not bare Gaussians, and have no gradient.
     Cameras take the dtype and device of the Gaussians.
 
     Raises:
@@ -78,7 +78,7 @@ def _job(
     outputs: frozenset[str],
     settings: RenderSettings,
 ) -> RenderJob:
-    """One picture, with both ends of the flow."""
+    """One image, with both ends of the flow."""
     later_s = time_s if settings.flow_time_s is None else settings.flow_time_s
     gaussians = _uniform(_state(subject, time_s))
     later = gaussians
@@ -159,13 +159,13 @@ def _frames(
                 settings, flow_camera=path.cameras[following], flow_time_s=times_s[following]
             )
         if shared is not None:
-            picture = shared(camera, times_s[index])
+            image = shared(camera, times_s[index])
         else:
-            picture = render(
+            image = render(
                 subject, camera, times_s[index], outputs=outputs, settings=own, backend=backend
             )
         advance()
-        yield picture
+        yield image
 
 
 def with_default_dilation(subject: Scene | Gaussians, settings: RenderSettings) -> RenderSettings:
@@ -198,7 +198,7 @@ def _matching(settings: RenderSettings, gaussians: Gaussians) -> RenderSettings:
     finite = torch.isfinite(features)
     if not bool(finite.all()):
         # Gaussians that are left out anyway may have any features.
-        usable, _ = usable_gaussians(gaussians)
+        usable, _ = renderable_gaussians(gaussians)
         if not bool(finite[usable].all()):
             raise InputError("settings.features: expected finite numbers, got NaN or infinity")
         features = torch.where(finite, features, 0.0)

@@ -32,7 +32,7 @@ class Backend(Protocol):
         ...
 
     def render(self, job: RenderJob) -> RenderOutput:
-        """Make the pictures that ``job`` asks for."""
+        """Make the images that ``job`` asks for."""
         ...
 
 

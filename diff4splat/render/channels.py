@@ -37,7 +37,7 @@ def name_outputs(
     median_depth: Float[Tensor, "h w"] | None,
     dropped: dict[str, int],
 ) -> RenderOutput:
-    """The pictures asked for, with the background behind the colours."""
+    """The images asked for, with the background behind the colours."""
     widths = {"rgb": 3, "depth": 2, "flow": 3}
     parts, start = dict.fromkeys((*widths, "features")), 0
     for name, width in widths.items():
@@ -72,7 +72,7 @@ def _over_background(
 def _displacements(
     job: RenderJob, start_px: Float[Tensor, "n 2"], moved: Float[Tensor, "n 3"]
 ) -> Float[Tensor, "n 3"]:
-    """How far means move on the picture, and 1; zeros for those the other view cannot see."""
+    """How far means move on the image, and 1; zeros for those the other view cannot see."""
     finite = torch.isfinite(moved).all(-1, keepdim=True)
     local = camera_space(job.flow_camera, torch.where(finite, moved, 0.0))
     seen = finite & (local[:, 2:] > job.settings.near_depth)

@@ -6,7 +6,7 @@ distance:
 
     α_i = min(α_max, o_i exp(-q_i / 2)), 0 below the cutoff        w_i = α_i Π_{j<i} (1 - α_j)
 
-and the picture is Σ w_i v_i for every channel v. Lists are worked off in pieces that carry the
+and the image is Σ w_i v_i for every channel v. Lists are worked off in pieces that carry the
 light still left, so memory does not grow with their length; with gradients each piece is computed
 again on the way back (torch.utils.checkpoint).
 """
@@ -40,7 +40,7 @@ _LEADING = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Composite:
-    """What a picture is made of before the background."""
+    """What an image is made of before the background."""
 
     blended: Float[Tensor, "h w c"]
     """Sum of weight times channel."""
@@ -105,11 +105,9 @@ def composite(
     parts = regions(plan.boxes, plan.grid, settings.memory_bytes // _BYTES_PER_PAIR)
     # What one region keeps for the way back fits in memory; what several keep need not.
     blend = _blend_region if len(parts) == 1 else _forgetful(_blend_region, plan)
-    picture = _assemble(plan, [blend(plan, part) for part in parts])
-    picture = picture[: size_px[0], : size_px[1]]
-    return Composite(
-        blended=picture[..., :-2], median_depth=picture[..., -2], light=picture[..., -1]
-    )
+    image = _assemble(plan, [blend(plan, part) for part in parts])
+    image = image[: size_px[0], : size_px[1]]
+    return Composite(blended=image[..., :-2], median_depth=image[..., -2], light=image[..., -1])
 
 
 def _forgetful(function: Callable[..., Any], plan: _Plan) -> Callable[..., Any]:
@@ -192,5 +190,5 @@ def _assemble(plan: _Plan, done: list[_Tiles]) -> Float[Tensor, "h w c"]:
     numbers = torch.cat([tiles.numbers for tiles in done])
     rank = torch.arange(1, len(values), device=numbers.device)
     place = numbers.new_zeros(rows * columns).index_copy(0, numbers, rank)
-    picture = values.index_select(0, place).view(rows, columns, edge, edge, -1)
-    return picture.transpose(1, 2).flatten(2, 3).flatten(0, 1)
+    image = values.index_select(0, place).view(rows, columns, edge, edge, -1)
+    return image.transpose(1, 2).flatten(2, 3).flatten(0, 1)

@@ -27,7 +27,7 @@ from diff4splat.render import gsplat_limits, reference
 from diff4splat.render.channels import extra_channels, name_outputs
 from diff4splat.render.projection import camera_space, to_pixels
 from diff4splat.render.settings import RenderJob, RenderOutput
-from diff4splat.render.support import usable_gaussians
+from diff4splat.render.support import renderable_gaussians
 from diff4splat.scene import harmonics
 
 
@@ -46,9 +46,9 @@ def unsupported_reason(job: RenderJob) -> str | None:
 
 
 def render(job: RenderJob) -> RenderOutput:
-    """Make the pictures that ``job`` asks for."""
+    """Make the images that ``job`` asks for."""
     with torch.autocast(job.gaussians.means.device.type, enabled=False):
-        usable, dropped = usable_gaussians(job.gaussians)
+        usable, dropped = renderable_gaussians(job.gaussians)
         if sum(dropped.values()) == len(usable):
             # gsplat divides by the number of Gaussians.
             return reference.render(job)
@@ -96,15 +96,15 @@ def _version_limit(job: RenderJob) -> str | None:
     return None
 
 
-def _select(job: RenderJob, kept: Bool[Tensor, " n"]) -> RenderJob:
+def _select(job: RenderJob, keep: Bool[Tensor, " n"]) -> RenderJob:
     """``job`` for some of the Gaussians."""
     settings = job.settings
     if settings.features is not None:
-        settings = replace(settings, features=settings.features[kept])
+        settings = replace(settings, features=settings.features[keep])
     return replace(
         job,
-        gaussians=job.gaussians.select(kept),
-        flow_gaussians=job.flow_gaussians.select(kept),
+        gaussians=job.gaussians.select(keep),
+        flow_gaussians=job.flow_gaussians.select(keep),
         settings=settings,
     )
 

@@ -9,7 +9,7 @@ from diff4splat.render.projection import camera_space
 from diff4splat.render.settings import RenderJob
 
 DEVICE_TYPE = "cuda"
-MADE = ("rgb", "depth", "alpha", "flow", "features")
+SUPPORTED_OUTPUTS = ("rgb", "depth", "alpha", "flow", "features")
 FIXED = {
     "alpha_cutoff": (1 / 255,),
     "light_cutoff": (1e-4, None),
@@ -34,9 +34,9 @@ def tensor_limit(job: RenderJob) -> str | None:
 
 def output_limit(job: RenderJob) -> str | None:
     """Sums over Gaussians, but no medians."""
-    other = sorted(job.outputs - set(MADE))
+    other = sorted(job.outputs - set(SUPPORTED_OUTPUTS))
     if other:
-        return f"expected outputs among {', '.join(MADE)}, got {', '.join(other)}"
+        return f"expected outputs among {', '.join(SUPPORTED_OUTPUTS)}, got {', '.join(other)}"
     return None
 
 

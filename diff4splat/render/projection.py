@@ -1,9 +1,9 @@
-"""Gaussians on the picture: elliptical weighted averaging (Zwicker et al. 2001; Kerbl et al. 2023).
+"""Gaussians on the image: elliptical weighted averaging (Zwicker et al. 2001; Kerbl et al. 2023).
 
 Axes: ``n`` Gaussians. A Gaussian with covariance Σ = (R S)(R S)ᵀ and camera-space mean (x, y, z)
 has the footprint covariance M Mᵀ + d I with M = J W R S, where W turns world into camera axes, d is
 the dilation and J = diag(f_x, f_y) / z · [1 0 -x/z; 0 1 -y/z]. In J alone, x/z and y/z are held to
-the picture plus 15 % of its size on each side: the linearisation is useless beyond.
+the image plus 15 % of its size on each side: the linearisation is useless beyond.
 
 The covariance is never formed as such. With rows a, b of M its determinant is
 |a × b|² + d (|a|² + |b|²) + d², a sum of positive terms that does not cancel for needles, and the
@@ -22,12 +22,12 @@ from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
 GUARD_BAND = 0.15
-"""How far beyond the picture J follows the mean, in picture sizes: to 1.3 tan(fov / 2)."""
+"""How far beyond the image J follows the mean, in image sizes: to 1.3 tan(fov / 2)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Footprints:
-    """Gaussians as they fall on the picture."""
+    """Gaussians as they fall on the image."""
 
     center_px: Float[Tensor, "n 2"]
     depth: Float[Tensor, " n"]

@@ -24,7 +24,7 @@ def unsupported_reason(job: RenderJob) -> str | None:
 
 
 def render(job: RenderJob) -> RenderOutput:
-    """Make the pictures that ``job`` asks for."""
+    """Make the images that ``job`` asks for."""
     with torch.autocast(job.gaussians.means.device.type, enabled=False):
         order, dropped = visible_order(job.gaussians, job.camera, job.settings)
         visible = job.gaussians.select(order)
@@ -40,9 +40,9 @@ def render(job: RenderJob) -> RenderOutput:
         if "rgb" in job.outputs:
             channels = torch.cat([_colors(job, visible), channels], 1)
         medians = "median_depth" in job.outputs
-        picture = composite(prints, channels, job.camera.size_px, job.settings, medians)
-        median_depth = picture.median_depth if medians else None
-        return name_outputs(job, picture.blended, picture.light, median_depth, dropped)
+        image = composite(prints, channels, job.camera.size_px, job.settings, medians)
+        median_depth = image.median_depth if medians else None
+        return name_outputs(job, image.blended, image.light, median_depth, dropped)
 
 
 def _colors(job: RenderJob, visible: Gaussians) -> Float[Tensor, "n 3"]:

@@ -18,7 +18,7 @@ from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import DILATION_PX2
 
 OUTPUTS = ("rgb", "depth", "median_depth", "alpha", "flow", "features")
-"""Every picture that a renderer can make."""
+"""Every image that a renderer can make."""
 
 _LEAST_MEMORY = 1 << 20
 LEAST_LIGHT = 1e-30
@@ -26,7 +26,7 @@ LEAST_LIGHT = 1e-30
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderSettings:
-    """How a picture is made; defaults as in gsplat, which follows Kerbl et al. 2023."""
+    """How an image is made; defaults as in gsplat, which follows Kerbl et al. 2023."""
 
     background: tuple[float, float, float] | Float[Tensor, "3"] = (0.0, 0.0, 0.0)
     """RGB behind the scene; a tensor gets a gradient."""
@@ -110,7 +110,7 @@ _EXPECTED = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderOutput:
-    """The pictures asked for, None for the others; ``b`` is there for batches of cameras."""
+    """The images asked for, None for the others; ``b`` is there for batches of cameras."""
 
     rgb: Float[Tensor, "*b h w 3"] | None = None
     depth: Float[Tensor, "*b h w"] | None = None
@@ -130,7 +130,7 @@ class RenderOutput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RenderJob:
-    """One picture to make: what every back end gets. Tensors share one dtype and device."""
+    """One image to make: what every back end gets. Tensors share one dtype and device."""
 
     gaussians: Gaussians
     camera: Camera
@@ -157,11 +157,11 @@ def require_outputs(outputs: Collection[str], known: Collection[str] = OUTPUTS) 
 
 
 def stack_outputs(frames: list[RenderOutput]) -> RenderOutput:
-    """Several pictures as one batch.
+    """Several images as one batch.
 
     A Gaussian that is left out of several counts in each of them.
     """
-    pictures = {
+    images = {
         name: torch.stack([getattr(frame, name) for frame in frames])
         for name in OUTPUTS
         if getattr(frames[0], name) is not None
@@ -170,5 +170,5 @@ def stack_outputs(frames: list[RenderOutput]) -> RenderOutput:
     for frame in frames:
         dropped.update(frame.dropped_by_parameter)
     return RenderOutput(
-        **pictures, dropped_nonfinite=dropped.total(), dropped_by_parameter=dict(dropped)
+        **images, dropped_nonfinite=dropped.total(), dropped_by_parameter=dict(dropped)
     )

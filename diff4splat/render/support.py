@@ -24,11 +24,11 @@ _THINNEST_PX = 1e-6
 def visible_order(
     gaussians: Gaussians, camera: Camera, settings: RenderSettings
 ) -> tuple[Int[Tensor, " m"], dict[str, int]]:
-    """Indices of the Gaussians that touch the picture, nearest first, and what was not finite.
+    """Indices of the Gaussians that touch the image, nearest first, and what was not finite.
 
     Equal depths keep the order of their indices.
     """
-    usable, dropped = usable_gaussians(gaussians)
+    usable, dropped = renderable_gaussians(gaussians)
     depth = camera_space(camera, gaussians.means)[:, 2]
     candidate = (
         usable & (depth > settings.near_depth) & (gaussians.opacities >= settings.alpha_cutoff)
@@ -48,7 +48,7 @@ def pixel_boxes(
     """Half-open boxes (left, top, right, bottom) of the pixels that a support may contain.
 
     A shade too large, because the cutoff is decided per pixel: were it decided by the rounding of
-    the box, the picture would depend on the tile size. A support off the picture has an empty box.
+    the box, the image would depend on the tile size. A support off the image has an empty box.
     """
     radius = (2 * (prints.opacities / alpha_cutoff).log().clamp_min(0)).sqrt()
     extent = 1.001 * prints.sigma_px * radius[:, None] + 0.01
@@ -60,7 +60,7 @@ def pixel_boxes(
 
 
 @torch.no_grad()
-def usable_gaussians(gaussians: Gaussians) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
+def renderable_gaussians(gaussians: Gaussians) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
     """Those whose parameters are finite and can be squared, and what was wrong with the others.
 
     The counts go by the first such parameter, so that they add up to the Gaussians left out.

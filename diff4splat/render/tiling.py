@@ -2,7 +2,7 @@
 
 Axes: ``n`` Gaussians in depth order, ``p`` pairs (tile, Gaussian), ``b`` tiles of a batch, ``l``
 list length, ``r c`` rows and columns of tiles. Boxes are half-open (left, top, right, bottom). The
-picture is cut into rectangular regions of tiles with a bounded number of pairs; inside a region
+image is cut into rectangular regions of tiles with a bounded number of pairs; inside a region
 tiles with lists of similar length are padded to one length and handled together. Only integers live
 here, so nothing depends on the order of threads.
 """
@@ -26,13 +26,13 @@ class TileBatch:
     """Tiles whose lists are padded to one length."""
 
     tiles: Int[Tensor, " b"]
-    """Row-major numbers of the tiles in the picture."""
+    """Row-major numbers of the tiles in the image."""
     members: Int[Tensor, "b l"]
     """The Gaussians of each tile, nearest first, then padding with the number n."""
 
 
 def grid_size(size_px: tuple[int, int], tile_px: int) -> tuple[int, int]:
-    """(rows, columns) of the tiles that cover a picture."""
+    """(rows, columns) of the tiles that cover an image."""
     return -(-size_px[0] // tile_px), -(-size_px[1] // tile_px)
 
 
@@ -53,7 +53,7 @@ def batches(
 ) -> list[TileBatch]:
     """The lists of a region; ``batch_pairs`` bounds b · l unless one list alone is longer.
 
-    ``columns`` is the number of tiles in a row of the picture. Empty tiles are left out.
+    ``columns`` is the number of tiles in a row of the image. Empty tiles are left out.
     """
     pair_tile, pair_member = _pairs(boxes, region, columns)
     pair_tile, order = pair_tile.sort(stable=True)

@@ -118,7 +118,7 @@ def prune(scene: Scene, min_opacity: float = MIN_OPACITY) -> Scene:
     return scene.select(scene.gaussians.opacities >= min_opacity)
 
 
-def static_if_still(
+def simplify_motion(
     scene: Scene,
     *,
     offset: float = 0.0,

@@ -55,9 +55,9 @@ class Scene:
         """The Gaussians as they stand at ``time_s`` seconds."""
         return self.motion.state_at(self.gaussians, time_s)
 
-    def select(self, kept: Bool[Tensor, " n"]) -> "Scene":
+    def select(self, keep: Bool[Tensor, " n"]) -> "Scene":
         """The scene with only the Gaussians under a mask."""
-        return replace(self, gaussians=self.gaussians.select(kept), motion=self.motion.select(kept))
+        return replace(self, gaussians=self.gaussians.select(keep), motion=self.motion.select(keep))
 
     def to(self, target: torch.device | torch.dtype) -> "Scene":
         """Move or cast Gaussians and motion; the suggested path stays where it is."""

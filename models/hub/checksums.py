@@ -33,7 +33,7 @@ def write_sums(folder: Path) -> None:
     write_text(folder / SUMS_FILE, "".join(lines))
 
 
-def require_whole(folder: Path, advice: str, names: Collection[str] | None = None) -> None:
+def require_complete(folder: Path, advice: str, names: Collection[str] | None = None) -> None:
     """Compare every file with the list; ``advice`` is how to get the folder again.
 
     With ``names`` only those files are compared; names of files that do not exist and that the

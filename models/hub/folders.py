@@ -10,7 +10,7 @@ from pathlib import Path
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import SIZES, size_by_name
 from diff4splat.models.hub.bundled_weights import bundled_folder
-from diff4splat.models.hub.checksums import SUMS_FILE, require_whole
+from diff4splat.models.hub.checksums import SUMS_FILE, require_complete
 from diff4splat.models.hub.provenance import PROVENANCE_FILE, ModelProvenance, read_provenance
 from diff4splat.models.hub.weights import CONFIG_FILE, load_config, weight_file
 
@@ -26,12 +26,12 @@ def checked_folder(name_or_folder: str | Path, names: Collection[str] | None = N
     folder = Path(name_or_folder)
     bundled = None if _is_folder(folder) else bundled_folder(str(name_or_folder))
     if bundled is not None:
-        require_whole(bundled, _advice(bundled), names)
+        require_complete(bundled, _advice(bundled), names)
         return bundled
     if not _is_folder(folder):
         return None
     if (folder / SUMS_FILE).is_file():
-        require_whole(folder, _advice(folder), names)
+        require_complete(folder, _advice(folder), names)
     return folder
 
 
@@ -43,7 +43,7 @@ def require_parts(folder: Path, parts: Collection[str]) -> None:
     """
     if (folder / SUMS_FILE).is_file():
         names = {weight_file(folder, part).name for part in parts}
-        require_whole(folder, _advice(folder), names)
+        require_complete(folder, _advice(folder), names)
 
 
 def find_config(name_or_folder: str | Path) -> ModelConfig:

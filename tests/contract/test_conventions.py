@@ -247,12 +247,12 @@ def test_precision() -> None:
 
 @pytest.fixture(scope="module")
 def generated() -> Scene:
-    """An untrained scene of a smooth picture along a two-second path."""
+    """An untrained scene of a smooth image along a two-second path."""
     y, x = torch.meshgrid(torch.linspace(0, 6, 32), torch.linspace(0, 6, 32), indexing="ij")
     rgb = torch.stack([x.sin(), y.cos(), (x + y).sin()], -1) * 0.4 + 0.5
-    picture = InputImage(rgb=rgb, camera=pinhole(30.0, (32, 32)), focal_source="test")
+    image = InputImage(rgb=rgb, camera=pinhole(30.0, (32, 32)), focal_source="test")
     pipeline = Diff4SplatPipeline.from_pretrained("test")
-    return pipeline(picture, "right", settings=GenerationSettings(steps=1))
+    return pipeline(image, "right", settings=GenerationSettings(steps=1))
 
 
 def test_first_camera(generated: Scene) -> None:
@@ -261,9 +261,9 @@ def test_first_camera(generated: Scene) -> None:
     foreign = generated.path.cameras.world_from_camera[:3] @ elsewhere
     cameras = generated.path.cameras[:3].with_pose(elsewhere @ foreign)
     path = CameraPath(cameras=cameras, times_s=torch.arange(3.0))
-    picture = InputImage(rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="")
+    image = InputImage(rgb=torch.rand(32, 32, 3), camera=pinhole(30.0, (32, 32)), focal_source="")
     pipeline = Diff4SplatPipeline.from_pretrained("test")
-    scene = pipeline(picture, path, settings=GenerationSettings(steps=1))
+    scene = pipeline(image, path, settings=GenerationSettings(steps=1))
     torch.testing.assert_close(scene.path.cameras.world_from_camera[0], torch.eye(4))
 
 

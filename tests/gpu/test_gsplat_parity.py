@@ -58,17 +58,17 @@ def assert_finite_gradients(view: View, settings: RenderSettings) -> None:
     [{}, {"antialias": True}, {"dilation_px2": 0.0}, {"dilation_px2": 2.0, "near_depth": 2.0}],
     ids=str,
 )
-def test_pictures(name: str, changes: dict, record_property: Callable[[str, object], None]) -> None:
+def test_images(name: str, changes: dict, record_property: Callable[[str, object], None]) -> None:
     view = scene(name)
     got, want = both(view, settings_for(view, **changes))
     record_property("boundary_pixels", oracles.strays(got, want))
     record_property("pixels_left_early", int(oracles.left_early(want).sum()))
-    oracles.assert_same_pictures(got, want)
+    oracles.assert_same_images(got, want)
     assert oracles.strays(got, want) <= MOST_STRAYS * want.alpha.numel()
 
 
 @pytest.mark.parametrize("outputs", [("rgb",), ("depth",), ("alpha",), ("rgb", "depth"), ("flow",)])
-def test_each_picture_is_the_same_alone_and_in_company(outputs: tuple[str, ...]) -> None:
+def test_each_image_is_the_same_alone_and_in_company(outputs: tuple[str, ...]) -> None:
     view = scene("random")
     alone = render(*view, outputs=outputs, settings=settings_for(view), backend="gsplat")
     together = render(*view, outputs=MADE, settings=settings_for(view), backend="gsplat")
@@ -91,7 +91,7 @@ def test_gradients(name: str, antialias: bool, outputs: tuple[str, ...]) -> None
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extremes(name: str) -> None:
     view = on(DEVICE, EXTREMES[name])
-    oracles.assert_same_pictures(*both(view, settings_for(view)))
+    oracles.assert_same_images(*both(view, settings_for(view)))
     assert_finite_gradients(view, settings_for(view))
 
 
@@ -100,7 +100,7 @@ def test_extremes(name: str) -> None:
 def test_few_gaussians_and_pixels(count: int, size_px: tuple[int, int]) -> None:
     gaussians, camera = random_view()
     view = on(DEVICE, (gaussians.select(torch.arange(count)), camera.resized(size_px)))
-    oracles.assert_same_pictures(*both(view, settings_for(view)))
+    oracles.assert_same_images(*both(view, settings_for(view)))
     assert_finite_gradients(view, settings_for(view))
 
 
@@ -114,7 +114,7 @@ def test_what_is_not_finite_is_counted_and_left_out(name: str, value: float) -> 
     view = on(DEVICE, (replace(gaussians, **{name: changed}), camera))
     got, want = both(view, settings)
     assert got.dropped_nonfinite == 2
-    oracles.assert_same_pictures(got, want)
+    oracles.assert_same_images(got, want)
     assert_finite_gradients(view, settings)
 
 
@@ -128,7 +128,7 @@ def test_a_pixel_left_early_misses_no_more_than_the_light_left_over() -> None:
     assert bool((difference <= 1 - got.alpha + 1e-3).all())
 
 
-def test_far_from_the_origin_the_picture_is_the_same() -> None:
+def test_far_from_the_origin_the_image_is_the_same() -> None:
     gaussians, camera = scene("random")
     gaussians = replace(gaussians, means=(gaussians.means * 16).round() / 16)
     near, far = camera.world_from_camera.clone(), camera.world_from_camera.clone()

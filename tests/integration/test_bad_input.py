@@ -338,7 +338,7 @@ def test_names_that_are_not_text(
     assert_refused(generate(photo, tmp_path / "o\udcff"), capsys, "UTF-8")
 
 
-def test_nothing_left_to_show_and_a_preview_that_is_no_picture(
+def test_nothing_left_to_show_and_a_preview_that_is_no_image(
     photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     assert_refused(generate(photo, tmp_path / "out", "--min-opacity", "1"), capsys, "leaves some")

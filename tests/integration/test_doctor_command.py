@@ -197,7 +197,7 @@ def test_an_extra_that_is_missing_comes_with_its_pip_line(
             ("diff4splat.no_such_module",),
             "expected every library to load, got No module named 'diff4splat.no_such_module'",
         ),
-        ("TOLERANCE", 0.0, "expected the picture of float64 within 0"),
+        ("TOLERANCE", 0.0, "expected the image of float64 within 0"),
     ],
 )
 def test_what_is_broken_ends_in_one_line(

@@ -1,4 +1,4 @@
-"""``diff4splat fit`` and ``bake``, from a folder of pictures to key frames."""
+"""``diff4splat fit`` and ``bake``, from a folder of images to key frames."""
 
 import json
 from pathlib import Path
@@ -48,8 +48,8 @@ def test_a_folder_becomes_a_scene_with_a_card(
     assert card["finished"] and card["held_out"]["frames"] == 3
     assert card["scene"]["moving_gaussians"] == len(scene.motion.moving_index)
     assert card["capture"]["format"].startswith("nerfstudio")
-    with Image.open(out / "comparison.png") as picture:
-        assert picture.size[0] > 1000
+    with Image.open(out / "comparison.png") as image:
+        assert image.size[0] > 1000
     assert (out / "video.mp4").stat().st_size > 0
     assert run(["render", str(out / "scene.safetensors"), "--out", str(tmp_path / "v.png")]) == 0
 

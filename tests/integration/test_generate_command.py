@@ -23,7 +23,7 @@ FILES = {"scene.safetensors", "video.mp4", "depth.exr", "preview.png", "card.jso
 
 @pytest.fixture(scope="module")
 def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A smooth colourful picture of 3:2."""
+    """A smooth colourful image of 3:2."""
     y, x = torch.meshgrid(torch.linspace(0, 6, 80), torch.linspace(0, 9, 120), indexing="ij")
     rgb = torch.stack([x.sin(), (x + y).cos(), (y * 2).sin()], -1) * 0.4 + 0.5
     file = tmp_path_factory.mktemp("photo") / "photo.png"
@@ -107,11 +107,11 @@ def test_a_ply_that_viewers_show_softer_is_said_to_be(
 
 def test_render_needs_nothing_but_the_scene_file(folder: Path, tmp_path: Path) -> None:
     scene_file = str(folder / "scene.safetensors")
-    picture = tmp_path / "view.png"
-    assert run(["render", scene_file, "--out", str(picture)]) == 0
+    image = tmp_path / "view.png"
+    assert run(["render", scene_file, "--out", str(image)]) == 0
     scene = load_scene(Path(scene_file))
     expected = render(scene, scene.path.cameras[0]).rgb.clamp(0, 1)
-    assert float(psnr(read_photo(picture).rgb, expected)) >= 50
+    assert float(psnr(read_photo(image).rgb, expected)) >= 50
     video = tmp_path / "view.mp4"
     options = ["--camera", "orbit:0.1", "--frames", "3", "--time", "0.05", "--resolution", "40"]
     assert run(["render", scene_file, "--out", str(video), *options]) == 0

@@ -21,7 +21,7 @@ ASKED_FOR = {
 }
 
 
-def assert_picture(file: Path) -> None:
+def assert_image(file: Path) -> None:
     with Image.open(file) as image:
         assert min(image.size) > 300
         assert len(set(image.convert("L").resize((64, 64)).tobytes())) > 10
@@ -30,7 +30,7 @@ def assert_picture(file: Path) -> None:
 @pytest.mark.parametrize("camera", ["spiral", "orbit:0.25+up:0.1", "dolly-zoom"])
 def test_preview_draws_presets(camera: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert run(["paths", "preview", camera, "--out", str(tmp_path / "p.png")]) == 0
-    assert_picture(tmp_path / "p.png")
+    assert_image(tmp_path / "p.png")
     assert "focal length" in capsys.readouterr().out
 
 
@@ -41,7 +41,7 @@ def test_preview_and_generate_follow_every_file_format(name: str, tmp_path: Path
     file = tmp_path / name
     write_path(path, file)
     assert run(["paths", "preview", str(file), "--out", str(tmp_path / "p.png")]) == 0
-    assert_picture(tmp_path / "p.png")
+    assert_image(tmp_path / "p.png")
     Image.radial_gradient("L").convert("RGB").resize((48, 32)).save(tmp_path / "photo.png")
     arguments = ["generate", str(tmp_path / "photo.png"), "--model", "test", "--steps", "1"]
     assert run([*arguments, "--camera", str(file), "--out", str(tmp_path / "out")]) == 0
@@ -66,7 +66,7 @@ def test_error_time_writes_a_table_and_a_plot(
     out = tmp_path / "report"
     arguments = ["report", "error-time", "--knob", "pruning", "--repeats", "1"]
     assert run([*arguments, "--out", str(out)]) == 0
-    assert_picture(out / "error-time-pruning.png")
+    assert_image(out / "error-time-pruning.png")
     assert "pruning" in (out / "error-time.md").read_text()
     assert json.loads((out / "error-time.json").read_text())
     assert run(["report", "error-time", "--knob", "magic", "--out", str(out)]) == 2

@@ -47,7 +47,7 @@ TARGET_FRAMES = 4
 
 @pytest.fixture(autouse=True)
 def one_thread() -> Iterator[None]:
-    """Pictures this small are not worth waking a second thread for: it costs several times more."""
+    """Images this small are not worth waking a second thread for: it costs several times more."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

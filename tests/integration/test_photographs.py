@@ -1,6 +1,6 @@
-"""Real photographs: the first view is the photograph, and the picture moves as geometry says.
+"""Real photographs: the first view is the photograph, and the image moves as geometry says.
 
-The picture's motion is measured on the rendered frames alone (dense optical flow, OpenCV DIS) and
+The image's motion is measured on the rendered frames alone (dense optical flow, OpenCV DIS) and
 compared with the motion that the predicted depth and the two poses imply.
 """
 
@@ -31,17 +31,17 @@ def photograph(name: str, side_px: int) -> InputImage:
     return prepare_image(rgb, focal, side_px)
 
 
-def scene_of(picture: InputImage, camera: str) -> Scene:
+def scene_of(image: InputImage, camera: str) -> Scene:
     pipeline = Diff4SplatPipeline.from_pretrained("test")
-    return pipeline(picture, camera, settings=GenerationSettings(steps=1))
+    return pipeline(image, camera, settings=GenerationSettings(steps=1))
 
 
 @pytest.mark.parametrize("side_px", SIDES_PX)
 @pytest.mark.parametrize("name", PHOTOGRAPHS)
 def test_the_first_view_reproduces_the_photograph(name: str, side_px: int) -> None:
-    picture = photograph(name, side_px)
-    first = render(scene_of(picture, "static"), picture.camera).rgb.clamp(0, 1)
-    assert float(psnr(first, picture.rgb)) >= 28
+    image = photograph(name, side_px)
+    first = render(scene_of(image, "static"), image.camera).rgb.clamp(0, 1)
+    assert float(psnr(first, image.rgb)) >= 28
 
 
 def grey(rgb: torch.Tensor) -> np.ndarray:
@@ -65,11 +65,11 @@ def measured_flow(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
 
 @pytest.mark.parametrize("camera", ["left:0.05", "up:0.05", "forward:0.08", "roll:0.008"])
 @pytest.mark.parametrize("name", PHOTOGRAPHS)
-def test_a_small_move_of_the_camera_moves_the_picture_as_geometry_says(
+def test_a_small_move_of_the_camera_moves_the_image_as_geometry_says(
     name: str, camera: str
 ) -> None:
-    picture = photograph(name, 128)
-    scene = scene_of(picture, camera)
+    image = photograph(name, 128)
+    scene = scene_of(image, camera)
     start, stop = scene.path.cameras[0], scene.path.cameras[-1]
     first = render(scene, start, outputs=("rgb", "depth"))
     points = unproject(start, first.depth)
@@ -85,8 +85,8 @@ def test_a_small_move_of_the_camera_moves_the_picture_as_geometry_says(
 def test_the_rendered_flow_is_the_flow_of_the_rendered_depth(name: str) -> None:
     from diff4splat.render.settings import RenderSettings
 
-    picture = photograph(name, 128)
-    scene = scene_of(picture, "arc:0.1")
+    image = photograph(name, 128)
+    scene = scene_of(image, "arc:0.1")
     start, stop = scene.path.cameras[0], scene.path.cameras[12]
     settings = RenderSettings(flow_camera=stop)
     first = render(scene, start, outputs=("depth", "flow"), settings=settings)

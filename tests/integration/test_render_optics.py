@@ -53,7 +53,7 @@ def test_a_camera_without_effects_gives_the_same_bytes_as_none(
     )
 
 
-def test_a_picture_is_what_the_library_takes(
+def test_an_image_is_what_the_library_takes(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     flags = ["--lens", "fisheye", "--fov", "120", "--aperture-radius", "0.1", "--samples", "4"]
@@ -89,8 +89,8 @@ def test_time_stops_the_scene_but_not_the_camera(
     assert render(scene_file, tmp_path / "camera.png", *blur, "--time", "0.1") == 0
     assert "16 rays per pixel" in said(capsys)
     assert render(scene_file, tmp_path / "still.png", "--time", "0.1", "--frame", "1") == 0
-    pictures = {file.read_bytes() for file in tmp_path.glob("*.png")}
-    assert len(pictures) == 3
+    images = {file.read_bytes() for file in tmp_path.glob("*.png")}
+    assert len(images) == 3
 
 
 def test_a_camera_that_stands_needs_no_rays_for_its_shutter(

@@ -36,8 +36,8 @@ def test_worlds_are_drawn_checked_and_learnt_from(
     out = tmp_path / "clips"
     assert run(["prepare", "synth", "--out", str(out), "--clips", "2", *DRAWN]) == 0
     assert "wrote 2 clips" in capsys.readouterr().err
-    with Image.open(out / "clips.png") as picture:
-        assert picture.size == (2 * (64 + 4), 32 + 4)
+    with Image.open(out / "clips.png") as image:
+        assert image.size == (2 * (64 + 4), 32 + 4)
     again = ["prepare", "synth", "--out", str(out), "--clips", "3", *DRAWN]
     assert run(again) == 2
     assert "append to it" in refusal(capsys)

@@ -26,7 +26,7 @@ def assert_pose(capture: Capture, index: int, camera: Seer) -> None:
 
 
 def assert_sees(capture: Capture, index: int, camera: Seer, time: float) -> None:
-    """The projected point lies in the one red pixel of the picture, and where ``camera`` has it."""
+    """The projected point lies in the one red pixel of the image, and where ``camera`` has it."""
     column, row = projected(capture, index, time)
     np.testing.assert_allclose((column, row), camera.straight_px(point_at(time)), atol=1e-6)
     rgb = capture.frames.read(index).rgb

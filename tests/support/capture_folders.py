@@ -1,6 +1,6 @@
 """Captures written byte by byte in the layouts of others, without any code under test.
 
-One bright point moves before standing or moving cameras; each picture shows it as one pixel (or a
+One bright point moves before standing or moving cameras; each image shows it as one pixel (or a
 blob), where the cameras' own formula puts it. Axes: OpenCV, world and cameras.
 """
 
@@ -30,7 +30,7 @@ class Seer:
     tangential: tuple[float, float] = (0.0, 0.0)
 
     def straight_px(self, point: np.ndarray) -> tuple[float, float]:
-        """(x, y) in the picture of a pinhole camera."""
+        """(x, y) in the image of a pinhole camera."""
         x, y = self._direction(point)
         return self.focal_px[0] * x + self.center_px[0], self.focal_px[1] * y + self.center_px[1]
 
@@ -88,12 +88,12 @@ def point_at(time: float) -> np.ndarray:
     return np.array([0.5 * np.cos(3 * time), 0.2 - 0.3 * time, 0.4 * np.sin(2 * time)])
 
 
-def pixel_picture(camera: Seer, time: float, level: int = 255) -> np.ndarray:
+def pixel_image(camera: Seer, time: float, level: int = 255) -> np.ndarray:
     """``h w 3``, uint8 RGB: grey, and the red pixel that holds the point."""
-    picture = np.full((*camera.size_px, 3), GREY, np.uint8)
+    image = np.full((*camera.size_px, 3), GREY, np.uint8)
     column, row = (int(np.floor(value)) for value in camera.seen_px(point_at(time)))
-    picture[row, column] = (level, 0, 0)
-    return picture
+    image[row, column] = (level, 0, 0)
+    return image
 
 
 def side_point_at(time: float) -> np.ndarray:
@@ -101,7 +101,7 @@ def side_point_at(time: float) -> np.ndarray:
     return 0.4 * point_at(time) + np.array([1.0, -0.6, 0.0])
 
 
-def blob_picture(camera: Seer, time: float, sigma_px: float = 1.3) -> np.ndarray:
+def blob_image(camera: Seer, time: float, sigma_px: float = 1.3) -> np.ndarray:
     """``h w 3``, uint8 RGB: a round blob on black, exact at pixel centres."""
     height, width = camera.size_px
     column, row = camera.seen_px(side_point_at(time))
@@ -110,7 +110,7 @@ def blob_picture(camera: Seer, time: float, sigma_px: float = 1.3) -> np.ndarray
     return np.round(255 * np.stack([bright, bright, bright], -1)).astype(np.uint8)
 
 
-def write_picture(file: Path, rgb: np.ndarray) -> None:
+def write_image(file: Path, rgb: np.ndarray) -> None:
     """PNG or JPEG by name; RGB or RGBA."""
     file.parent.mkdir(parents=True, exist_ok=True)
     order = cv2.COLOR_RGBA2BGRA if rgb.shape[2] == 4 else cv2.COLOR_RGB2BGR
@@ -144,11 +144,11 @@ def write_dnerf(
     for split in splits:
         frames = []
         for index, (camera, time) in enumerate(dnerf_cameras(split)):
-            rgb = pixel_picture(camera, time)
+            rgb = pixel_image(camera, time)
             if alpha:
                 solid = (rgb[..., :1] == 255).astype(np.uint8)
                 rgb = np.concatenate([rgb * solid, solid * 255], -1)
-            write_picture(folder / split / f"r_{index:03d}.png", rgb)
+            write_image(folder / split / f"r_{index:03d}.png", rgb)
             frames.append(
                 {
                     "file_path": f"./{split}/r_{index:03d}",
@@ -168,7 +168,7 @@ def rig_cameras(count: int = 4, **lens: object) -> list[Seer]:
 
 
 def llff_rows(cameras: list[Seer], full: int = 2) -> np.ndarray:
-    """``poses_bounds.npy`` for pictures ``full`` times as large."""
+    """``poses_bounds.npy`` for images ``full`` times as large."""
     rows = []
     for camera in cameras:
         height, width = (side * full for side in camera.size_px)
@@ -179,29 +179,29 @@ def llff_rows(cameras: list[Seer], full: int = 2) -> np.ndarray:
 
 
 def write_neu3d(folder: Path, frames: int = 3, count: int = 4) -> list[Seer]:
-    """Neural 3D Video as extracted pictures of half the size; returns the cameras."""
+    """Neural 3D Video as extracted images of half the size; returns the cameras."""
     cameras = rig_cameras(count, focal_px=(31.0, 31.0), center_px=(18.0, 12.0))
     for number, camera in enumerate(cameras):
         for frame in range(frames):
-            picture = pixel_picture(camera, frame / 30)
-            write_picture(folder / f"cam{number:02d}" / "images" / f"{frame:04d}.png", picture)
+            image = pixel_image(camera, frame / 30)
+            write_image(folder / f"cam{number:02d}" / "images" / f"{frame:04d}.png", image)
     np.save(folder / "poses_bounds.npy", llff_rows(cameras))
     return cameras
 
 
-def write_video(file: Path, pictures: list[np.ndarray], fps: float) -> None:
+def write_video(file: Path, images: list[np.ndarray], fps: float) -> None:
     """An mp4 of few colours' loss."""
-    height, width, _ = pictures[0].shape
+    height, width, _ = images[0].shape
     file.parent.mkdir(parents=True, exist_ok=True)
     stream = cv2.VideoWriter(str(file), cv2.VideoWriter_fourcc(*"mp4v"), fps, (width, height))
     assert stream.isOpened()
-    for picture in pictures:
-        stream.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    for image in images:
+        stream.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     stream.release()
 
 
 def nerfies_camera_json(camera: Seer, full: int = 2, center: object = 0.0, scale: float = 1.0):
-    """For pictures ``full`` times as large, in a world before centre and scale were applied."""
+    """For images ``full`` times as large, in a world before centre and scale were applied."""
     return {
         "orientation": camera.rows().tolist(),
         "position": (camera.position / scale + np.asarray(center)).tolist(),
@@ -219,9 +219,9 @@ NERFIES_CENTER, NERFIES_SCALE = (1.5, -2.0, 3.0), 0.25
 
 
 def write_hypernerf(
-    folder: Path, count: int = 8, validation: bool = True, draw: object = pixel_picture, **lens
+    folder: Path, count: int = 8, validation: bool = True, draw: object = pixel_image, **lens
 ) -> list[Seer]:
-    """Two cameras side by side that move along; pictures at 2x; returns left, right, left, ..."""
+    """Two cameras side by side that move along; images at 2x; returns left, right, left, ..."""
     cameras, ids, metadata = [], [], {}
     for index in range(2 * count):
         warp, side = divmod(index, 2)
@@ -231,7 +231,7 @@ def write_hypernerf(
             folder / "camera" / f"{name}.json",
             nerfies_camera_json(camera, 2, NERFIES_CENTER, NERFIES_SCALE),
         )
-        write_picture(folder / "rgb" / "2x" / f"{name}.png", draw(camera, warp / 15))
+        write_image(folder / "rgb" / "2x" / f"{name}.png", draw(camera, warp / 15))
         metadata[name] = {"warp_id": warp, "appearance_id": warp, "camera_id": side}
         cameras.append(camera)
         ids.append(name)
@@ -256,14 +256,14 @@ def write_hypernerf(
 
 
 def write_transforms(
-    folder: Path, count: int = 16, draw: object = pixel_picture, **lens: object
+    folder: Path, count: int = 16, draw: object = pixel_image, **lens: object
 ) -> list[Seer]:
-    """nerfstudio, one camera that moves, a picture every tenth of a second."""
+    """nerfstudio, one camera that moves, an image every tenth of a second."""
     cameras = [seer(0.06 * index, **lens) for index in range(count)]
     frames = []
     for index, camera in enumerate(cameras):
         name = f"images/frame_{index + 1:05d}.png"
-        write_picture(folder / name, draw(camera, index / 10))
+        write_image(folder / name, draw(camera, index / 10))
         frames.append({"file_path": name, "transform_matrix": camera.opengl(), "time": index / 10})
     first = cameras[0]
     write_json(

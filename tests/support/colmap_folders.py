@@ -4,7 +4,7 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from capture_folders import Seer, pixel_picture, point_at, rig_cameras, seer, write_picture
+from capture_folders import Seer, pixel_image, point_at, rig_cameras, seer, write_image
 
 MODELS = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4}
 
@@ -80,7 +80,7 @@ def write_rig(
     for number, camera in enumerate(cameras, start=1):
         for frame in range(frames):
             file = folder / f"cam{number:02d}" / f"frame_{frame + 1:05d}.png"
-            write_picture(file, pixel_picture(camera, frame / 30))
+            write_image(file, pixel_image(camera, frame / 30))
     named = [(f"image{number}.jpg", camera) for number, camera in enumerate(cameras, start=1)]
     # COLMAP does not keep any order.
     (write_text if text else write_binary)(folder / sparse, named[::-1], cloud())
@@ -88,10 +88,10 @@ def write_rig(
 
 
 def write_moving(folder: Path, count: int = 12, text: bool = False) -> list[Seer]:
-    """One camera that moves, whose fourth picture has no pose; returns all cameras."""
+    """One camera that moves, whose fourth image has no pose; returns all cameras."""
     cameras = [seer(0.08 * index) for index in range(count)]
     for index, camera in enumerate(cameras):
-        write_picture(folder / "images" / f"frame_{index}.png", pixel_picture(camera, index / 30))
+        write_image(folder / "images" / f"frame_{index}.png", pixel_image(camera, index / 30))
     named = [(f"frame_{index}.png", camera) for index, camera in enumerate(cameras) if index != 3]
     (write_text if text else write_binary)(folder / "sparse" / "0", named, cloud())
     return cameras

@@ -73,7 +73,7 @@ def rasterization(  # noqa: PLR0917
     rolling_shutter: object = None,
     viewmats_rs: Tensor | None = None,
 ) -> tuple[Tensor, Tensor, dict]:
-    """The picture of one camera; names, order and defaults of the parameters are gsplat's."""
+    """The image of one camera; names, order and defaults of the parameters are gsplat's."""
     _check_shapes(means=means, quats=quats, scales=scales, opacities=opacities)
     assert (viewmats.shape, Ks.shape) == ((1, 4, 4), (1, 3, 3))
     assert render_mode in ("RGB", "D", "ED", "RGB+D", "RGB+ED")
@@ -93,11 +93,11 @@ def rasterization(  # noqa: PLR0917
     index = index[nearest]
     channels = _channels(colors[index], means[index], view, sh_degree)
     channels, behind = _with_depth(channels, backgrounds, local[index, 2:], render_mode)
-    picture, alpha = weights @ channels + light[:, None] * behind, 1 - light[:, None]
+    image, alpha = weights @ channels + light[:, None] * behind, 1 - light[:, None]
     if "ED" in render_mode:
-        depth = picture[:, -1:] / alpha.clamp(min=1e-10)
-        picture = torch.cat([picture[:, :-1], depth], 1)
-    return picture.view(1, height, width, -1), alpha.view(1, height, width, 1), {}
+        depth = image[:, -1:] / alpha.clamp(min=1e-10)
+        image = torch.cat([image[:, :-1], depth], 1)
+    return image.view(1, height, width, -1), alpha.view(1, height, width, 1), {}
 
 
 def _check_shapes(**tensors: Tensor) -> None:
@@ -136,7 +136,7 @@ def _covariances(quats: Tensor, scales: Tensor, view: Tensor) -> Tensor:
 
 
 def _project(local: Tensor, covariances: Tensor, k: Tensor, size: tuple) -> tuple[Tensor, Tensor]:
-    """``persp_proj``: centres (n, 2) and covariances (n, 2, 2) on the picture."""
+    """``persp_proj``: centres (n, 2) and covariances (n, 2, 2) on the image."""
     z, tangents, entries = local[:, 2], [], []
     for axis in (0, 1):
         focal, center = k[axis, axis], k[axis, 2]
@@ -162,7 +162,7 @@ def _blur(covariances: Tensor, eps2d: float) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def _touches(centers: Tensor, blurred: Tensor, opacities: Tensor, size: tuple) -> Tensor:
-    """Whether the box around the support meets the picture."""
+    """Whether the box around the support meets the image."""
     extent = (2 * (opacities / ALPHA_THRESHOLD).log()).clamp_min(0).sqrt().clamp(max=3.33)
     reach = (extent[:, None] * blurred[:, [0, 2]].sqrt()).ceil()
     inside = (centers + reach > 0) & (centers - reach < centers.new_tensor(size)) & (reach > 0)

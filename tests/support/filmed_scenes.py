@@ -66,6 +66,6 @@ def going_right(frames: int, size_px: tuple[int, int], focal: float) -> CameraPa
 
 
 def png_rgb(file: Path) -> torch.Tensor:
-    """A picture of any size, RGB in [0, 1]."""
+    """An image of any size, RGB in [0, 1]."""
     with Image.open(file) as image:
         return torch.from_numpy(np.asarray(image.convert("RGB")).astype(np.float32) / 255)

@@ -14,7 +14,7 @@ class Chunk:
     """Neighbouring lines that are seen as if they were read at one time."""
 
     lines: range
-    """In the order of the picture."""
+    """In the order of the image."""
     share: float
     """The mean of their shares of the read-out."""
 

@@ -15,7 +15,7 @@ from diff4splat.geometry.camera import Camera, pinhole
 
 
 def seen_by_loops(case: EvalSample) -> np.ndarray:
-    """(picture, row, column), from the definition alone."""
+    """(image, row, column), from the definition alone."""
     clip = case.clip
     masks = []
     for view, frame in case.targets.pairs:

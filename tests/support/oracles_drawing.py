@@ -249,5 +249,5 @@ def project(camera: Camera, frame: int, points: np.ndarray) -> tuple[np.ndarray,
 
 
 def looking_down() -> torch.Tensor:
-    """The rotation of a camera that looks straight down; the picture's top is world +z."""
+    """The rotation of a camera that looks straight down; the image's top is world +z."""
     return torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], dtype=torch.float64)

@@ -97,7 +97,7 @@ def view_cameras(view: int) -> Camera:
 
 
 def filmed(scene: Scene, identifier: str = "filmed", still: bool = False) -> Clip:
-    """A clip whose pictures, depth and tracks are what ``scene`` shows."""
+    """A clip whose images, depth and tracks are what ``scene`` shows."""
     times_s = torch.linspace(0, LAST_S, FRAMES, dtype=torch.float64)
     states = [scene.state_at(float(time_s)).means.double() for time_s in times_s]
     index = torch.cat([torch.arange(0, len(states[0]), 17), scene.motion.moving_index]).unique()

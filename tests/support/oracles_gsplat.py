@@ -93,7 +93,7 @@ def on(device: str, view: View) -> View:
 
 
 def everything(view: View) -> RenderSettings:
-    """Settings that make every picture possible, on a coloured background."""
+    """Settings that make every image possible, on a coloured background."""
     gaussians, camera = view
     pose = camera.world_from_camera.clone()
     pose[:3, 3] += pose.new_tensor([0.1, -0.05, 0.2])
@@ -112,7 +112,7 @@ def both(view: View, settings: RenderSettings, outputs=MADE) -> tuple[RenderOutp
 
 
 def decibels(actual: Tensor, wanted: Tensor) -> float:
-    """Peak signal to noise; equal pictures are 300 dB apart from noise."""
+    """Peak signal to noise; equal images are 300 dB apart from noise."""
     peak = max(1.0, float(wanted.abs().max())) if wanted.numel() else 1.0
     error = float((actual - wanted).double().square().mean()) if wanted.numel() else 0.0
     return 10 * math.log10(peak**2 / max(error, 1e-30 * peak**2))
@@ -128,10 +128,10 @@ def strays(got: RenderOutput, want: RenderOutput) -> int:
     return int((((got.alpha - want.alpha).abs() > 1e-3) & ~left_early(want)).sum())
 
 
-def assert_same_pictures(
+def assert_same_images(
     got: RenderOutput, want: RenderOutput, least: float = LEAST_DECIBELS
 ) -> None:
-    """All pixels of every picture; averages where there is enough to average over."""
+    """All pixels of every image; averages where there is enough to average over."""
     assert got.dropped_nonfinite == want.dropped_nonfinite
     assert got.dropped_by_parameter == want.dropped_by_parameter
     solid = torch.minimum(got.alpha, want.alpha) > LEAST_ALPHA
@@ -168,13 +168,13 @@ def gradients(
 
 
 def _weighed(made: RenderOutput, outputs: tuple[str, ...]) -> Tensor:
-    """A loss that asks something else of every pixel of every picture."""
+    """A loss that asks something else of every pixel of every image."""
     solid, total = made.alpha.detach() > LEAST_ALPHA, made.alpha.new_zeros(())
     for name in outputs:
-        picture = getattr(made, name)
+        image = getattr(made, name)
         generator = torch.Generator().manual_seed(MADE.index(name))
-        weights = torch.randn(picture.shape, generator=generator).to(picture)
-        total = total + (weights * picture)[solid].sum() / solid.numel()
+        weights = torch.randn(image.shape, generator=generator).to(image)
+        total = total + (weights * image)[solid].sum() / solid.numel()
     return total
 
 

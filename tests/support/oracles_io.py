@@ -1,4 +1,4 @@
-"""Small scenes, pictures and an independent PLY reader for the tests of files.
+"""Small scenes, images and an independent PLY reader for the tests of files.
 
 The committed scene file is made again, after a deliberate change of the format, by:
     PYTHONPATH=tests/support python -c "import oracles_io; oracles_io.write_golden()"
@@ -91,7 +91,7 @@ def write_golden() -> None:
 
 
 def photograph(width: int = 24, height: int = 20) -> Image.Image:
-    """A picture whose four corners differ, so that every turn of it can be told."""
+    """An image whose four corners differ, so that every turn of it can be told."""
     image = Image.new("RGB", (width, height))
     image.putdata(
         [(10 * x % 256, 12 * y % 256, (x * y) % 256) for y in range(height) for x in range(width)]

@@ -38,14 +38,14 @@ def alexnet_features() -> nn.Sequential:
 
 
 def lpips(features: nn.Sequential, taps, heads, image: Tensor, reference: Tensor) -> list[float]:
-    """LPIPS 0.1 of ``n 3 h w`` pictures in [0, 1], one pair and one slice after the other."""
+    """LPIPS 0.1 of ``n 3 h w`` images in [0, 1], one pair and one slice after the other."""
     shift = torch.tensor([-0.030, -0.088, -0.188]).double()[:, None, None]
     scale = torch.tensor([0.458, 0.448, 0.450]).double()[:, None, None]
     distances = []
     for pair in zip(image, reference, strict=True):
         found = []
-        for picture in pair:
-            state = ((picture.double() * 2 - 1) - shift) / scale
+        for side in pair:
+            state = ((side.double() * 2 - 1) - shift) / scale
             outputs = []
             for index, layer in enumerate(features[: taps[-1] + 1].double()):
                 state = layer(state)
@@ -62,7 +62,7 @@ def lpips(features: nn.Sequential, taps, heads, image: Tensor, reference: Tensor
 
 
 def gradient_pyramid(image: np.ndarray, reference: np.ndarray) -> float:
-    """The stand-in's distance of two ``3 h w`` pictures, from its module's formulas."""
+    """The stand-in's distance of two ``3 h w`` images, from its module's formulas."""
     opponent = np.array([[1 / 3, 1 / 3, 1 / 3], [0.5, -0.5, 0], [0.25, 0.25, -0.5]])
     window = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]) / 256
 
@@ -81,7 +81,7 @@ def gradient_pyramid(image: np.ndarray, reference: np.ndarray) -> float:
                 found.append(np.sqrt(energy + 0.02**2) - 0.02)
         return found
 
-    pair = [[np.tensordot(row, picture, 1) for row in opponent] for picture in (image, reference)]
+    pair = [[np.tensordot(row, side, 1) for row in opponent] for side in (image, reference)]
     structures = []
     while True:
         one, other = strengths(pair[0]), strengths(pair[1])
@@ -90,13 +90,13 @@ def gradient_pyramid(image: np.ndarray, reference: np.ndarray) -> float:
         structures.append((apart / contrast).mean())
         if len(structures) == 4 or min(pair[0][0].shape) < 6:
             break
-        pair = [[halved(plane) for plane in picture] for picture in pair]
+        pair = [[halved(plane) for plane in side] for side in pair]
     rest = np.mean([(a - b) ** 2 for a, b in zip(*pair, strict=True)])
     return float(np.mean(structures) + rest)
 
 
 def ssim(image: np.ndarray, reference: np.ndarray) -> float:
-    """Of two ``h w 3`` pictures, window by window."""
+    """Of two ``h w 3`` images, window by window."""
     ticks = np.arange(-5, 6)
     line = np.exp(-0.5 * (ticks / 1.5) ** 2)
     window = np.outer(line, line) / line.sum() ** 2

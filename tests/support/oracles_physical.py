@@ -123,15 +123,15 @@ def camera_of(
 
 @dataclass
 class Spot:
-    """Mass, centre and covariance of a picture, in pixels (x, y)."""
+    """Mass, centre and covariance of an image, in pixels (x, y)."""
 
     mass: float
     center: np.ndarray
     covariance: np.ndarray
 
 
-def spot(picture: Tensor) -> Spot:
-    weights = picture.detach().double().numpy()
+def spot(image: Tensor) -> Spot:
+    weights = image.detach().double().numpy()
     rows, columns = np.indices(weights.shape) + 0.5
     mass = weights.sum()
     center = np.array([(weights * columns).sum(), (weights * rows).sum()]) / mass
@@ -140,9 +140,9 @@ def spot(picture: Tensor) -> Spot:
     return Spot(mass, center, covariance)
 
 
-def row_centers(picture: Tensor) -> np.ndarray:
+def row_centers(image: Tensor) -> np.ndarray:
     """Centre of mass of every row, x in pixels."""
-    weights = picture.detach().double().numpy()
+    weights = image.detach().double().numpy()
     columns = np.arange(weights.shape[1]) + 0.5
     return (weights * columns).sum(1) / weights.sum(1)
 

@@ -1,4 +1,4 @@
-"""Pictures and gradients in float64, from the formula, by one dense table of Gaussians × pixels.
+"""Images and gradients in float64, from the formula, by one dense table of Gaussians × pixels.
 
 No tiles, lists or blocks; footprints through a Cholesky factor, gradients by autograd. Unlike the
 reference renderer it stops where the light runs out. ``unsure`` pixels hang on rounding: a
@@ -41,7 +41,7 @@ class Dense:
 
     @property
     def unsure_share(self) -> float:
-        """Part of the picture that cannot be compared."""
+        """Part of the image that cannot be compared."""
         return float(self.unsure.double().mean())
 
 
@@ -252,7 +252,7 @@ def cloud(count: int, seed: int = 0, bands: int = 1, spread_px: float = 3.0) -> 
 
 
 def wide_camera(size_px: tuple[int, int] = (67, 91), dtype: torch.dtype = torch.float32) -> Camera:
-    """A picture of several tiles of any size, with the principal point off its middle."""
+    """An image of several tiles of any size, with the principal point off its middle."""
     camera = pinhole(60.0, size_px, dtype)
     shift = camera.center_px.new_tensor([4.3, -2.6])
     return replace(

@@ -1,4 +1,4 @@
-"""Pictures of Gaussians pixel by pixel in float64, from the formula, and scenes to try it on.
+"""Images of Gaussians pixel by pixel in float64, from the formula, and scenes to try it on.
 
 No tiles, no support, no whitening: every Gaussian is asked at every pixel, with the inverse of its
 covariance. ``doubtful`` marks pixels where a decision (cutoff, half the light) hangs on rounding.
@@ -20,7 +20,7 @@ BAND = 1e-3
 
 @dataclass
 class Oracle:
-    """Pictures, and where not to look."""
+    """Images, and where not to look."""
 
     rgb: np.ndarray
     alpha: np.ndarray
@@ -58,7 +58,7 @@ def color(sh: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def brute_force(gaussians: Gaussians, camera: Camera, settings: RenderSettings) -> Oracle:
-    """The picture by two nested loops."""
+    """The image by two nested loops."""
     arrays = [
         getattr(gaussians, name).detach().numpy().astype(np.float64)
         for name in ("means", "quats", "scales", "opacities", "sh")
@@ -112,7 +112,7 @@ def assert_close_to_oracle(
 
 
 def random_gaussians(count: int, seed: int = 0, bands: int = 4, dtype=torch.float64) -> Gaussians:
-    """A cloud in front of the camera at the origin, some of it off the picture."""
+    """A cloud in front of the camera at the origin, some of it off the image."""
     generator = torch.Generator().manual_seed(seed)
 
     def uniform(*shape: int, low: float = 0.0, high: float = 1.0) -> Tensor:

@@ -163,7 +163,7 @@ def bundle(count: int = 50, seed: int = 1, dtype=torch.float64, times: bool = Fa
     )
 
 
-def picture(
+def image(
     size_px: tuple[int, int], focal_px: float, dtype=torch.float64, spread: float = 0.0
 ) -> Rays:
     """Rays of a pinhole at the origin that looks along z, row by row; or of a small lens."""

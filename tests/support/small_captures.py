@@ -1,4 +1,4 @@
-"""Captures made of numbers alone, for what asks nothing of pictures."""
+"""Captures made of numbers alone, for what asks nothing of images."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from diff4splat.geometry.camera import Camera
 
 
 class GreyFrames:
-    """Grey pictures, with depth where asked for."""
+    """Grey images, with depth where asked for."""
 
     def __init__(self, count: int, depth: bool = False) -> None:
         self._count, self._depth = count, depth

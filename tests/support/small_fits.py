@@ -1,6 +1,6 @@
 """Captures small enough to fit in seconds: a coloured ball that moves among a few that stand.
 
-Pictures come from the float64 reference renderer, so that truth does not depend on the fast one.
+Images come from the float64 reference renderer, so that truth does not depend on the fast one.
 """
 
 import json
@@ -23,7 +23,7 @@ SIDE_PX = 24
 
 
 @dataclass(kw_only=True)
-class Pictures:
+class Images:
     """Frames in memory."""
 
     shown: list[Frame]
@@ -85,7 +85,7 @@ def ball_capture(
         times_s=torch.tensor(times_s).double(),
         camera_index=camera_index,
         held_out=torch.isin(camera_index, torch.tensor(held, dtype=torch.long)),
-        frames=Pictures(shown=shown),
+        frames=Images(shown=shown),
         points=cloud(),
         background=(0.0, 0.0, 0.0),
     )

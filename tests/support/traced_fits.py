@@ -6,7 +6,7 @@ The ball and its speed are given to the fit, so that what is left to find is the
 from dataclasses import replace
 
 import torch
-from small_fits import Pictures, ring
+from small_fits import Images, ring
 
 from diff4splat.data.capture.capture import Capture, Frame, PointCloud
 from diff4splat.geometry.camera import Camera, stack_cameras
@@ -84,7 +84,7 @@ def photographed(
         times_s=torch.tensor(at_s).double(),
         camera_index=torch.tensor(index),
         held_out=torch.tensor(index) == views - 1,
-        frames=Pictures(shown=shown),
+        frames=Images(shown=shown),
         optics=optics,
         points=PointCloud(positions=near, rgb=torch.full((COUNT, 3), 0.5)),
         background=(0.0, 0.0, 0.0),
@@ -92,5 +92,5 @@ def photographed(
 
 
 def said(capture: Capture, optics: Optics | None) -> Capture:
-    """The same pictures, with something else said of the cameras."""
+    """The same images, with something else said of the cameras."""
     return replace(capture, optics=optics)

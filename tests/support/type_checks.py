@@ -9,6 +9,6 @@ def check_types(function: Callable) -> Callable:
     """Beartype, except for functions defined inside functions.
 
     Every call of the outer function defines those again, and beartype then compiles a wrapper
-    again: this took longer than the picture that the renderer drew.
+    again: this took longer than the image that the renderer drew.
     """
     return function if "<locals>" in function.__qualname__ else beartype(function)

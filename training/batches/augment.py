@@ -1,7 +1,7 @@
 """The same clip seen otherwise: from its other cameras, mirrored, backwards, through a window.
 
 Axes: ``f`` frames, ``h w`` pixels, ``n`` points. Everything stays exact: cameras, depth and tracks
-follow the pictures. A mirrored world is the world under x → −x; poses are conjugated by that
+follow the images. A mirrored world is the world under x → −x; poses are conjugated by that
 mirror, so that cameras stay right-handed. Captions are not rewritten: "left" would be wrong in a
 mirrored clip, so only stages without text may ask for it.
 """
@@ -22,7 +22,7 @@ def augmented(clip: Clip, settings: DataSettings, generator: torch.Generator) ->
     """What the settings ask for, drawn from ``generator``; the first camera is the identity.
 
     Raises:
-        InputError: the window is larger than the pictures.
+        InputError: the window is larger than the images.
     """
     if settings.augment:
         first, mirror, backwards = torch.rand(3, generator=generator).tolist()
@@ -42,7 +42,7 @@ def led_by(clip: Clip, view: int) -> Clip:
 
 
 def mirrored(clip: Clip) -> Clip:
-    """Left and right exchanged, in space and in pictures."""
+    """Left and right exchanged, in space and in images."""
     tracks = clip.tracks
     if tracks is not None:
         flip = tracks.positions.new_tensor([-1.0, 1.0, 1.0])
@@ -64,12 +64,12 @@ def cropped(clip: Clip, size_px: tuple[int, int], generator: torch.Generator) ->
     """One random window of (height, width) for all frames and views.
 
     Raises:
-        InputError: the pictures are smaller.
+        InputError: the images are smaller.
     """
     room = [whole - part for whole, part in zip(clip.size_px, size_px, strict=True)]
     if min(room) < 0:
         raise InputError(
-            f"clip {clip.note.identifier}: expected pictures of at least "
+            f"clip {clip.note.identifier}: expected images of at least "
             f"{size_px[0]}×{size_px[1]}, got {clip.size_px[0]}×{clip.size_px[1]}; lower crop_px"
         )
     top, left = (int(torch.randint(space + 1, (), generator=generator)) for space in room)

@@ -17,7 +17,7 @@ from diff4splat.models.ldrm.refinement.posed_video import camera_frames
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClipBatch:
-    """The input video with its cameras, pictures to be rendered, and points that move."""
+    """The input video with its cameras, images to be rendered, and points that move."""
 
     sample_index: Int[Tensor, " b"]
     source: tuple[str, ...]

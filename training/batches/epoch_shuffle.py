@@ -13,11 +13,11 @@ from diff4splat.training.trainer.loading.samples import EVALUATION_START
 
 VALIDATION_EVERY = 16
 """One clip in so many is kept back for evaluation."""
-Places = dict[tuple[str, bool], list[int]]
+IndicesByMotion = dict[tuple[str, bool], list[int]]
 """Positions by kind, still or moving, and by whether evaluation owns them."""
 
 
-def split_by_motion(is_static: Sequence[bool], versions: int = 1) -> Places:
+def split_by_motion(is_static: Sequence[bool], versions: int = 1) -> IndicesByMotion:
     """Positions of still and of moving clips, each with its last ones for evaluation.
 
     So many ``versions`` of one clip, one after another, stay together.
@@ -40,7 +40,7 @@ class ShuffledIndices:
     still_share: float
     seed: int
 
-    def place(self, index: int, places: Places) -> int:
+    def place(self, index: int, places: IndicesByMotion) -> int:
         """The position of a sample."""
         judged = index >= EVALUATION_START
         draw = torch.rand((), generator=SampleKey(self.seed, "kind", index, "still").generator())

@@ -1,4 +1,4 @@
-"""A clip at another picture size.
+"""A clip at another image size.
 
 Axes: ``f`` frames, ``h w`` pixels before, ``h2 w2`` after.
 """
@@ -18,14 +18,14 @@ def resized(clip: Clip, size_px: tuple[int, int]) -> Clip:
     """The clip at another (height, width): colour by area, depth and masks by nearest pixel.
 
     Raises:
-        InputError: the shape of the picture would change by more than a tenth.
+        InputError: the shape of the image would change by more than a tenth.
     """
     if clip.size_px == size_px:
         return clip
     (height, width), (new_height, new_width) = clip.size_px, size_px
     if not 0.9 < (width / height) / (new_width / new_height) < 1.1:
         raise InputError(
-            f"clip {clip.note.identifier}: expected pictures of the shape "
+            f"clip {clip.note.identifier}: expected images of the shape "
             f"{new_height}×{new_width}, got {height}×{width}; prepare the clips at that shape"
         )
     return replace(clip, views=tuple(_resized_view(view, size_px) for view in clip.views))

@@ -59,8 +59,8 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         video=view.rgb[None, shown],
         cameras=stack_cameras([view.cameras[shown]]).to(torch.float32),
         depth=view.depth[None, shown][:, :: settings.keyframe_stride].float(),
-        target_rgb=_pictures(clip, targets, "rgb")[None],
-        target_depth=_pictures(clip, targets, "depth").float()[None],
+        target_rgb=_images(clip, targets, "rgb")[None],
+        target_depth=_images(clip, targets, "depth").float()[None],
         target_cameras=stack_cameras([_target_cameras(clip, targets)]).to(torch.float32),
         target_time=_fractions(clip, targets, generator)[None],
         track_cell=tracks.cell[None],
@@ -93,8 +93,8 @@ def _require_views(clip: Clip, views: int) -> None:
         )
 
 
-def _pictures(clip: Clip, targets: Targets, name: str) -> Tensor:
-    """One kind of picture at every target, with axes ``m p`` in front."""
+def _images(clip: Clip, targets: Targets, name: str) -> Tensor:
+    """One kind of image at every target, with axes ``m p`` in front."""
     rows = [
         torch.stack([getattr(clip.views[view], name)[frame] for view in views])
         for frame, views in targets.pairs()

@@ -15,7 +15,11 @@ from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import FPS, WorldRecipe, make_world
 from diff4splat.errors import InputError
-from diff4splat.training.batches.epoch_shuffle import Places, ShuffledIndices, split_by_motion
+from diff4splat.training.batches.epoch_shuffle import (
+    IndicesByMotion,
+    ShuffledIndices,
+    split_by_motion,
+)
 from diff4splat.training.recipe.data import DataSettings, SourceSettings
 
 
@@ -76,7 +80,7 @@ class FolderClips:
         return self.clips.clip(position, part)
 
     @cached_property
-    def _places(self) -> Places:
+    def _places(self) -> IndicesByMotion:
         return split_by_motion([entry.is_static for entry in self.clips.entries])
 
 

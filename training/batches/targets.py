@@ -1,7 +1,7 @@
-"""Which pictures of a clip a sample is judged by, and which points.
+"""Which images of a clip a sample is judged by, and which points.
 
 Axes: ``f`` frames, ``m`` target times, ``p`` views per time, ``n`` points. At least half of the
-pictures come from other cameras than the input's: supervision by the input views alone over-fits
+images come from other cameras than the input's: supervision by the input views alone over-fits
 them (Wonderland §3.3, in effect).
 """
 

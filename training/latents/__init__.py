@@ -1,1 +1,1 @@
-"""Clips encoded once and for all: what the video model learns from without reading pictures."""
+"""Clips encoded once and for all: what the video model learns from without reading images."""

@@ -50,7 +50,7 @@ class EncodingJob:
     clips: Path
     folder: Path
     mirror: bool = True
-    """Each clip also with left and right exchanged, in pictures and in words."""
+    """Each clip also with left and right exchanged, in images and in words."""
 
 
 @torch.no_grad()

@@ -6,7 +6,11 @@ from pathlib import Path
 import torch
 
 from diff4splat.errors import ConfigError, InputError
-from diff4splat.training.batches.epoch_shuffle import Places, ShuffledIndices, split_by_motion
+from diff4splat.training.batches.epoch_shuffle import (
+    IndicesByMotion,
+    ShuffledIndices,
+    split_by_motion,
+)
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latents.latent_batch import LatentBatch, collate_latents
 from diff4splat.training.latents.latent_shards import LatentPack, read_packs, require_alike
@@ -76,7 +80,7 @@ def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples:
     return LatentSamples(recipe, seed) if encoded.pop() else ClipSamples.open(recipe, seed)
 
 
-def _require_kinds(places: Places, settings: SourceSettings) -> None:
+def _require_kinds(places: IndicesByMotion, settings: SourceSettings) -> None:
     needed = {"still": settings.still_share > 0, "moving": settings.still_share < 1}
     for kind, wanted in needed.items():
         if wanted and not places[kind, False]:

@@ -6,7 +6,7 @@ Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid. With ``level`` 
     loss  = mean over c, t, h, w of (velocity − target)²
 
 (Diff4Splat, arXiv 2511.00503, flow matching section; the sum of squares there is a mean here, so
-that the weight does not depend on the picture size.) Where the first latent frame is the picture
+that the weight does not depend on the image size.) Where the first latent frame is the image
 that the video starts from, it has level 0 at every step and nothing to learn: it is left out.
 """
 

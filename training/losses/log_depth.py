@@ -1,6 +1,6 @@
-"""Logarithm of the depth of single pictures against the truth, wherever a truth is known.
+"""Logarithm of the depth of single images against the truth, wherever a truth is known.
 
-Axes: ``n`` pictures, ``h w`` pixels. With the difference R = log D̂ − log D and V its valid pixels
+Axes: ``n`` images, ``h w`` pixels. With the difference R = log D̂ − log D and V its valid pixels
 
     gradient = Σ_k mean_V (|R_{x + 2^k} − R_x| + |R_{y + 2^k} − R_y|),   k = 0 … SCALES − 1
 
@@ -16,15 +16,15 @@ from diff4splat.metrics.masked import masked_mean
 
 SCALES = 4
 LEAST_PIXELS = 16
-"""A picture with fewer pixels of known depth has no scale of its own."""
+"""An image with fewer pixels of known depth has no scale of its own."""
 
 
 def rescale_median(
     depth: Float[Tensor, "n h w"], median: float
 ) -> tuple[Float[Tensor, "n h w"], Bool[Tensor, "n h w"]]:
-    """Depth in units in which each picture's median is ``median``, and where it is known.
+    """Depth in units in which each image's median is ``median``, and where it is known.
 
-    1 where nothing is known: nowhere in a picture with next to no depth.
+    1 where nothing is known: nowhere in an image with next to no depth.
     """
     known = (depth > 0) & depth.isfinite()
     known = known & (known.flatten(1).sum(1) >= LEAST_PIXELS)[:, None, None]

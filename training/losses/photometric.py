@@ -1,6 +1,6 @@
-"""Rendered pictures against true ones.
+"""Rendered images against true ones.
 
-Axes: ``b`` batch, ``k`` pictures of an element (views, times), ``h w`` pixels. RGB in [0, 1].
+Axes: ``b`` batch, ``k`` images of an element (views, times), ``h w`` pixels. RGB in [0, 1].
 
     loss = MSE + λ_p · perceptual distance,   λ_p = 0.5  (Diff4Splat, arXiv 2511.00503, losses)
 
@@ -39,7 +39,7 @@ def perceptual_error(
     features: PerceptualFeatures,
     valid: Bool[Tensor, "b k h w"] | None = None,
 ) -> Float[Tensor, " b"]:
-    """Mean distance over an element's pictures; invalid pixels show the reference in both.
+    """Mean distance over an element's images; invalid pixels show the reference in both.
 
     Raises:
         ShapeError: the shapes differ.
@@ -50,7 +50,7 @@ def perceptual_error(
 
 
 def _known(image: Tensor, reference: Tensor, valid: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
-    """Widened pictures that agree in invalid pixels, and the mask."""
+    """Widened images that agree in invalid pixels, and the mask."""
     require_alike("image", image, reference)
     image, reference = promote(image, reference)
     if valid is None:

@@ -53,8 +53,10 @@ def recipe_from_dict(data: Any) -> Recipe:
     """
     if isinstance(data, dict):
         data = _current(data)
-    own = {ModelConfig: lambda value: ModelConfig.from_json(json.dumps(value))}
-    reader = TypedReader(refusal=ConfigError, own=own, dependent={StageRecipe: _losses_of_kind})
+    readers = {ModelConfig: lambda value: ModelConfig.from_json(json.dumps(value))}
+    reader = TypedReader(
+        error_type=ConfigError, readers=readers, dependent={StageRecipe: _losses_of_kind}
+    )
     return reader.read(Recipe, data, "recipe")
 
 

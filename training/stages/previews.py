@@ -1,4 +1,4 @@
-"""Pictures to look at while a model learns: rows of frames, everything at one size.
+"""Images to look at while a model learns: rows of frames, everything at one size.
 
 Axes: ``b`` batch, ``m p`` targets, ``h w`` pixels; all panels show the first sample of a batch.
 """
@@ -22,19 +22,19 @@ GAP_PX, LABEL_PX = 2, 14
 MOTION_CONTRAST = 0.1
 """Change of a colour, in [0, 1], for a motion of 1."""
 LEAST_PX = 96
-"""Smaller pictures are enlarged by a whole factor, so that people see their pixels."""
+"""Smaller images are enlarged by a whole factor, so that people see their pixels."""
 
 Row = tuple[str, Sequence[Float[Tensor, "h w 3"]]]
-"""What a row shows, and its pictures."""
+"""What a row shows, and its images."""
 
 
 def preview(rows: Sequence[Row]) -> Float[Tensor, "height width 3"]:
-    """Labelled rows of pictures on white; short rows are filled up."""
+    """Labelled rows of images on white; short rows are filled up."""
     longest = max(len(row) for _, row in rows)
     blank = torch.ones_like(rows[0][1][0])
     lines = []
     for label, row in rows:
-        line = _beside([picture.cpu() for picture in (*row, *[blank] * (longest - len(row)))])
+        line = _beside([image.cpu() for image in (*row, *[blank] * (longest - len(row)))])
         lines += [_label(label, line.shape[1]), line]
     return torch.cat(lines)
 
@@ -94,8 +94,8 @@ def _arrows(
     offset: Float[Tensor, "n 3"],
     valid: Bool[Tensor, " n"],
 ) -> Float[Tensor, "h w 3"]:
-    """Displacements across the picture as lines, coloured by direction."""
-    # A copy of its own: lines of one picture must not show in the next.
+    """Displacements across the image as lines, coloured by direction."""
+    # A copy of its own: lines of one image must not show in the next.
     canvas = background.cpu().numpy().copy()
     scale = float(batch.cameras.focal_px[0, 0, 0]) / 4
     for (_, row, column), shift in zip(

@@ -1,4 +1,4 @@
-"""Neural 3D Video (DyNeRF): ``poses_bounds.npy`` and a video, or numbered pictures, per camera.
+"""Neural 3D Video (DyNeRF): ``poses_bounds.npy`` and a video, or numbered images, per camera.
 
 Rows are in the order of the cameras' names. Camera 0 is the test camera
 (Li et al., CVPR 2022).
@@ -15,8 +15,8 @@ from diff4splat.data_prep.readers.camera_rig.rig import (
     rig_from_folders,
     rig_shots,
 )
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft, Shot
 from diff4splat.data_prep.readers.common.test_split import MIN_CAMERAS, choose_test_split
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot, UndecodedCapture
 from diff4splat.data_prep.readers.files.file_discovery import (
     CaptureLocation,
     camera_folders,
@@ -45,7 +45,7 @@ def matches(folder: Path) -> bool:
     )
 
 
-def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
+def read(location: CaptureLocation, options: ReadOptions) -> UndecodedCapture:
     """Read the capture.
 
     Raises:
@@ -62,7 +62,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
         reason = "camera 0 held out, as given by the data set"
     points, cloud_notes = find_cloud(location.folder, _CLOUDS)
     warning = (_OUT_OF_STEP,) if "coffee_martini" in location.name.lower() else ()
-    return CaptureDraft(
+    return UndecodedCapture(
         name=location.name,
         source="Neural 3D Video",
         shots=shots,
@@ -79,17 +79,17 @@ def _rig(folder: Path, shrink: int) -> tuple[Rig, tuple[str, ...]]:
     folders, videos = camera_folders(folder), camera_videos(folder)
     if not folders and not videos:
         raise FileFormatError(
-            f"{folder}: expected videos or pictures of cameras (cam00.mp4 or cam00/images), got "
+            f"{folder}: expected videos or images of cameras (cam00.mp4 or cam00/images), got "
             "none; check the folder"
         )
     if set(folders) >= set(videos):
-        notes = ("pictures were taken and videos left out",) if videos else ()
+        notes = ("images were taken and videos left out",) if videos else ()
         return rig_from_folders(folders), notes
     only = sorted(set(folders) - set(videos))
     if only:
         raise FileFormatError(
-            f"{folder}: expected a video for every camera, or pictures for every camera, got "
-            f"pictures but no video of {only[0]} and a video but no pictures of "
+            f"{folder}: expected a video for every camera, or images for every camera, got "
+            f"images but no video of {only[0]} and a video but no images of "
             f"{min(set(videos) - set(folders))}; add what is missing"
         )
     return _rig_of_videos(videos, shrink), ()
@@ -107,7 +107,7 @@ def _rig_of_videos(files: dict[str, Path], shrink: int) -> Rig:
 
 
 def _videos_of(rig: Rig) -> list[VideoFile]:
-    firsts = [next(iter(pictures.values())) for pictures in rig.by_camera.values()]
+    firsts = [next(iter(images.values())) for images in rig.by_camera.values()]
     return [first.video for first in firsts if isinstance(first, VideoFrame)]
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.data_prep.readers.common.capture_draft import Shot
 from diff4splat.data_prep.readers.common.intrinsics import Intrinsics
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot
 from diff4splat.data_prep.readers.files.file_discovery import images_in, last_number
 from diff4splat.data_prep.readers.files.image_file import ImageFile
 from diff4splat.data_prep.readers.files.video_file import VideoFrame
@@ -33,20 +33,20 @@ class Rig:
         return list(self.by_camera)
 
     def notes(self) -> tuple[str, ...]:
-        """Which cameras lack pictures that others have, and how cameras are counted."""
+        """Which cameras lack images that others have, and how cameras are counted."""
         every = set().union(*self.by_camera.values())
         lacking = {name: len(every) - len(found) for name, found in self.by_camera.items()}
         return (
-            *(f"{name} lacks {n} of {len(every)} pictures" for name, n in lacking.items() if n),
+            *(f"{name} lacks {n} of {len(every)} images" for name, n in lacking.items() if n),
             *_counting(self.names),
         )
 
 
 def rig_from_folders(folders: Mapping[str, Path]) -> Rig:
-    """The numbered pictures in the folder of each camera.
+    """The numbered images in the folder of each camera.
 
     Raises:
-        FileFormatError: a picture has no number, or two have the same.
+        FileFormatError: an image has no number, or two have the same.
     """
     return Rig(by_camera={name: _numbered(folder) for name, folder in folders.items()})
 
@@ -55,17 +55,17 @@ def rig_shots(
     rig: Rig, poses: Float[Tensor, "c 4 4"], lenses: Sequence[Intrinsics], fps: float
 ) -> list[Shot]:
     """Every image of static cameras, camera by camera in the order of time."""
-    first = min(min(pictures) for pictures in rig.by_camera.values())
+    first = min(min(images) for images in rig.by_camera.values())
     return [
         Shot(
-            image=pictures[number],
+            image=images[number],
             lens=lenses[camera],
             world_from_camera=poses[camera],
             time_s=(number - first) / fps,
             camera=camera,
         )
-        for camera, pictures in enumerate(rig.by_camera.values())
-        for number in sorted(pictures)
+        for camera, images in enumerate(rig.by_camera.values())
+        for number in sorted(images)
     ]
 
 
@@ -90,7 +90,7 @@ def _numbered(folder: Path) -> dict[int, ImageFile]:
         if number is None or number in found:
             got = "no number" if number is None else f"that of {found[number].file.name} again"
             raise FileFormatError(
-                f"{file}: expected pictures numbered by time, such as frame_00001.jpg, got {got}; "
+                f"{file}: expected images numbered by time, such as frame_00001.jpg, got {got}; "
                 "rename or remove it"
             )
         found[number] = ImageFile(file=file)

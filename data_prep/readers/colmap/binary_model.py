@@ -113,10 +113,10 @@ def require_known_model(name: str, where: str) -> None:
     """Refuse a camera model by its name.
 
     Raises:
-        FileFormatError: its pictures can neither be straightened nor seen through it here.
+        FileFormatError: its images can neither be straightened nor seen through it here.
     """
     if name not in PARAMETERS:
         raise FileFormatError(
             f"{where}: expected a camera model of {', '.join(PARAMETERS)}, got {name}; let COLMAP "
-            "undistort the pictures (image_undistorter)"
+            "undistort the images (image_undistorter)"
         )

@@ -12,8 +12,8 @@ from diff4splat.data_prep.readers.colmap.model import Model, model_folder
 from diff4splat.data_prep.readers.colmap.read_model import read_model
 from diff4splat.data_prep.readers.colmap.rig_images import read_rig
 from diff4splat.data_prep.readers.colmap.video_images import image_folder, read_video
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft
 from diff4splat.data_prep.readers.common.test_split import choose_test_split
+from diff4splat.data_prep.readers.common.undecoded_capture import UndecodedCapture
 from diff4splat.data_prep.readers.files.file_discovery import CaptureLocation, camera_folders
 from diff4splat.data_prep.readers.files.point_cloud import (
     CloudWithNotes,
@@ -29,7 +29,7 @@ EXPECTED_FILES = (
 )
 
 _CLOUDS = ("points3D_multipleview.ply", "points3D_downsample2.ply", "points3D.ply")
-_NO_TEST = "; what this layout's tools call test are training pictures, so they are not used as one"
+_NO_TEST = "; what this layout's tools call test are training images, so they are not used as one"
 
 
 def matches(folder: Path) -> bool:
@@ -37,16 +37,16 @@ def matches(folder: Path) -> bool:
     return model_folder(folder) is not None and bool(_cameras(folder) or image_folder(folder))
 
 
-def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
+def read(location: CaptureLocation, options: ReadOptions) -> UndecodedCapture:
     """Read the capture.
 
     Raises:
-        FileFormatError: the model is missing or damaged, or does not fit the pictures.
+        FileFormatError: the model is missing or damaged, or does not fit the images.
         ConfigError: cameras are to be held out that are not there.
     """
     sparse = model_folder(location.folder)
-    folders, pictures = _cameras(location.folder), image_folder(location.folder)
-    if sparse is None or not (folders or pictures):
+    folders, images = _cameras(location.folder), image_folder(location.folder)
+    if sparse is None or not (folders or images):
         raise FileFormatError(
             f"{location.folder}: expected {EXPECTED_FILES}, got less; check the folder"
         )
@@ -54,10 +54,10 @@ def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
     if folders:
         shots, notes = read_rig(model, folders, fps)
     else:
-        shots, notes = read_video(model, pictures, fps)
+        shots, notes = read_video(model, images, fps)
     shots, reason = choose_test_split(shots, options.hold_out, location.name)
     points, cloud_notes = _points(model, location.folder)
-    return CaptureDraft(
+    return UndecodedCapture(
         name=location.name,
         source="COLMAP",
         shots=shots,

@@ -15,7 +15,7 @@ from torch import Tensor
 from diff4splat.data_prep.readers.camera_rig.rig import rig_from_folders, rig_shots
 from diff4splat.data_prep.readers.colmap.model import Model, ModelImage
 from diff4splat.data_prep.readers.colmap.read_model import camera_intrinsics, image_poses
-from diff4splat.data_prep.readers.common.capture_draft import Shot
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot
 from diff4splat.data_prep.readers.files.file_discovery import last_number
 from diff4splat.errors import FileFormatError
 

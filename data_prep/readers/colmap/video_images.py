@@ -7,7 +7,7 @@ from pathlib import Path
 
 from diff4splat.data_prep.readers.colmap.model import Model
 from diff4splat.data_prep.readers.colmap.read_model import camera_intrinsics, image_poses
-from diff4splat.data_prep.readers.common.capture_draft import Shot
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot
 from diff4splat.data_prep.readers.files.file_discovery import (
     images_below,
     natural_key,
@@ -31,7 +31,7 @@ def read_video(model: Model, folder: Path, fps: float) -> tuple[list[Shot], tupl
     """Every image of the model in the order of time, and notes.
 
     Raises:
-        FileFormatError: a picture is missing or lies elsewhere.
+        FileFormatError: an image is missing or lies elsewhere.
     """
     places = {file: index for index, file in enumerate(images_below(folder))}
     images = sorted(model.images, key=lambda image: natural_key(image.name))
@@ -40,7 +40,7 @@ def read_video(model: Model, folder: Path, fps: float) -> tuple[list[Shot], tupl
         file = resolve_inside(folder, image.name, f"{model.folder}: image")
         if file not in places:
             raise FileFormatError(
-                f"{model.folder}: '{image.name}': expected the picture {file}, got no such file; "
+                f"{model.folder}: '{image.name}': expected the image {file}, got no such file; "
                 "copy it again"
             )
         shots.append(
@@ -55,5 +55,5 @@ def read_video(model: Model, folder: Path, fps: float) -> tuple[list[Shot], tupl
             )
         )
     without = len(places) - len(shots)
-    note = f"{without} of {len(places)} pictures left out: COLMAP found no pose for them"
+    note = f"{without} of {len(places)} images left out: COLMAP found no pose for them"
     return shots, (note,) if without else ()

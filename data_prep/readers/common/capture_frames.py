@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from diff4splat.data.capture.capture import Frame
-from diff4splat.data_prep.readers.common.capture_draft import Shot
 from diff4splat.data_prep.readers.common.intrinsics import Intrinsics, undistortion_map
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot
 from diff4splat.data_prep.readers.files import pixel_layers
 from diff4splat.data_prep.readers.files.depth_file import read_mask
 from diff4splat.data_prep.readers.files.lru_cache import LruCache
@@ -53,7 +53,7 @@ class CaptureFrames:
         known = pixel_layers.composite_over(pixels, self._background)
         if shot.image.is_float and known.counts is not None and not known.counts.any():
             raise FileFormatError(
-                f"{shot.image.where}: expected a picture, got NaN everywhere; leave it out"
+                f"{shot.image.where}: expected an image, got NaN everywhere; leave it out"
             )
         if shot.mask is not None:
             known = pixel_layers.apply_mask(known, read_mask(shot.mask, size_px))
@@ -75,6 +75,6 @@ def require_size(where: str, got: tuple[int, ...], want: tuple[int, int]) -> Non
     """
     if got != want:
         raise FileFormatError(
-            f"{where}: expected pictures of one size, {want[1]} x {want[0]}, got {got[1]} x "
+            f"{where}: expected images of one size, {want[1]} x {want[0]}, got {got[1]} x "
             f"{got[0]}: images of different sizes; make them alike, or leave this one out"
         )

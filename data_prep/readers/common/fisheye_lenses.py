@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import torch
 
-from diff4splat.data_prep.readers.common.capture_draft import Shot
 from diff4splat.data_prep.readers.common.intrinsics import Intrinsics
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot
 from diff4splat.errors import FileFormatError
 from diff4splat.geometry.lenses.equirectangular import Equirectangular
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
@@ -19,17 +19,17 @@ from diff4splat.geometry.optics import Optics
 from diff4splat.io.cameras.lens_json import as_file_error
 
 _SMALLEST_CIRCLE = 0.5
-"""Diameter of what a fisheye sees, in shorter sides of the picture; real ones fill more."""
+"""Diameter of what a fisheye sees, in shorter sides of the image; real ones fill more."""
 _ALMOST = 0.999
 """Share of the range up to the turning point of the polynomial that is used."""
 
 LENS_NOTES = {
     "fisheye": (
-        "pictures were left as their fisheye lens shows them: fits see them through it by rays, "
+        "images were left as their fisheye lens shows them: fits see them through it by rays, "
         "which is slower"
     ),
     "equirectangular": (
-        "pictures were left as they are, the whole sphere around the camera: fits see them by "
+        "images were left as they are, the whole sphere around the camera: fits see them by "
         "rays, which is slower"
     ),
 }
@@ -41,7 +41,7 @@ def require_fisheye(lens: Intrinsics, where: str) -> Intrinsics:
 
     Raises:
         FileFormatError: coefficients are not finite, or the polynomial turns back so early that
-            next to nothing of the picture would be seen.
+            next to nothing of the image would be seen.
     """
     with as_file_error(where):
         fisheye = _fisheye(lens)
@@ -49,7 +49,7 @@ def require_fisheye(lens: Intrinsics, where: str) -> Intrinsics:
     radius_px = float(fisheye.radii(largest_rad)[0]) * min(lens.focal_px)
     if min(lens.focal_px) > 0 and 2 * radius_px < _SMALLEST_CIRCLE * min(lens.size_px):
         raise FileFormatError(
-            f"{where}: expected fisheye coefficients that rise over the picture, got "
+            f"{where}: expected fisheye coefficients that rise over the image, got "
             f"{_numbers(lens)}, which turn back {radius_px:.3g} pixels from the centre; calibrate "
             "the lens again"
         )
@@ -82,13 +82,13 @@ def _require_same(first: Shot, other: Shot) -> None:
         raise FileFormatError(
             f"{other.image.where}: expected a {mine.model} camera as for {first.image.where}, "
             f"since cameras of one capture share their lens, got a {theirs.model} one; straighten "
-            "the pictures of the others, or leave one kind out"
+            "the images of the others, or leave one kind out"
         )
     if mine.fisheye != theirs.fisheye:
         raise FileFormatError(
             f"{other.image.where}: expected the fisheye coefficients of {first.image.where}, "
             f"{_numbers(mine)}, since cameras of one capture share their lens, got "
-            f"{_numbers(theirs)}; calibrate them as one camera, or straighten the pictures"
+            f"{_numbers(theirs)}; calibrate them as one camera, or straighten the images"
         )
 
 

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from diff4splat.errors import FileFormatError
 
 _ROUNDING_PX = 1.5
-"""What halving a picture may do to its sides."""
+"""What halving an image may do to its sides."""
 _OUTSIDE = -2.0
 
 
@@ -60,8 +60,8 @@ class Intrinsics:
         across, along = new_width / width, new_height / height
         if abs(height * across - new_height) > _ROUNDING_PX:
             raise FileFormatError(
-                f"{where}: expected a picture shaped as its camera, {width} x {height}, got "
-                f"{new_width} x {new_height}; give the pictures that the cameras were made for"
+                f"{where}: expected an image shaped as its camera, {width} x {height}, got "
+                f"{new_width} x {new_height}; give the images that the cameras were made for"
             )
         return replace(
             self,
@@ -99,7 +99,7 @@ def undistortion_map(lens: Intrinsics) -> tuple[Float[np.ndarray, "h w"], Float[
     """Where a pinhole camera of the same focal lengths finds its pixels in the distorted image.
 
     (column, row) as OpenCV's ``remap`` wants them: float32, pixel centres at whole numbers. Where
-    the formula bends back on itself there is nothing to find, and both lie outside the picture.
+    the formula bends back on itself there is nothing to find, and both lie outside the image.
     """
     height, width = lens.size_px
     column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from diff4splat.data_prep.readers.common.capture_draft import Shot
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot
 from diff4splat.errors import ConfigError
 
 TEST_TIME_STEP = 8

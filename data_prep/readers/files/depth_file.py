@@ -37,8 +37,8 @@ class DepthFile:
         (height, width), (rows, columns) = size_px, depth.shape
         if abs(rows * width / columns - height) > max(2.0, width / columns):
             raise FileFormatError(
-                f"{self.file}: expected depth shaped as its picture, {width} x {height}, got "
-                f"{columns} x {rows}; give the depth of that picture"
+                f"{self.file}: expected depth shaped as its image, {width} x {height}, got "
+                f"{columns} x {rows}; give the depth of that image"
             )
         return cv2.resize(depth, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
 
@@ -68,7 +68,7 @@ def read_mask(file: Path, size_px: tuple[int, int]) -> Bool[np.ndarray, "h w"]:
     counts = (levels.max(-1) if levels.ndim == 3 else levels) > 0
     if counts.shape != size_px:
         raise FileFormatError(
-            f"{file}: expected a mask as large as its picture, {size_px[1]} x {size_px[0]}, got "
+            f"{file}: expected a mask as large as its image, {size_px[1]} x {size_px[0]}, got "
             f"{counts.shape[1]} x {counts.shape[0]}; make it again"
         )
     if not counts.any():
@@ -80,16 +80,16 @@ def read_mask(file: Path, size_px: tuple[int, int]) -> Bool[np.ndarray, "h w"]:
 
 
 def grey_levels(file: Path) -> np.ndarray:
-    """A picture's numbers as stored, ``h w`` or ``h w c``.
+    """An image's numbers as stored, ``h w`` or ``h w c``.
 
     Raises:
         FileFormatError: missing or damaged.
     """
-    require_file(file, "a picture")
+    require_file(file, "an image")
     try:
         with Image.open(file, formats=("PNG", "TIFF", "JPEG", "BMP")) as image:
             return np.asarray(image)
     except Exception as error:  # damaged files make Pillow's readers raise almost anything
         raise FileFormatError(
-            f"{file}: expected a whole picture, got a cut off, damaged or other file; copy it again"
+            f"{file}: expected a whole image, got a cut off, damaged or other file; copy it again"
         ) from error

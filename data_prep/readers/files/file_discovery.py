@@ -69,7 +69,7 @@ def find_image(folder: Path, name: str, where: str) -> Path:
     for candidate in (file, *(file.with_name(file.name + suffix) for suffix in IMAGE_SUFFIXES)):
         if candidate.is_file():
             return candidate
-    raise FileFormatError(f"{where}: expected the picture {file}, got no such file; copy it again")
+    raise FileFormatError(f"{where}: expected the image {file}, got no such file; copy it again")
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
@@ -100,9 +100,9 @@ def camera_folders(folder: Path) -> dict[str, Path]:
     found = {}
     for path in folder.iterdir():
         if path.is_dir() and _CAMERA.fullmatch(path.name):
-            pictures = path / "images" if (path / "images").is_dir() else path
-            if images_in(pictures):
-                found[path.name] = pictures
+            images = path / "images" if (path / "images").is_dir() else path
+            if images_in(images):
+                found[path.name] = images
     return dict(sorted(found.items(), key=lambda item: natural_key(item[0])))
 
 

@@ -57,7 +57,7 @@ class ImageFile:
         """(height, width), from the header alone.
 
         Raises:
-            FileFormatError: missing, or not a picture.
+            FileFormatError: missing, or not an image.
         """
         if self.file.suffix.lower() == ".exr":
             return exr_size(self.file)
@@ -99,7 +99,7 @@ class ImageFile:
 
 @contextmanager
 def _image(file: Path) -> Iterator[Image.Image]:
-    require_file(file, "a picture")
+    require_file(file, "an image")
     try:
         # Pillow warns about sizes and odd metadata; neither is a reason to stop.
         with warnings.catch_warnings():
@@ -110,7 +110,7 @@ def _image(file: Path) -> Iterator[Image.Image]:
         raise
     except Exception as error:  # damaged files make Pillow's readers raise almost anything
         raise FileFormatError(
-            f"{file}: expected a whole picture, got a cut off, damaged or other file; copy it again"
+            f"{file}: expected a whole image, got a cut off, damaged or other file; copy it again"
         ) from error
 
 

@@ -117,7 +117,7 @@ class VideoFrame:
         return False
 
     def read(self) -> Pixels:
-        """The picture.
+        """The image.
 
         Raises:
             FileFormatError: the video ends before it.

@@ -25,7 +25,7 @@ class CameraFolders:
     """One per camera, each with a folder per effect."""
 
     @property
-    def found(self) -> bool:
+    def has_cameras(self) -> bool:
         """Whether there is any camera."""
         return bool(self.plain or self.sets)
 

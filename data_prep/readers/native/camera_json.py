@@ -17,10 +17,10 @@ import torch
 
 from diff4splat.data.capture.capture import Capture
 from diff4splat.data_prep.readers.common.assembly import assemble_capture
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft, Shot
 from diff4splat.data_prep.readers.common.downscale_optics import downscale_optics
 from diff4splat.data_prep.readers.common.intrinsics import Intrinsics
 from diff4splat.data_prep.readers.common.test_split import choose_test_split
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot, UndecodedCapture
 from diff4splat.data_prep.readers.files.depth_file import DepthFile
 from diff4splat.data_prep.readers.files.file_discovery import CaptureLocation, resolve_inside
 from diff4splat.data_prep.readers.files.image_file import ImageFile
@@ -31,9 +31,7 @@ from diff4splat.geometry.optics import Optics
 from diff4splat.io.cameras.camera_record import FILE, CameraRecord, read_camera_record
 from diff4splat.io.cameras.optics_json import optics_json
 
-EXPECTED_FILES = (
-    "camera.json beside its pictures, or folders of these (diff4splat render --dataset)"
-)
+EXPECTED_FILES = "camera.json beside its images, or folders of these (diff4splat render --dataset)"
 
 _ROUNDING = 1e-4
 """Largest deviation of a frame from the track, in rotation entries and shares of distance."""
@@ -41,7 +39,7 @@ _ROUNDING = 1e-4
 
 def matches(folder: Path) -> bool:
     """Whether ``folder`` has this format."""
-    return camera_folders(folder).found
+    return camera_folders(folder).has_cameras
 
 
 def read(location: CaptureLocation, options: ReadOptions) -> Capture:
@@ -62,7 +60,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
     shots, reason = choose_test_split(shots, options.hold_out, location.name)
     shots, repeated = _without_repeats(shots)
     first = records[0]
-    draft = CaptureDraft(
+    undecoded = UndecodedCapture(
         name=location.name,
         source="diff4splat cameras",
         shots=shots,
@@ -71,7 +69,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> Capture:
         background=options.background,
         notes=(*_notes(records, folders), *repeated),
     )
-    capture = replace(assemble_capture(draft, options), license=_licenses(records))
+    capture = replace(assemble_capture(undecoded, options), license=_licenses(records))
     optics = first.physical_path.optics
     if optics_json(optics) == optics_json(Optics()):
         return capture
@@ -167,7 +165,7 @@ def _without_repeats(shots: list[Shot]) -> tuple[list[Shot], tuple[str, ...]]:
     training = {_view_key(shot) for shot in shots if not shot.held_out}
     kept = [shot for shot in shots if not (shot.held_out and _view_key(shot) in training)]
     left = len(shots) - len(kept)
-    note = f"{left} held-out pictures were left out: training sees the same view at the same time"
+    note = f"{left} held-out images were left out: training sees the same view at the same time"
     return kept, (note,) if left else ()
 
 

@@ -17,7 +17,7 @@ from diff4splat.paths.formats.json_fields import number_list, numbers, optional_
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NerfiesCamera:
-    """As in the file, in its world and for its full picture."""
+    """As in the file, in its world and for its full image."""
 
     lens: Intrinsics
     orientation: list[list[float]]
@@ -26,7 +26,7 @@ class NerfiesCamera:
 
 
 def read_nerfies_camera(file: Path) -> NerfiesCamera:
-    """The camera of one picture.
+    """The camera of one image.
 
     Raises:
         FileFormatError: missing, or a value is missing, of another kind or not finite.

@@ -18,7 +18,7 @@ from diff4splat.paths.formats.json_fields import numbers, optional_number
 _EVERY, _AFTER = 4, 2
 """Without val_ids: every fourth image is for training, the second after each is held out."""
 _USUAL = (
-    "no val_ids in dataset.json: as is usual then, every 4th picture is learnt from, the 2nd after "
+    "no val_ids in dataset.json: as is usual then, every 4th image is learnt from, the 2nd after "
     "each is held out, and those between are left out"
 )
 
@@ -60,14 +60,14 @@ class ImageFolder:
 
     folder: Path
     size: int
-    """What the full picture was divided by: 2 in ``rgb/2x``."""
+    """What the full image was divided by: 2 in ``rgb/2x``."""
     shrink: int
     """What is left to do."""
     notes: tuple[str, ...] = ()
 
 
 def choose_image_folder(folder: Path, downscale: int) -> ImageFolder:
-    """The smallest pictures from which those asked for can be made, else the largest there are.
+    """The smallest images from which those asked for can be made, else the largest there are.
 
     Raises:
         FileFormatError: there are none.
@@ -76,11 +76,11 @@ def choose_image_folder(folder: Path, downscale: int) -> ImageFolder:
     sizes = [int(name[:-1]) for name in names if name[:-1].isdecimal() and name.endswith("x")]
     if not sizes or min(sizes) < 1:
         raise FileFormatError(
-            f"{folder}: expected pictures in folders 1x, 2x and so on, got none; copy them again"
+            f"{folder}: expected images in folders 1x, 2x and so on, got none; copy them again"
         )
     size = max((size for size in sizes if downscale % size == 0), default=min(sizes))
     shrink = max(downscale // size, 1)
-    note = f"there is nothing to make pictures at 1/{downscale} from: those of rgb/{size}x are used"
+    note = f"there is nothing to make images at 1/{downscale} from: those of rgb/{size}x are used"
     return ImageFolder(
         folder=folder / f"{size}x",
         size=size,
@@ -90,7 +90,7 @@ def choose_image_folder(folder: Path, downscale: int) -> ImageFolder:
 
 
 def read_split(file: Path, take_all: bool) -> tuple[dict[str, bool], str]:
-    """Whether each picture is held out, and why, in words; ``take_all`` leaves that open.
+    """Whether each image is held out, and why, in words; ``take_all`` leaves that open.
 
     Raises:
         FileFormatError: damaged, or without names.

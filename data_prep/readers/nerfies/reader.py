@@ -1,6 +1,6 @@
 """Nerfies and HyperNeRF: images with one camera file each, and JSON metadata.
 
-``metadata.json`` gives each picture a camera and a ``warp_id`` that counts times; ``points.npy``
+``metadata.json`` gives each image a camera and a ``warp_id`` that counts times; ``points.npy``
 has points in the world of the cameras' files (https://github.com/google/nerfies#datasets).
 """
 
@@ -13,8 +13,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.data_prep.readers.camera_rig.rig import fps_note
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft, Shot
 from diff4splat.data_prep.readers.common.test_split import choose_test_split
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot, UndecodedCapture
 from diff4splat.data_prep.readers.files.file_discovery import (
     CaptureLocation,
     find_image,
@@ -51,38 +51,38 @@ def matches(folder: Path) -> bool:
     return (folder / "camera").is_dir() and all((folder / name).is_file() for name in names)
 
 
-def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
+def read(location: CaptureLocation, options: ReadOptions) -> UndecodedCapture:
     """Read the capture.
 
     Raises:
-        FileFormatError: naming the file and picture.
+        FileFormatError: naming the file and image.
         ConfigError: cameras are to be held out that are not there.
     """
     folder, chosen = location.folder, options.hold_out is not None
     roles, reason = read_split(folder / "dataset.json", take_all=chosen)
-    world, pictures = (
+    world, images = (
         read_world_transform(folder),
         choose_image_folder(folder / "rgb", options.downscale),
     )
-    taken = _shots(folder, list(roles), world, pictures, options.fps or DEFAULT_FPS)
+    taken = _shots(folder, list(roles), world, images, options.fps or DEFAULT_FPS)
     shots = [replace(one, held_out=held) for one, held in zip(taken, roles.values(), strict=True)]
     if chosen:
         shots, reason = choose_test_split(shots, options.hold_out, location.name)
     points, cloud_notes = _points(folder / "points.npy", world)
-    return CaptureDraft(
+    return UndecodedCapture(
         name=location.name,
         source="Nerfies or HyperNeRF",
         shots=shots,
         split_reason=reason,
-        shrink=pictures.shrink,
+        shrink=images.shrink,
         points=points,
         background=options.background,
-        notes=(*pictures.notes, *fps_note(options.fps, DEFAULT_FPS), *cloud_notes),
+        notes=(*images.notes, *fps_note(options.fps, DEFAULT_FPS), *cloud_notes),
     )
 
 
 def _shots(
-    folder: Path, names: list[str], world: WorldTransform, pictures: ImageFolder, fps: float
+    folder: Path, names: list[str], world: WorldTransform, images: ImageFolder, fps: float
 ) -> list[Shot]:
     file = folder / "metadata.json"
     metadata = read_object(file)
@@ -93,8 +93,8 @@ def _shots(
     numbers = _dense([_whole(record, "camera_id", where) for record, where in records])
     return [
         Shot(
-            image=ImageFile(file=find_image(pictures.folder, f"{name}.png", str(file))),
-            lens=camera.lens.downscaled(pictures.size),
+            image=ImageFile(file=find_image(images.folder, f"{name}.png", str(file))),
+            lens=camera.lens.downscaled(images.size),
             world_from_camera=pose,
             time_s=_whole(record, "warp_id", where) / fps,
             camera=number,
@@ -122,11 +122,11 @@ def _record(metadata: Mapping[str, object], name: str, file: Path) -> tuple[dict
 
 
 def _whole(record: dict[str, object], key: str, where: str) -> int:
-    """The number under ``key``; a picture without ``camera_id`` is of camera 0."""
+    """The number under ``key``; an image without ``camera_id`` is of camera 0."""
     value = optional_number(record, key, where)
     if value is None and key == "warp_id":
         raise FileFormatError(
-            f"{where}: expected 'warp_id', which counts times, got none; add it to every picture"
+            f"{where}: expected 'warp_id', which counts times, got none; add it to every image"
         )
     return int(value or 0)
 

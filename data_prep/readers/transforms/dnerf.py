@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from diff4splat.data_prep.readers.common.camera_ids import assign_camera_ids
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft, Shot
 from diff4splat.data_prep.readers.common.test_split import hold_out_times, requested_reason
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot, UndecodedCapture
 from diff4splat.data_prep.readers.files.file_discovery import CaptureLocation
 from diff4splat.data_prep.readers.options import ReadOptions
 from diff4splat.data_prep.readers.transforms.frame_records import (
@@ -27,9 +27,9 @@ EXPECTED_FILES = "transforms_train.json (and transforms_test.json, transforms_va
 WHITE = (1.0, 1.0, 1.0)
 
 _SPLITS = ("train", "val", "test")
-_NO_TIME = "write the time of every picture, from 0 to 1, into the file"
+_NO_TIME = "write the time of every image, from 0 to 1, into the file"
 _LEGO = (
-    "the test pictures of D-NeRF's lego do not show what its training pictures show; published "
+    "the test images of D-NeRF's lego do not show what its training images show; published "
     "numbers are of val (hold_out 1) or of test: do not compare them"
 )
 
@@ -39,7 +39,7 @@ def matches(folder: Path) -> bool:
     return _file(folder, "train").is_file()
 
 
-def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
+def read(location: CaptureLocation, options: ReadOptions) -> UndecodedCapture:
     """Read the capture.
 
     Raises:
@@ -57,7 +57,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
     background = options.background
     if background is None and shots[0].image.has_alpha():
         background = WHITE
-    return CaptureDraft(
+    return UndecodedCapture(
         name=location.name,
         source="D-NeRF",
         shots=shots,
@@ -94,18 +94,18 @@ def _shots_of(location: CaptureLocation, split: str, first_camera: int) -> list[
         record_poses(frames, file),
         [record_time_s(frame, _NO_TIME) for frame in frames],
     )
-    pictures = [record_image(frame, location.folder) for frame in frames]
-    size_px = pictures[0].size_px()
+    images = [record_image(frame, location.folder) for frame in frames]
+    size_px = images[0].size_px()
     return [
         Shot(
-            image=picture,
+            image=image,
             lens=record_intrinsics(frame, size_px),
             world_from_camera=pose,
             time_s=time_s,
             camera=first_camera + camera,
         )
-        for picture, frame, pose, time_s, camera in zip(
-            pictures, frames, poses, times_s, assign_camera_ids(poses, times_s), strict=True
+        for image, frame, pose, time_s, camera in zip(
+            images, frames, poses, times_s, assign_camera_ids(poses, times_s), strict=True
         )
     ]
 

@@ -55,7 +55,7 @@ def record_poses(frames: list[FrameRecord], file: Path) -> Float[Tensor, "f 4 4"
 
 
 def record_image(frame: FrameRecord, folder: Path) -> ImageFile:
-    """The picture under ``file_path``.
+    """The image under ``file_path``.
 
     Raises:
         FileFormatError: no name, no such file, or one outside the folder.

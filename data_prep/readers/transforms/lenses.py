@@ -12,7 +12,7 @@ from diff4splat.data_prep.readers.common.fisheye_lenses import require_fisheye
 from diff4splat.data_prep.readers.common.intrinsics import Intrinsics
 from diff4splat.errors import FileFormatError
 from diff4splat.geometry.camera import pinhole
-from diff4splat.paths.formats.json_fields import FrameRecord, optional_number, picture_size
+from diff4splat.paths.formats.json_fields import FrameRecord, image_size, optional_number
 from diff4splat.paths.formats.pinhole_fields import Record, pinhole_px
 
 _LENGTHS, _ANGLES = ("fl_x", "fl_y"), ("camera_angle_x", "camera_angle_y")
@@ -20,17 +20,17 @@ _STRAIGHTENED = ("k1", "k2", "k3", "p1", "p2")
 """Distortion that can be removed; other coefficients are refused by name."""
 _POLYNOMIAL = ("k1", "k2", "k3", "k4")
 _ROUNDING_PX = 0.5
-"""How far numbers of a sphere may be from those of its picture."""
+"""How far numbers of a sphere may be from those of its image."""
 
 
-def record_intrinsics(frame: FrameRecord, picture_px: tuple[int, int]) -> Intrinsics:
-    """The lens of a frame; ``picture_px`` stands in where the file says no size.
+def record_intrinsics(frame: FrameRecord, image_px: tuple[int, int]) -> Intrinsics:
+    """The lens of a frame; ``image_px`` stands in where the file says no size.
 
     Raises:
         FileFormatError: no focal length, a camera model that can neither be straightened nor seen
             through, or numbers that make no sense for it.
     """
-    size_px = picture_size(frame.fields, ("h", "w"), frame.where) or picture_px
+    size_px = image_size(frame.fields, ("h", "w"), frame.where) or image_px
     model = frame.fields.get("camera_model")
     name = model.upper() if isinstance(model, str) else ""
     if name == "EQUIRECTANGULAR":
@@ -64,8 +64,8 @@ def _equirectangular(frame: FrameRecord, size_px: tuple[int, int]) -> Intrinsics
         got = optional_number(frame.fields, key, frame.where)
         if got is not None and abs(got - value) > _ROUNDING_PX:
             raise FileFormatError(
-                f"{frame.where}: '{key}': expected {value:g}, since a picture of {width} x "
-                f"{height} is the whole sphere, got {got:g}; give the whole picture and remove the "
+                f"{frame.where}: '{key}': expected {value:g}, since an image of {width} x "
+                f"{height} is the whole sphere, got {got:g}; give the whole image and remove the "
                 "number"
             )
     plain = {"camera_model", *_LENGTHS, *_ANGLES, "cx", "cy"}

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from diff4splat.data.capture.capture import PointCloud
 from diff4splat.data_prep.readers.common.camera_ids import assign_camera_ids
-from diff4splat.data_prep.readers.common.capture_draft import CaptureDraft, Shot
 from diff4splat.data_prep.readers.common.test_split import choose_test_split
+from diff4splat.data_prep.readers.common.undecoded_capture import Shot, UndecodedCapture
 from diff4splat.data_prep.readers.files.depth_file import DepthFile
 from diff4splat.data_prep.readers.files.file_discovery import CaptureLocation, resolve_inside
 from diff4splat.data_prep.readers.files.json_file import texts
@@ -32,7 +32,7 @@ from diff4splat.paths.formats.json_fields import FrameRecord, optional_number
 EXPECTED_FILES = "transforms.json (nerfstudio, with a 'time' for every frame)"
 
 _HELD, _LEARNT = ("val_filenames", "test_filenames"), "train_filenames"
-_NO_TIME = "add the seconds of every picture, or give fps if the frames stand in order of time"
+_NO_TIME = "add the seconds of every image, or give fps if the frames stand in order of time"
 
 
 def matches(folder: Path) -> bool:
@@ -40,7 +40,7 @@ def matches(folder: Path) -> bool:
     return (folder / "transforms.json").is_file()
 
 
-def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
+def read(location: CaptureLocation, options: ReadOptions) -> UndecodedCapture:
     """Read the capture.
 
     Raises:
@@ -60,7 +60,7 @@ def read(location: CaptureLocation, options: ReadOptions) -> CaptureDraft:
     else:
         shots, reason = choose_test_split(shots, options.hold_out, location.name)
     points, cloud_notes = _points(root, file)
-    return CaptureDraft(
+    return UndecodedCapture(
         name=location.name,
         source="nerfstudio",
         shots=shots,
@@ -82,19 +82,19 @@ def _shots(
 ) -> list[Shot]:
     folder, poses, times_s = file.parent, record_poses(frames, file), _times_s(frames, fps)
     unit = optional_number(root, "depth_unit_scale_factor", str(file))
-    pictures = [record_image(frame, folder) for frame in frames]
-    size_px = pictures[0].size_px()
+    images = [record_image(frame, folder) for frame in frames]
+    size_px = images[0].size_px()
     shots = [
         Shot(
-            image=picture,
+            image=image,
             lens=record_intrinsics(frame, size_px),
             world_from_camera=pose,
             time_s=time_s,
             camera=camera,
             mask=_beside(frame, "mask_path", folder),
         )
-        for picture, frame, pose, time_s, camera in zip(
-            pictures, frames, poses, times_s, assign_camera_ids(poses, times_s), strict=True
+        for image, frame, pose, time_s, camera in zip(
+            images, frames, poses, times_s, assign_camera_ids(poses, times_s), strict=True
         )
     ]
     depths = [_beside(frame, "depth_file_path", folder) for frame in frames]

@@ -1,4 +1,4 @@
-"""Cameras as plain numbers, and the directions in which a picture is sampled.
+"""Cameras as plain numbers, and the directions in which an image is sampled.
 
 A direction is (x, y, 1) in camera axes: x = (u − c_x) / f_x, y = (v − c_y) / f_y.
 """
@@ -51,7 +51,7 @@ def render_camera(camera: Camera, frame: int) -> RenderCamera:
 
 
 def sample_grid(lens: RenderCamera, per_side: int) -> SampleGrid:
-    """Samples of a picture."""
+    """Samples of an image."""
     columns = np.arange(lens.width * per_side, dtype=np.float64)
     rows = np.arange(lens.height * per_side, dtype=np.float64)
     shift = (np.arange(per_side) - (per_side - 1) / 2) / (per_side * per_side)

@@ -38,7 +38,7 @@ Result = TypeVar("Result")
 
 
 def draw_clip(world: World, settings: DrawSettings | None = None) -> Clip:
-    """Pictures and truth of a world in all its views and frames.
+    """Images and truth of a world in all its views and frames.
 
     The same world gives the same bits on every machine and with any number of threads. Flow of the
     sky is that of infinitely far points. Points that are ever behind a camera have finite but
@@ -70,7 +70,7 @@ def draw_clip(world: World, settings: DrawSettings | None = None) -> Clip:
             frames,
         )
         views = [
-            _view(camera, [pictures[at] for pictures in painted], truths[at], lenses[0][0])
+            _view(camera, [images[at] for images in painted], truths[at], lenses[0][0])
             for at, camera in enumerate(world.views)
         ]
         tracks = None
@@ -104,7 +104,7 @@ def _lenses(world: World) -> list[list[RenderCamera]]:
     if lengths != [(frames,)] * len(lengths) or frames == 0:
         raise ConfigError(f"views: expected cameras for {frames} > 0 frames, got {lengths}")
     if len(sizes) > 1:
-        raise ConfigError(f"views: expected one picture size, got {sorted(sizes)}")
+        raise ConfigError(f"views: expected one image size, got {sorted(sizes)}")
     for at, camera in enumerate(world.views):
         require_rigid(camera.world_from_camera, f"view {at}")
     return [[render_camera(camera, frame) for frame in range(frames)] for camera in world.views]
@@ -118,7 +118,7 @@ def _measure(
 
 
 def _view(
-    camera: Camera, pictures: list[np.ndarray], truths: list[GroundTruth], first: RenderCamera
+    camera: Camera, images: list[np.ndarray], truths: list[GroundTruth], first: RenderCamera
 ) -> View:
     flow = None
     if truths[0].to_next is not None:
@@ -128,7 +128,7 @@ def _view(
             visible=_stacked([truth.visible for truth in truths[:-1]]),
         )
     return View(
-        rgb=_stacked(pictures),
+        rgb=_stacked(images),
         depth=_stacked([truth.depth for truth in truths]),
         cameras=_in_clip(camera, first),
         instances=_stacked([truth.instances for truth in truths]),

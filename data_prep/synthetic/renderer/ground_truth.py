@@ -34,24 +34,35 @@ def render_ground_truth(
 ) -> GroundTruth:
     """Ground truth of a frame; ``following`` is the camera at the next frame, for flow."""
     local, grid = camera_vertices(buffer, frame, lens), sample_grid(lens, 1)
-    closest, found = blank(lens.height, lens.width)
-    rasterise(local, buffer.triangles, 0, len(buffer.triangles), grid, NEAR_M, closest, found)
+    closest, triangle_map = blank(lens.height, lens.width)
+    rasterise(
+        local, buffer.triangles, 0, len(buffer.triangles), grid, NEAR_M, closest, triangle_map
+    )
     shape = (lens.height, lens.width)
     depth, instances = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
     read_pixels(
-        found, grid, local, buffer.triangles, buffer.owners, buffer.instances, depth, instances
+        triangle_map,
+        grid,
+        local,
+        buffer.triangles,
+        buffer.owners,
+        buffer.instances,
+        depth,
+        instances,
     )
     if following is None:
-        return GroundTruth(triangles=found, depth=depth, instances=instances)
+        return GroundTruth(triangles=triangle_map, depth=depth, instances=instances)
     later = camera_vertices(buffer, frame + 1, following)
     targets = np.zeros((depth.size, 3))
-    next_frame_positions(found, grid, lens, following, local, later, buffer.triangles, targets)
-    triangle_of_pixel = found.reshape(-1).astype(np.int64)
+    next_frame_positions(
+        triangle_map, grid, lens, following, local, later, buffer.triangles, targets
+    )
+    triangle_of_pixel = triangle_map.reshape(-1).astype(np.int64)
     visible_next = visible_points(later, buffer.triangles, following, targets, triangle_of_pixel)
     known = targets[:, 2] >= 0
     to_next = np.where(known[:, None], targets[:, :2] - _centers(shape), 0.0)
     return GroundTruth(
-        triangles=found,
+        triangles=triangle_map,
         depth=depth,
         instances=instances,
         to_next=to_next.astype(np.float32).reshape(*shape, 2),
@@ -75,29 +86,29 @@ def _centers(shape: tuple[int, int]) -> Float64[np.ndarray, "p 2"]:
 
 
 @kernel
-def read_pixels(found, grid, local, triangles, owners, instances, depth, seen):
+def read_pixels(triangle_map, grid, local, triangles, owners, instances, depth, instance_map):
     """Depth and instance of every pixel covered by a triangle."""
-    for row in range(found.shape[0]):
-        for column in range(found.shape[1]):
-            index = found[row, column]
+    for row in range(triangle_map.shape[0]):
+        for column in range(triangle_map.shape[1]):
+            index = triangle_map[row, column]
             if index >= 0:
                 x, y = grid.x[0, column], grid.y[row]
                 a, b, c = weights(local, triangles, index, x, y)
                 i, j, k = triangles[index, 0], triangles[index, 1], triangles[index, 2]
                 depth[row, column] = local[i, 2] * a + local[j, 2] * b + local[k, 2] * c
-                seen[row, column] = instances[owners[index]]
+                instance_map[row, column] = instances[owners[index]]
 
 
 @kernel
-def next_frame_positions(found, grid, lens, following, local, later, triangles, targets):
+def next_frame_positions(triangle_map, grid, lens, following, local, later, triangles, targets):
     """Position (u, v, 1/z) of the surface of every pixel in the next frame; 1/z = −1 if behind it.
 
     The sky is infinitely far away: it turns with the camera and has 1/z = 0.
     """
-    width = found.shape[1]
-    for row in range(found.shape[0]):
+    width = triangle_map.shape[1]
+    for row in range(triangle_map.shape[0]):
         for column in range(width):
-            index = found[row, column]
+            index = triangle_map[row, column]
             x, y = grid.x[0, column], grid.y[row]
             if index >= 0:
                 a, b, c = weights(local, triangles, index, x, y)

@@ -76,12 +76,12 @@ class Renderer:
             buffer.positions[frame], local, normals, buffer.rest, buffer.uv, buffer.triangles,
             buffer.owners,
         )  # fmt: skip
-        picture = np.zeros((lens.height, lens.width, 3), np.uint8)
+        image = np.zeros((lens.height, lens.width, 3), np.uint8)
         shade(
             found, grid, lens, surfaces, self._materials, self._lighting, shades,
-            byte_thresholds(), picture,
+            byte_thresholds(), image,
         )  # fmt: skip
-        return picture
+        return image
 
 
 def visible_world_points(

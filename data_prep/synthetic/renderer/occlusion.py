@@ -21,18 +21,18 @@ def visible_points(
     triangles: Int32[np.ndarray, "f 3"],
     lens: RenderCamera,
     points: Float64[np.ndarray, "n 3"],
-    own: Int64[np.ndarray, " n"],
+    point_triangles: Int64[np.ndarray, " n"],
 ) -> Bool[np.ndarray, " n"]:
     """Whether points (u, v, 1/z) are inside the image, in front of the camera and not occluded.
 
-    1/z is 0 at infinite distance, and negative for invisible points; ``own`` is the
+    1/z is 0 at infinite distance, and negative for invisible points; ``point_triangles`` is the
     triangle that a point lies on, or −1.
     """
     seen = np.zeros(len(points), np.bool_)
     starts = np.zeros(lens.height * lens.width + 1, np.int64)
     order = np.zeros(len(points), np.int64)
     inside = sort_by_pixel(points, lens.height, lens.width, starts, order)
-    lists = points[order[:inside]], own[order[:inside]]
+    lists = points[order[:inside]], point_triangles[order[:inside]]
     hidden = np.zeros(inside, np.bool_)
     mark_occluded(local, triangles, lens, starts, *lists, hidden)
     seen[order[:inside]] = ~hidden
@@ -49,7 +49,7 @@ def _pixel(points, index, height, width):
 
 @kernel
 def sort_by_pixel(points, height, width, starts, order):
-    """Indices of points by pixel into ``order``; returns how many are in the picture."""
+    """Indices of points by pixel into ``order``; returns how many are in the image."""
     for index in range(len(points)):
         pixel = _pixel(points, index, height, width)
         if pixel >= 0:
@@ -68,7 +68,7 @@ def sort_by_pixel(points, height, width, starts, order):
 
 
 @kernel
-def mark_occluded(local, triangles, lens, starts, points, own, hidden):
+def mark_occluded(local, triangles, lens, starts, points, point_triangles, hidden):
     """Mark the sorted ``points`` that triangles occlude."""
     for index in range(len(triangles)):
         left, top, right, bottom, low, high, cut = bounds(
@@ -99,5 +99,7 @@ def mark_occluded(local, triangles, lens, starts, points, own, hidden):
                     if cut and inverse > high:
                         continue
                     inverse = min(max(inverse, low), high)
-                    if inverse > points[at, 2] * _IN_FRONT and not touch(triangles, index, own[at]):
+                    if inverse > points[at, 2] * _IN_FRONT and not touch(
+                        triangles, index, point_triangles[at]
+                    ):
                         hidden[at] = True

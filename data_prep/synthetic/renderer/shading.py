@@ -1,4 +1,4 @@
-"""Kernel: the colours of a picture from its visibility samples.
+"""Kernel: the colours of an image from its visibility samples.
 
 A triangle is shaded once in each pixel where it has samples, at their middle, with its texture
 averaged over the pixel, and counts as often as it has samples. On a smooth surface it stands for
@@ -56,12 +56,12 @@ class Shade(NamedTuple):
 
 
 @kernel
-def shade(owners, grid, lens, surfaces, materials, lighting, shades, thresholds, picture):
-    """Fill ``picture`` (h w 3, bytes)."""
+def shade(owners, grid, lens, surfaces, materials, lighting, shades, thresholds, image):
+    """Fill ``image`` (h w 3, bytes)."""
     n = grid.per_side
     samples = n * n
-    for row in range(picture.shape[0]):
-        for column in range(picture.shape[1]):
+    for row in range(image.shape[0]):
+        for column in range(image.shape[1]):
             red, green, blue, done = 0.0, 0.0, 0.0, 0
             for first in range(samples):
                 if (done >> first) & 1:
@@ -88,9 +88,9 @@ def shade(owners, grid, lens, surfaces, materials, lighting, shades, thresholds,
                 green += color[1] * count
                 blue += color[2] * count
             scale = lighting.exposure / samples
-            picture[row, column, 0] = encoded(filmic(red * scale), thresholds)
-            picture[row, column, 1] = encoded(filmic(green * scale), thresholds)
-            picture[row, column, 2] = encoded(filmic(blue * scale), thresholds)
+            image[row, column, 0] = encoded(filmic(red * scale), thresholds)
+            image[row, column, 1] = encoded(filmic(green * scale), thresholds)
+            image[row, column, 2] = encoded(filmic(blue * scale), thresholds)
 
 
 @inlined
@@ -225,7 +225,7 @@ def _place(surfaces, materials, owner, i, j, k, a, b, c):
 def _bent(index, x, y, level, footprint, corners, point, normal, lens, surfaces, materials, owner):
     """The normal, bent by the slope of the texture's height (Mikkelsen 2010).
 
-    Slopes along the picture's axes, half a pixel away on the plane of the triangle.
+    Slopes along the image's axes, half a pixel away on the plane of the triangle.
     """
     i, j, k = corners
     step_x = _AVERAGED_PX * 0.5 / lens.focal[0]

@@ -1,8 +1,8 @@
 """How much of the light and of the sky reaches a point, from maps of heights toward each.
 
 A map looks along one direction: texel (row, column) holds the height, along that direction, of the
-surface nearest to the light. Heights are kept positive, which makes a map a picture that the
-rasteriser draws: vertices (u/h, v/h, 1/h) have 1/z = h, linear on the picture as an orthographic
+surface nearest to the light. Heights are kept positive, which makes a map an image that the
+rasteriser draws: vertices (u/h, v/h, 1/h) have 1/z = h, linear on the image as an orthographic
 height is.
 """
 
@@ -37,16 +37,16 @@ class Chart(NamedTuple):
 
 def chart_of(
     toward: Float64[np.ndarray, " 3"],
-    seen: Float64[np.ndarray, "n 3"],
+    points: Float64[np.ndarray, "n 3"],
     buffer: TriangleBuffer,
     edge_px: int,
 ) -> Chart:
-    """The plane whose map covers the points ``seen``, but for the outermost hundredth."""
+    """The plane whose map covers ``points``, but for the outermost hundredth."""
     axes = _axes(toward)
     low, size = np.zeros(2), 1e-3
-    if len(seen):
+    if len(points):
         for axis in range(2):
-            along = np.sort(_along(axes[axis], seen))
+            along = np.sort(_along(axes[axis], points))
             low[axis] = along[len(along) // 100]
             size = max(size, float(along[-1 - len(along) // 100] - low[axis]))
     size = min(1.06 * size + 0.1, 60.0)
@@ -84,14 +84,14 @@ class HeightMaps:
         self._grid = SampleGrid(middle[None], middle, np.zeros(edge_px), ones, zeros, 1)
         self._still = blank(edge_px, edge_px)
         if len(buffer.positions):
-            self._draw(0, (0, buffer.still), self._still)
+            self._draw(0, (0, buffer.static_count), self._still)
 
     def at(self, frame: int) -> Float64[np.ndarray, "h w"]:
         """Heights toward the light in one frame."""
-        if self._stage.still == len(self._stage.triangles):
+        if self._stage.static_count == len(self._stage.triangles):
             return self._still[0]
         drawn = self._still[0].copy(), self._still[1].copy()
-        self._draw(frame, (self._stage.still, len(self._stage.triangles)), drawn)
+        self._draw(frame, (self._stage.static_count, len(self._stage.triangles)), drawn)
         return drawn[0]
 
     def _draw(self, frame: int, part: tuple[int, int], to: tuple[np.ndarray, np.ndarray]) -> None:

@@ -38,7 +38,7 @@ _WALLS = 0.45
 
 
 def lighting_of(world: World) -> Lighting:
-    """A world's light, exposed so that what is white and lit is nearly white in the picture."""
+    """A world's light, exposed so that what is white and lit is nearly white in the image."""
     light, sky = world.light, world.sky
     facing = max(float(-light.toward[1]), 0.35)
     level = 0.85 * facing * _luminance(light.color) + 0.7 * _luminance(light.sky)

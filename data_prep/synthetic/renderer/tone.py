@@ -1,4 +1,4 @@
-"""From linear light to the bytes of a picture: a filmic shoulder, then sRGB (IEC 61966-2-1)."""
+"""From linear light to the bytes of an image: a filmic shoulder, then sRGB (IEC 61966-2-1)."""
 
 from functools import cache
 

@@ -72,7 +72,7 @@ def _candidates(
             where = np.empty((len(rows), 4), np.int64)
             where[:, 0], where[:, 1], where[:, 2], where[:, 3] = view, frame, rows, columns
             places.append(where)
-            moves.append(truth.triangles[rows, columns] >= buffer.still)
+            moves.append(truth.triangles[rows, columns] >= buffer.static_count)
     return np.concatenate(places), np.concatenate(moves)
 
 

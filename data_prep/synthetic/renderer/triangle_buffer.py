@@ -25,7 +25,7 @@ class TriangleBuffer:
     owners: Int32[np.ndarray, " f"]
     """Index into ``objects``."""
     instances: UInt8[np.ndarray, " o"]
-    still: int
+    static_count: int
     """Number of static triangles; they come first."""
 
 
@@ -61,7 +61,7 @@ def build_triangle_buffer(world: World) -> TriangleBuffer:
         ),
         owners=np.repeat(np.arange(len(objects), dtype=np.int32), sizes),
         instances=np.array([thing.instance for thing in objects], np.uint8),
-        still=sum(
+        static_count=sum(
             size for size, thing in zip(sizes, objects, strict=True) if len(thing.positions) == 1
         ),
     )

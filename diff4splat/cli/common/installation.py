@@ -107,7 +107,7 @@ def self_test() -> str:
     error = float((rgb - exact).abs().max())
     if not error < TOLERANCE or not bool(exact.any()):
         raise Diff4SplatError(
-            f"renderer {backend}: expected the picture of float64 within {TOLERANCE:g}, "
+            f"renderer {backend}: expected the image of float64 within {TOLERANCE:g}, "
             f"got {error:g} off; install numba and torch again"
         )
     return f"renderer {backend} agrees with float64 to {error:.0e}"

@@ -8,9 +8,9 @@ if TYPE_CHECKING:
 
 def skipped_gaussians(scene: "Scene", time_s: float) -> str | None:
     """One line with the number of invalid Gaussians at ``time_s`` and the reason, or None."""
-    from diff4splat.render.support import usable_gaussians
+    from diff4splat.render.support import renderable_gaussians
 
-    _, dropped = usable_gaussians(scene.state_at(time_s))
+    _, dropped = renderable_gaussians(scene.state_at(time_s))
     if not dropped:
         return None
     parts = ", ".join(f"{count:,} with {name}" for name, count in dropped.items())

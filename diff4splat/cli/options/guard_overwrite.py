@@ -6,7 +6,7 @@ from pathlib import Path
 from diff4splat.errors import ConfigError
 
 
-def require_inputs_kept(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
+def require_inputs_not_overwritten(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
     """Reject an output that is also an input.
 
     Raises:

@@ -81,7 +81,7 @@ def _fisheye_fov_deg(options: OpticsOptions, lens: "OpenCVFisheye") -> float:
     if options.fov is not None and options.fov > widest * (1 + _ROUNDING):
         raise ConfigError(
             f"--fov: expected at most {widest:.4g} degrees, where these --lens-coefficients bend "
-            f"the picture back on itself, got {options.fov:g}; ask for less"
+            f"the image back on itself, got {options.fov:g}; ask for less"
         )
     return min(FOV_DEG, widest * (1 - _ROUNDING)) if options.fov is None else options.fov
 

@@ -1,1 +1,1 @@
-"""Captures: posed, timed pictures of one scene, which per-scene fitting learns from."""
+"""Captures: posed, timed images of one scene, which per-scene fitting learns from."""

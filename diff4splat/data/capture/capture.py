@@ -1,7 +1,7 @@
-"""A capture: pictures of one dynamic scene with known cameras and times, from any reader.
+"""A capture: images of one dynamic scene with known cameras and times, from any reader.
 
-Axes: ``f`` frames (one picture of one camera at one time), ``h w`` pixels, ``p`` points. Lengths
-are scene units, times seconds, depth is z with 0 for "nothing there". Pictures are read when asked
+Axes: ``f`` frames (one image of one camera at one time), ``h w`` pixels, ``p`` points. Lengths
+are scene units, times seconds, depth is z with 0 for "nothing there". Images are read when asked
 for, so that a long capture need not fit into memory.
 """
 
@@ -31,12 +31,12 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """One picture and what else is known about its pixels."""
+    """One image and what else is known about its pixels."""
 
     rgb: Float[Tensor, "h w 3"]
     """RGB in [0, 1], float32; where the file has transparency, over ``Capture.background``."""
     counts: Bool[Tensor, "h w"] | None = None
-    """False where the picture says nothing about the scene (masked, NaN); None counts all."""
+    """False where the image says nothing about the scene (masked, NaN); None counts all."""
     depth: Float[Tensor, "h w"] | None = None
     """z; 0 where there is none."""
     flow: Flow | None = None
@@ -44,12 +44,12 @@ class Frame:
 
 @runtime_checkable
 class Frames(Protocol):
-    """Pictures by index; equal calls give equal pictures."""
+    """Images by index; equal calls give equal images."""
 
     def __len__(self) -> int: ...
 
     def read(self, index: int) -> Frame:
-        """The picture of frame ``index``.
+        """The image of frame ``index``.
 
         Raises:
             FileFormatError: the file is missing, damaged, or of another size than the camera.

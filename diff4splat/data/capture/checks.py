@@ -13,13 +13,13 @@ ROUNDING = 1e-9
 """Places closer than this share of their coordinates are one place."""
 
 
-def require_usable_capture(capture: Capture) -> Capture:
+def require_valid_capture(capture: Capture) -> Capture:
     """``capture`` itself.
 
     Raises:
-        ShapeError: cameras, times, indices and pictures differ in number.
-        InputError: no frames, a time that is not finite, a camera that shows two pictures at one
-            time, a pose that is not a rotation and a translation, or pictures from one place only
+        ShapeError: cameras, times, indices and images differ in number.
+        InputError: no frames, a time that is not finite, a camera that shows two images at one
+            time, a pose that is not a rotation and a translation, or images from one place only
             and without depth.
     """
     _require_counts(capture)
@@ -44,7 +44,7 @@ def _require_counts(capture: Capture) -> None:
         got = ", ".join(f"{name} {shape}" for name, shape in counts.items())
         raise ShapeError(f"{capture.name}: expected one entry per frame everywhere, got {got}")
     if len(capture) == 0:
-        raise InputError(f"{capture.name}: expected pictures, got none; check the folder")
+        raise InputError(f"{capture.name}: expected images, got none; check the folder")
 
 
 def _require_times(capture: Capture) -> None:
@@ -58,7 +58,7 @@ def _require_times(capture: Capture) -> None:
         if bool((times_s.diff() <= 0).any()):
             at_s = float(times_s[:-1][times_s.diff() <= 0][0])
             raise InputError(
-                f"{capture.name}: expected one picture per camera and time, got two of camera "
+                f"{capture.name}: expected one image per camera and time, got two of camera "
                 f"{camera} at {at_s:g} s; give every frame its own time"
             )
 
@@ -73,6 +73,6 @@ def _require_parallax(capture: Capture) -> None:
         return
     if capture.frames.read(int(learnt[0])).depth is None:
         raise InputError(
-            f"{capture.name}: expected pictures from at least two places, got one standing camera "
+            f"{capture.name}: expected images from at least two places, got one standing camera "
             "and no depth; move the camera, add cameras, or give depth"
         )

@@ -1,6 +1,6 @@
 """What a held-out frame is new in: its view, its time, or nothing at all.
 
-Names of splits cannot be trusted: the test frames of a widely used multi-view layout are pictures
+Names of splits cannot be trusted: the test frames of a widely used multi-view layout are images
 that training has seen. So the kind is found from poses and times, frame by frame.
 """
 

@@ -13,7 +13,7 @@ from diff4splat.data.codecs.cameras import decode_cameras
 from diff4splat.data.codecs.depth import decode_exr
 from diff4splat.data.codecs.images import decode_png
 from diff4splat.data.codecs.metadata import decode_metadata
-from diff4splat.data.codecs.motion import SeenTracks, decode_flow, decode_tracks
+from diff4splat.data.codecs.motion import VisibleTracks, decode_flow, decode_tracks
 from diff4splat.data.codecs.video import decode_mp4
 from diff4splat.data.entry import ClipEntry
 from diff4splat.errors import FileFormatError
@@ -79,7 +79,7 @@ def decode_clip(members: Mapping[str, bytes], entry: ClipEntry, part: ClipPart) 
     )
 
 
-def _view(job: _Job, number: int, camera: Camera, seen: SeenTracks | None) -> View:
+def _view(job: _Job, number: int, camera: Camera, seen: VisibleTracks | None) -> View:
     instances, flow = f"instances{number:02d}.png", f"flow{number:02d}.npz"
     shape = (job.entry.frames, *job.entry.size_px)
     depth = job.decode(f"depth{number:02d}.exr", lambda content: decode_exr(content, shape))
@@ -108,8 +108,8 @@ def _rgb(job: _Job, number: int) -> Tensor:
     movie = f"rgb{number:02d}.mp4"
     if movie in job.members:
         return torch.from_numpy(job.decode(movie, lambda content: decode_mp4(content, shape)))
-    picture = f"rgb{number:02d}.png"
-    return torch.from_numpy(job.decode(picture, lambda content: decode_png(content, shape)))
+    image = f"rgb{number:02d}.png"
+    return torch.from_numpy(job.decode(image, lambda content: decode_png(content, shape)))
 
 
 def _instances(job: _Job, suffix: str, shape: tuple[int, ...]) -> Tensor:
@@ -124,7 +124,7 @@ def _flow(job: _Job, suffix: str) -> Flow:
     return Flow(to_next=flow.to_next[pairs], known=flow.known[pairs], visible=flow.visible[pairs])
 
 
-def _tracks(job: _Job) -> tuple[Tracks, tuple[SeenTracks | None, ...]]:
+def _tracks(job: _Job) -> tuple[Tracks, tuple[VisibleTracks | None, ...]]:
     tracks, seen = job.decode(
         "tracks.npz", lambda content: decode_tracks(content, job.entry, job.views)
     )

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from torch import Tensor
 
-from diff4splat.data.checks import require_first_camera, require_usable
+from diff4splat.data.checks import require_first_camera, require_valid_clip
 from diff4splat.data.clip import Clip, View
 from diff4splat.data.codecs.cameras import encode_cameras
 from diff4splat.data.codecs.depth import DepthCoding, encode_exr
@@ -30,7 +30,7 @@ _DEFAULT_FPS = 10.0
 class Coding:
     """How pixels are stored."""
 
-    pictures: Literal["png", "mp4"] = "png"
+    images: Literal["png", "mp4"] = "png"
     """PNG without loss; MP4, ten times smaller, for sets that were video before."""
     depth: DepthCoding = "pxr24"
 
@@ -59,7 +59,7 @@ def encode_clip(clip: Clip, coding: Coding | None = None) -> EncodedClip:
     Raises:
         InputError: the clip contradicts itself or cannot be stored so; says what and where.
     """
-    require_usable(clip)
+    require_valid_clip(clip)
     require_first_camera(clip)
     try:
         members = tuple(Member(suffix=s, content=c) for s, c in _members(clip, coding or Coding()))
@@ -81,8 +81,8 @@ def _members(clip: Clip, coding: Coding) -> Iterator[tuple[str, bytes]]:
 
 def _pixels(view: View, coding: Coding, fps: float) -> Iterator[tuple[str, str, bytes]]:
     rgb = view.rgb.numpy()
-    lossy = coding.pictures == "mp4"
-    yield "rgb", coding.pictures, encode_mp4(rgb, fps) if lossy else encode_png(rgb)
+    lossy = coding.images == "mp4"
+    yield "rgb", coding.images, encode_mp4(rgb, fps) if lossy else encode_png(rgb)
     yield "depth", "exr", encode_exr(view.depth.numpy(), coding.depth)
     if view.instances is not None:
         yield "instances", "png", encode_png(view.instances.numpy())

@@ -1,4 +1,4 @@
-"""Pictures of all frames in one PNG, stacked from top to bottom: without loss, seen anywhere.
+"""Images of all frames in one PNG, stacked from top to bottom: without loss, seen anywhere.
 
 Axes: ``t`` frames, ``h w`` pixels, 3 colours or none (instances).
 """
@@ -16,7 +16,7 @@ _LEVEL = 3
 
 
 def encode_png(frames: UInt8[np.ndarray, "t h w *c"]) -> bytes:
-    """One picture of height t · h."""
+    """One image of height t · h."""
     encoded = io.BytesIO()
     stacked = frames.reshape(-1, *frames.shape[2:])
     Image.fromarray(stacked).save(encoded, "PNG", compress_level=_LEVEL)
@@ -30,7 +30,7 @@ def decode_png(content: bytes, shape: tuple[int, ...]) -> UInt8[np.ndarray, "t h
         FileFormatError: damaged, or of another size or kind.
     """
     try:
-        # Not Image.open: its limit on pixels is for one picture, and the size is checked here.
+        # Not Image.open: its limit on pixels is for one image, and the size is checked here.
         image = PngImagePlugin.PngImageFile(io.BytesIO(content))
         got = (image.size[::-1], image.mode)
         want = ((shape[0] * shape[1], shape[2]), "RGB" if len(shape) == 4 else "L")

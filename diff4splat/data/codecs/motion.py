@@ -22,7 +22,7 @@ from diff4splat.errors import FileFormatError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SeenTracks:
+class VisibleTracks:
     """Where one view sees the tracked points."""
 
     uv: Float32[Tensor, "t n 2"]
@@ -71,7 +71,7 @@ def encode_tracks(clip: Clip, tracks: Tracks) -> bytes:
 
 def decode_tracks(
     content: bytes, entry: ClipEntry, views: tuple[int, ...]
-) -> tuple[Tracks, tuple[SeenTracks | None, ...]]:
+) -> tuple[Tracks, tuple[VisibleTracks | None, ...]]:
     """The points, and where each of ``views`` sees them.
 
     Raises:
@@ -97,9 +97,9 @@ def decode_tracks(
     return tracks, seen
 
 
-def _seen(archive: ZipFile, view: int, shape: tuple[int, int]) -> SeenTracks | None:
+def _seen(archive: ZipFile, view: int, shape: tuple[int, int]) -> VisibleTracks | None:
     if not has_array(archive, f"uv{view:02d}"):
         return None
     uv = take_array(archive, f"uv{view:02d}", np.float32, (*shape, 2))
     visible = take_bits(archive, f"visible{view:02d}", shape)
-    return SeenTracks(uv=torch.from_numpy(uv), visible=torch.from_numpy(visible))
+    return VisibleTracks(uv=torch.from_numpy(uv), visible=torch.from_numpy(visible))

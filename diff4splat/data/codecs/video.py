@@ -1,4 +1,4 @@
-"""Pictures of all frames as MP4: small, with loss. Axes: ``t`` frames, ``h w 3`` bytes."""
+"""Images of all frames as MP4: small, with loss. Axes: ``t`` frames, ``h w 3`` bytes."""
 
 import tempfile
 from pathlib import Path

@@ -80,9 +80,7 @@ def text_entries(
     """Correct directions, and the fraction of static Gaussians, of one sample."""
     target = text_sample(sample)
     if target is None:
-        return [
-            Skip(row=row, key=key, why="the first picture shows no named object") for key in KEYS
-        ]
+        return [Skip(row=row, key=key, why="the first image shows no named object") for key in KEYS]
     scenes = {
         motion: system.generate(sample, captioner(sample.clip, target.note, motion), protocol.seed)
         for motion in ("left", "right", "still")

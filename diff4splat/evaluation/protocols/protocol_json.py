@@ -71,7 +71,7 @@ def parse_protocol(text: str, where: str) -> Protocol:
         raise FileFormatError(
             f"{where}: expected version {VERSION}, got {version!r}; a newer diff4splat may read it"
         )
-    return TypedReader(refusal=FileFormatError).read(Protocol, data, where)
+    return TypedReader(error_type=FileFormatError).read(Protocol, data, where)
 
 
 def protocol_json(protocol: Protocol) -> str:

@@ -19,7 +19,7 @@ def difference_chart(values: list[float], title: str) -> Float[Tensor, "h w 3"]:
     canvas = Canvas(*_SIZE)
     canvas.text((_MARGIN, 16), title, Style(size_px=20))
     width = _SIZE[0] - 2 * _MARGIN
-    canvas.picture((_MARGIN, 64), (width, _PLOT_HEIGHT), _bars(sorted(values), width))
+    canvas.image((_MARGIN, 64), (width, _PLOT_HEIGHT), _bars(sorted(values), width))
     below = 64 + _PLOT_HEIGHT + 12
     small = Style(size_px=17, color=FAINT)
     if values:

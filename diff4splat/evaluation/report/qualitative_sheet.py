@@ -79,7 +79,7 @@ def _draw_strip(canvas: Canvas, y: int, strip: ImageStrip) -> None:
         x = _MARGIN + index * (_CELL + _GAP)
         size = fitted(image.shape, (_CELL, _CELL))
         canvas.text((x, top), name, _SMALL)
-        canvas.picture((x, top + _SMALL.line_px), size, image)
+        canvas.image((x, top + _SMALL.line_px), size, image)
 
 
 def _strip_height(strip: ImageStrip) -> int:

@@ -91,7 +91,7 @@ class LearnedLens:
         return replace(model, optics=replace(model.optics, lens=lens))
 
     def clamped(self, raw: Tensor) -> Tensor | None:
-        """None for a lens that folds back within the picture."""
+        """None for a lens that folds back within the image."""
         try:
             lens = coefficients.with_coefficients(self._lens, self._at(raw))
         except InputError:

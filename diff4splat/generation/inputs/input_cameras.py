@@ -13,7 +13,7 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.paths.build import build_path
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.resize import resized
 from diff4splat.paths.settings import PathFrame, PathSettings
 from diff4splat.paths.spline import resample
@@ -27,37 +27,37 @@ def path_frame(camera: Camera) -> PathFrame:
 
 
 def to_camera_path(path: CameraPath | str, camera: Camera) -> CameraPath:
-    """Presets in the picture's view, or cameras at its size that start at the identity and 0 s."""
+    """Presets in the image's view, or cameras at its size that start at the identity and 0 s."""
     if isinstance(path, str):
         settings = PathSettings(frames=DEFAULT_FRAMES, fps=DEFAULT_FPS)
         return build_path(path, path_frame(camera), settings)
-    fitting = resized(require_usable(path, "camera path"), camera.size_px)
+    fitting = resized(require_valid_path(path, "camera path"), camera.size_px)
     started = CameraPath(
         cameras=relative_to_first(fitting.cameras), times_s=fitting.times_s - fitting.times_s[0]
     )
     return started.to(camera.focal_px.dtype)
 
 
-def reconcile_intrinsics(picture: InputImage, path: CameraPath) -> tuple[InputImage, CameraPath]:
+def reconcile_intrinsics(image: InputImage, path: CameraPath) -> tuple[InputImage, CameraPath]:
     """The first camera of the path took the photograph, so both must have one lens.
 
     A photograph whose lens is known keeps it, and the path keeps its zoom relative to its first
     camera; otherwise the photograph takes over the lens that the path names.
     """
     cameras, first = path.cameras, path.cameras[0]
-    if torch.allclose(first.focal_px, picture.camera.focal_px) and torch.allclose(
-        first.center_px, picture.camera.center_px
+    if torch.allclose(first.focal_px, image.camera.focal_px) and torch.allclose(
+        first.center_px, image.camera.center_px
     ):
-        return picture, path
-    if not picture.focal_known:
-        lens = replace(picture.camera, focal_px=first.focal_px, center_px=first.center_px)
-        return replace(picture, camera=lens, focal_known=True, focal_source="camera path"), path
+        return image, path
+    if not image.focal_known:
+        lens = replace(image.camera, focal_px=first.focal_px, center_px=first.center_px)
+        return replace(image, camera=lens, focal_known=True, focal_source="camera path"), path
     matched = replace(
         cameras,
-        focal_px=cameras.focal_px * (picture.camera.focal_px / first.focal_px),
-        center_px=cameras.center_px + (picture.camera.center_px - first.center_px),
+        focal_px=cameras.focal_px * (image.camera.focal_px / first.focal_px),
+        center_px=cameras.center_px + (image.camera.center_px - first.center_px),
     )
-    return picture, replace(path, cameras=matched)
+    return image, replace(path, cameras=matched)
 
 
 def resample_to_model_frames(path: CameraPath, frames: int) -> CameraPath:

@@ -1,6 +1,6 @@
 """The photograph as the model sees it: size, crop and focal length.
 
-Axes: ``h w 3`` RGB in [0, 1]. The picture keeps the photograph's shape: both sides become multiples
+Axes: ``h w 3`` RGB in [0, 1]. The image keeps the photograph's shape: both sides become multiples
 of 16 within a pixel budget, and at most a few columns or rows are cropped. Focal lengths follow
 scale and crop, so the geometry stays that of the photograph.
 """
@@ -55,14 +55,14 @@ class InputImage:
         return replace(self, rgb=self.rgb.to(device), camera=self.camera.to(device))
 
 
-def downsample(picture: InputImage, factor: int) -> InputImage:
-    """The picture with ``factor``² pixels averaged into one; its sides are multiples of that."""
+def downsample(image: InputImage, factor: int) -> InputImage:
+    """The image with ``factor``² pixels averaged into one; its sides are multiples of that."""
     if factor == 1:
-        return picture
-    rgb = torch.nn.functional.avg_pool2d(picture.rgb.movedim(-1, 0)[None], factor)[0]
-    height, width = picture.camera.size_px
-    camera = picture.camera.resized((height // factor, width // factor))
-    return replace(picture, rgb=rgb.movedim(0, -1), camera=camera)
+        return image
+    rgb = torch.nn.functional.avg_pool2d(image.rgb.movedim(-1, 0)[None], factor)[0]
+    height, width = image.camera.size_px
+    camera = image.camera.resized((height // factor, width // factor))
+    return replace(image, rgb=rgb.movedim(0, -1), camera=camera)
 
 
 def load_image(

@@ -56,6 +56,6 @@ class LayeredImage:
     layers: tuple[ImageLayer, ...]
 
     @property
-    def shown_count(self) -> int:
+    def visible_count(self) -> int:
         """Cells of the layers that the image shows."""
         return sum(int(layer.mask.sum()) for layer in self.layers if layer.in_image)

@@ -45,13 +45,13 @@ def reconstruct(
     maps: RawGaussianMaps,
     base: PixelBase,
     config: ActivationConfig,
-    kept: Bool[Tensor, "f h w"] | None = None,
+    keep: Bool[Tensor, "f h w"] | None = None,
 ) -> CanonicalScene:
-    """One Gaussian for every cell of a batch of one, or for those that are ``kept``."""
+    """One Gaussian for every cell of a batch of one, or for those in the mask ``keep``."""
     gaussians = activate(maps.gaussians[0].float(), base, config)
     index = torch.arange(len(gaussians), device=gaussians.means.device)
-    if kept is not None:
-        index = kept.flatten().nonzero()[:, 0]
+    if keep is not None:
+        index = keep.flatten().nonzero()[:, 0]
         gaussians = gaussians.select(index)
     return CanonicalScene(gaussians=gaussians, cell_index=index, maps=maps)
 
@@ -63,11 +63,11 @@ def reconstruct_refined(
     cameras, raw = video.key_cameras[0], maps.gaussians[0].float()
     base = keyframe_plane_prior(video.key_rgb[0].movedim(1, -1), cameras)
     depth = key_depth(raw[-1], config)
-    kept = ~visible_in_earlier_frame(depth.detach(), cameras)
-    if duplicates := int((~kept).sum()):
+    keep = ~visible_in_earlier_frame(depth.detach(), cameras)
+    if duplicates := int((~keep).sum()):
         why, saved = "an earlier key frame shows the same points", f"{duplicates:,} Gaussians"
         log.record_skipped("duplicate pixels", why, saved)
-    scene = reconstruct(maps, base, config, kept)
+    scene = reconstruct(maps, base, config, keep)
     if maps.border is None:
         return scene
     border = border_gaussians(maps.border[0].float(), base, depth[0], config)
@@ -114,23 +114,23 @@ def prune_cells(
         ConfigError: no Gaussian is left, unless the result ``may_be_empty``.
     """
     opacities, cells = scene.gaussians.opacities, len(scene.cell_index)
-    kept = opacities >= min_opacity
-    dropped = int((~kept).sum())
-    if dropped == len(kept) and dropped and not may_be_empty:
+    keep = opacities >= min_opacity
+    dropped = int((~keep).sum())
+    if dropped == len(keep) and dropped and not may_be_empty:
         raise ConfigError(
             f"--min-opacity: expected a value that leaves some Gaussians, got {min_opacity:g}; "
             "lower it"
         )
     if dropped:
-        faintest = float(opacities[~kept].max())
+        faintest = float(opacities[~keep].max())
         log.record_skipped(
             "faint Gaussians",
             f"opacity below {min_opacity:g}",
-            f"{dropped:,} of {len(kept):,} Gaussians",
+            f"{dropped:,} of {len(keep):,} Gaussians",
             faintest if faintest >= RENDER_CUTOFF else 0.0,
         )
     return CanonicalScene(
-        gaussians=scene.gaussians.select(kept),
-        cell_index=scene.cell_index[kept[:cells]],
+        gaussians=scene.gaussians.select(keep),
+        cell_index=scene.cell_index[keep[:cells]],
         maps=scene.maps,
     )

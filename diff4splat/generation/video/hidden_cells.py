@@ -37,7 +37,7 @@ class FillGrid:
         return self.base.cameras
 
 
-def whole_grid(
+def full_grid(
     raw: Float[Tensor, "12 f h w"], base: PixelBase, config: ActivationConfig
 ) -> FillGrid:
     """Every cell is filled: the image has no geometry of its own."""
@@ -46,11 +46,11 @@ def whole_grid(
     return FillGrid(base=base, depth=depth, filled=torch.ones_like(depth, dtype=torch.bool))
 
 
-def hidden_grid(grid: FillGrid, shown: RenderedImage) -> FillGrid:
+def hidden_grid(grid: FillGrid, rendered: RenderedImage) -> FillGrid:
     """Only cells that neither the image nor an earlier frame shows, at the image's depth scale."""
-    ratio = depth_ratio(grid.depth, shown)
-    depth, unseen = grid.depth * ratio, ~shown.valid
-    unseen = unseen & ~in_front_of_image(depth, grid.cameras, shown.depth[0])
+    ratio = depth_ratio(grid.depth, rendered)
+    depth, unseen = grid.depth * ratio, ~rendered.valid
+    unseen = unseen & ~in_front_of_image(depth, grid.cameras, rendered.depth[0])
     return FillGrid(
         base=replace(grid.base, distance=grid.base.distance * ratio),
         depth=depth,
@@ -73,10 +73,10 @@ def in_front_of_image(
     return torch.stack(rows)
 
 
-def depth_ratio(depth: Float[Tensor, "f h w"], shown: RenderedImage) -> Float[Tensor, "f 1 1"]:
+def depth_ratio(depth: Float[Tensor, "f h w"], rendered: RenderedImage) -> Float[Tensor, "f 1 1"]:
     """The median ratio that brings each frame to the image's depth; 1 where they share no cell."""
     ratios = []
-    for predicted, valid, reference in zip(depth, shown.valid, shown.depth, strict=True):
+    for predicted, valid, reference in zip(depth, rendered.valid, rendered.depth, strict=True):
         both = valid & (reference > 0)
         ratio = reference[both] / predicted[both]
         ratios.append(ratio.median() if len(ratio) else predicted.new_ones(()))

@@ -47,7 +47,7 @@ def render_layered_image(image: LayeredImage, path: CameraPath) -> RenderedImage
         state = scene.motion.state_at(scene.gaussians, float(path.times_s[index]))
         camera = path.cameras[index]
         rgb.append(render(state, camera, settings=UNDILATED).rgb.clamp(0, 1))
-        shown = state.select(slice(image.shown_count))
+        shown = state.select(slice(image.visible_count))
         seen = render(shown, camera, outputs=("alpha", "depth"), settings=UNDILATED)
         valid.append(seen.alpha > MIN_COVERAGE)
         depth.append(seen.depth)

@@ -26,7 +26,7 @@ from diff4splat.generation.video.canonical_scene import (
     reconstruct,
 )
 from diff4splat.generation.video.deformation_motion import deform
-from diff4splat.generation.video.hidden_cells import FillGrid, at_grid, hidden_grid, whole_grid
+from diff4splat.generation.video.hidden_cells import FillGrid, at_grid, full_grid, hidden_grid
 from diff4splat.generation.video.render_condition import (
     RenderedImage,
     encode_condition,
@@ -141,7 +141,7 @@ def _grid(model: Model, request: FillRequest, video: _FilledVideo, raw: RawVideo
     else:
         rgb, frames = raw.frames.key_rgb[0].movedim(1, -1), frames[::TIME_STRIDE]
         base = keyframe_plane_prior(rgb, raw.frames.key_cameras[0])
-    grid = whole_grid(raw.maps.gaussians[0], base, model.config.activation)
+    grid = full_grid(raw.maps.gaussians[0], base, model.config.activation)
     if not request.hidden_only:
         return grid
     return hidden_grid(grid, at_grid(video.rendered, frames, model.config.ldrm.grid_stride))

@@ -31,7 +31,7 @@ FARTHEST_MM = 1e6
 class BlenderFisheye:
     """A fisheye lens as Blender describes it; image-plane coordinates are millimetres.
 
-    With k_0 ≠ 0 the centre of the picture and the axis have no partner, since their azimuth is
+    With k_0 ≠ 0 the centre of the image and the axis have no partner, since their azimuth is
     unknown. With k_0 < 0 a direction can be seen twice; ``points`` gives the side where θ >= 0.
 
     Raises:

@@ -18,7 +18,7 @@ def blender_camera(
 ) -> Camera:
     """A camera for ``BlenderFisheye``: the focal length is pixels per millimetre.
 
-    ``sensor_mm`` is the longer side of the sensor; the other follows from the picture.
+    ``sensor_mm`` is the longer side of the sensor; the other follows from the image.
 
     Raises:
         InputError: the sensor has no size.
@@ -32,7 +32,7 @@ def blender_camera(
 
 
 def equirectangular_camera(size_px: tuple[int, int], dtype: torch.dtype = torch.float32) -> Camera:
-    """A camera for ``Equirectangular``: the whole sphere fills the picture."""
+    """A camera for ``Equirectangular``: the whole sphere fills the image."""
     height, width = size_px
     per_radian = torch.tensor([width / (2 * math.pi), height / math.pi], dtype=dtype)
     return replace(pinhole(1.0, size_px, dtype), focal_px=per_radian)
@@ -44,7 +44,7 @@ def fisheye_camera(
     lens: OpenCVFisheye,
     dtype: torch.dtype = torch.float32,
 ) -> Camera:
-    """A camera whose field of view ``fov_deg`` spans the width of the picture.
+    """A camera whose field of view ``fov_deg`` spans the width of the image.
 
     Raises:
         InputError: the lens does not see that far.

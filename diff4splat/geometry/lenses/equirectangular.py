@@ -1,4 +1,4 @@
-"""The whole sphere on one picture: points are (longitude, latitude) in radians.
+"""The whole sphere on one image: points are (longitude, latitude) in radians.
 
     direction = (sin lon cos lat, sin lat, cos lon cos lat)
 

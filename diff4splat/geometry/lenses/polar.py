@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 LARGEST_TANGENT = 1e6
-"""Directions closer than this to a right angle with the axis have no point on a flat picture."""
+"""Directions closer than this to a right angle with the axis have no point on a flat image."""
 
 TINY = 1e-18
 """Radii and sines below count as zero."""

@@ -1,4 +1,4 @@
-"""Polynomials that rise from the centre of a picture up to a limit, and their inverse.
+"""Polynomials that rise from the centre of an image up to a limit, and their inverse.
 
 Coefficients are ascending: c_0 + c_1 x + c_2 x² + …. Axes: ``k`` coefficients.
 """

@@ -29,7 +29,7 @@ def sensor_pixels(
 ) -> tuple[Float[Tensor, "*b 2"], Bool[Tensor, "*b"]]:
     """Pixel coordinates (x, y) of directions in camera axes, and which exist.
 
-    Pixels outside the picture exist too; where there is none, the value is the centre.
+    Pixels outside the image exist too; where there is none, the value is the centre.
 
     Raises:
         ShapeError: ``camera`` is a batch.

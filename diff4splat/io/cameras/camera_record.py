@@ -22,15 +22,15 @@ from diff4splat.io.strict_json import (
     JsonObject,
     as_object,
     optional_text,
+    take_int,
     take_list,
     take_number,
     take_numbers,
     take_object,
     take_pose,
     take_text,
-    take_whole,
 )
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.formats.json_fields import load_object, optional_number
 from diff4splat.paths.physical_path import PhysicalPath
 from diff4splat.render.physical.settings import PhotoSettings
@@ -183,7 +183,7 @@ def _record(root: JsonObject, where: str) -> CameraRecord:
         generator=take_text(root, "generator", where),
         valid=optional_text(root, "valid", where),
         scene_time_s=optional_number(root, "scene_time_s", where),
-        intervals=take_whole(sampling, "intervals", where, least=1),
+        intervals=take_int(sampling, "intervals", where, least=1),
         interval_error_px=take_number(sampling, "interval_error_px", where),
     )
 
@@ -208,7 +208,7 @@ def _path(frames: list[dict[str, object]], size_px: tuple[int, int], where: str)
             [take_number(frame, "time_s", name) for frame, name in named], dtype=torch.float64
         ),
     )
-    return require_usable(path, "frames")
+    return require_valid_path(path, "frames")
 
 
 def _size_px(root: JsonObject, where: str) -> tuple[int, int]:
@@ -233,7 +233,7 @@ def _provenance(source: JsonObject, where: str) -> Provenance:
 def _require_version(root: JsonObject, where: str) -> None:
     if root.get("format") != FORMAT:
         raise FileFormatError(f"{where}: expected a {FORMAT} file, got JSON of another kind")
-    version = take_whole(root, "version", where, least=1)
+    version = take_int(root, "version", where, least=1)
     if version > VERSION:
         raise FileFormatError(
             f"{where}: written by a newer diff4splat (version {version}, this one reads up to "

@@ -52,9 +52,9 @@ def lens_json(lens: Lens) -> dict[str, object]:
     """
     match lens:
         case Pinhole():
-            own: dict[str, object] = {"model": "pinhole"}
+            record: dict[str, object] = {"model": "pinhole"}
         case OpenCVPinhole():
-            own = {
+            record = {
                 "model": "opencv",
                 "radial": exact_list(lens.radial),
                 "tangential": exact_list(lens.tangential),
@@ -62,33 +62,33 @@ def lens_json(lens: Lens) -> dict[str, object]:
             }
         case OpenCVFisheye():
             angle = lens.max_angle_rad
-            own = {
+            record = {
                 "model": "fisheye",
                 "coefficients": exact_list(lens.coefficients),
                 "max_angle_rad": None if angle is None else exact(angle),
             }
         case BlenderFisheye():
-            own = {
+            record = {
                 "model": "blender",
                 "coefficients": exact_list(lens.coefficients),
                 "fov_rad": exact(lens.fov_rad),
                 "cycles_signs": lens.cycles_signs,
             }
         case Equirectangular():
-            own = {"model": "equirectangular"}
+            record = {"model": "equirectangular"}
         case _:
             raise InputError(f"lens: expected one of {', '.join(_READERS)}, got {type(lens)}")
-    return own | {"formula": _FORMULAS[own["model"]]}
+    return record | {"formula": _FORMULAS[record["model"]]}
 
 
-def read_lens(own: JsonObject, where: str) -> Lens:
+def read_lens(record: JsonObject, where: str) -> Lens:
     """The lens that ``lens_json`` wrote, float64.
 
     Raises:
         FileFormatError: a value is missing, of another kind, or impossible; names it.
     """
     with as_file_error(where):
-        return _READERS[take_text(own, "model", where, tuple(_READERS))](own, where)
+        return _READERS[take_text(record, "model", where, tuple(_READERS))](record, where)
 
 
 def exact_list(values: torch.Tensor) -> list[float]:
@@ -105,34 +105,34 @@ def as_file_error(where: str) -> Iterator[None]:
         raise FileFormatError(f"{where}: {error}") from error
 
 
-def _opencv(own: JsonObject, where: str) -> Lens:
+def _opencv(record: JsonObject, where: str) -> Lens:
     return OpenCVPinhole(
-        radial=take_numbers(own, "radial", 6, where),
-        tangential=take_numbers(own, "tangential", 2, where),
-        thin_prism=take_numbers(own, "thin_prism", 4, where),
+        radial=take_numbers(record, "radial", 6, where),
+        tangential=take_numbers(record, "tangential", 2, where),
+        thin_prism=take_numbers(record, "thin_prism", 4, where),
     )
 
 
-def _fisheye(own: JsonObject, where: str) -> Lens:
+def _fisheye(record: JsonObject, where: str) -> Lens:
     return OpenCVFisheye(
-        coefficients=take_numbers(own, "coefficients", 4, where),
-        max_angle_rad=optional_number(own, "max_angle_rad", where),
+        coefficients=take_numbers(record, "coefficients", 4, where),
+        max_angle_rad=optional_number(record, "max_angle_rad", where),
     )
 
 
-def _blender(own: JsonObject, where: str) -> Lens:
+def _blender(record: JsonObject, where: str) -> Lens:
     return BlenderFisheye(
-        coefficients=take_numbers(own, "coefficients", 5, where),
-        fov_rad=take_number(own, "fov_rad", where),
-        cycles_signs=take_flag(own, "cycles_signs", where),
+        coefficients=take_numbers(record, "coefficients", 5, where),
+        fov_rad=take_number(record, "fov_rad", where),
+        cycles_signs=take_flag(record, "cycles_signs", where),
     )
 
 
 _READERS: dict[str, Callable[[JsonObject, str], Lens]] = {
-    "pinhole": lambda own, where: Pinhole(),
+    "pinhole": lambda record, where: Pinhole(),
     "opencv": _opencv,
     "fisheye": _fisheye,
     "blender": _blender,
-    "equirectangular": lambda own, where: Equirectangular(),
+    "equirectangular": lambda record, where: Equirectangular(),
 }
 LENS_MODELS = tuple(_READERS)

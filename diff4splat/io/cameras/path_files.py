@@ -1,8 +1,8 @@
 """Camera path files: which format it is, reading, writing.
 
 Axes: ``t`` poses. A path that was read starts at the identity and at time 0, whatever world and
-clock the file used, and has the dtype of the default camera. The picture size is that of the file
-where it says one; ``paths.picture_size.resized`` brings it to another.
+clock the file used, and has the dtype of the default camera. The image size is that of the file
+where it says one; ``paths.image_size.resized`` brings it to another.
 """
 
 import errno
@@ -18,7 +18,7 @@ from diff4splat.errors import FileFormatError, InputError
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.io.atomic import write_text
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.formats import camera_path_json, realestate10k, transforms_json, tum
 from diff4splat.paths.formats.json_fields import load_object
 from diff4splat.paths.formats.source import DEFAULT_FPS, PathSource
@@ -46,7 +46,7 @@ _DUMPERS: dict[PathFormat, Callable[[CameraPath], str]] = {
 def read_path(file: Path, view: Camera, fps: float = DEFAULT_FPS) -> CameraPath:
     """The camera path in ``file``, relative to its first camera; the format is found by content.
 
-    ``view`` (one camera) stands in for intrinsics and picture size that the file lacks, ``fps``
+    ``view`` (one camera) stands in for intrinsics and image size that the file lacks, ``fps``
     for times.
 
     Raises:
@@ -61,7 +61,7 @@ def read_path(file: Path, view: Camera, fps: float = DEFAULT_FPS) -> CameraPath:
         cameras=relative_to_first(path.cameras).to(view.focal_px.dtype),
         times_s=(path.times_s - path.times_s[0]).to(view.focal_px.dtype),
     )
-    return require_usable(_with_exact_start(started), source.name)
+    return require_valid_path(_with_exact_start(started), source.name)
 
 
 def write_path(path: CameraPath, file: Path, format: PathFormat | None = None) -> None:
@@ -71,7 +71,7 @@ def write_path(path: CameraPath, file: Path, format: PathFormat | None = None) -
         InputError: the path is not usable, or the format is unknown or cannot hold it.
         OutputError: the file cannot be written.
     """
-    require_usable(path, "camera path")
+    require_valid_path(path, "camera path")
     write_text(file, _DUMPERS[format_for(file) if format is None else _known(format)](path))
 
 

@@ -3,11 +3,11 @@
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.strict_json import (
     JsonObject,
+    optional_int,
     optional_number,
-    optional_whole,
     take_flag,
+    take_int,
     take_number,
-    take_whole,
 )
 from diff4splat.render.physical.settings import PhotoSettings
 
@@ -33,13 +33,13 @@ def read_photo_settings(source: JsonObject, where: str) -> PhotoSettings:
     """
     try:
         return PhotoSettings(
-            samples=optional_whole(source, "samples", where, least=1),
-            seed=take_whole(source, "seed", where),
+            samples=optional_int(source, "samples", where, least=1),
+            seed=take_int(source, "seed", where),
             pixel_area=take_flag(source, "pixel_area", where),
             smoothing_px2=optional_number(source, "smoothing_px2", where),
             tolerance_px=take_number(source, "tolerance_px", where),
-            rows_per_chunk=optional_whole(source, "rows_per_chunk", where, least=1),
-            most_intervals=take_whole(source, "most_intervals", where, least=1),
+            rows_per_chunk=optional_int(source, "rows_per_chunk", where, least=1),
+            most_intervals=take_int(source, "most_intervals", where, least=1),
         )
     except ConfigError as error:
         raise FileFormatError(f"{where}: {error}; repair the file") from error

@@ -1,4 +1,4 @@
-"""The preview page: photograph, frames along the path, depth and coverage in one picture.
+"""The preview page: photograph, frames along the path, depth and coverage in one image.
 
 Axes: ``t`` frames, ``h w`` pixels. RGB in [0, 1]; depth in the unit that is printed beside it.
 """
@@ -32,7 +32,7 @@ _NOTE = Style(size_px=21, color=NOTE_INK)
 _MAX_COLUMNS, _MIN_COLUMNS = 5, 3
 _MAX_CELL_HEIGHT = 420
 _MIN_STEP = 110
-"""Room for a caption below very narrow pictures."""
+"""Room for a caption below very narrow images."""
 _BAR = (180, 14)
 
 
@@ -110,7 +110,7 @@ def _head(content: SheetContent) -> _Block:
     top = _TITLE.line_px + _GAP + (note_height + _GAP if note else 0)
 
     def draw(canvas: Canvas, y: int) -> None:
-        canvas.picture((_MARGIN, y), size, content.photo)
+        canvas.image((_MARGIN, y), size, content.photo)
         canvas.text((left, y - 8), content.title, _TITLE)
         if note:
             canvas.box((left, y + _TITLE.line_px + _GAP), (width, note_height), NOTE_PAPER)
@@ -151,27 +151,27 @@ def _depth_row(content: SheetContent, index: Tensor) -> _Block:
         low, high = f"{limits[0]:#.3g}", f"{limits[1]:#.3g} {content.depth_unit}"
         canvas.text((x, y + 4), low, _SMALL)
         x += text_width(low, _SMALL) + 10
-        canvas.picture((x, y + 7), _BAR, color_bar(*_BAR))
+        canvas.image((x, y + 7), _BAR, color_bar(*_BAR))
         x += _BAR[0] + 10
         canvas.text((x, y + 4), f"{high}   (2 to 98 % of all pixels; grey has no depth)", _SMALL)
 
     return _Block(height=row.height, draw=draw)
 
 
-def _row(heading: str, pictures: Float[Tensor, "c h w 3"], captions: list[str]) -> _Block:
-    """A heading over pictures side by side, each with a caption below it."""
-    columns = max(len(pictures), _MIN_COLUMNS)
+def _row(heading: str, images: Float[Tensor, "c h w 3"], captions: list[str]) -> _Block:
+    """A heading over images side by side, each with a caption below it."""
+    columns = max(len(images), _MIN_COLUMNS)
     box = ((_INNER - (columns - 1) * _GAP) // columns, _MAX_CELL_HEIGHT)
-    size = fitted(pictures.shape[1:], box)
+    size = fitted(images.shape[1:], box)
     step = max(size[0] + _GAP, _MIN_STEP)
     top = _HEADING.line_px + 10
     caption_height = _SMALL.line_px + 8 if any(captions) else 0
 
     def draw(canvas: Canvas, y: int) -> None:
         canvas.text((_MARGIN, y), heading, _HEADING)
-        for i, picture in enumerate(pictures):
+        for i, image in enumerate(images):
             x = _MARGIN + i * step
-            canvas.picture((x, y + top), size, picture)
+            canvas.image((x, y + top), size, image)
             canvas.text((x, y + top + size[1] + 8), captions[i], _SMALL)
 
     return _Block(height=top + size[1] + caption_height, draw=draw)

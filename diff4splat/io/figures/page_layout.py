@@ -1,4 +1,4 @@
-"""A page to put pictures and short texts on; positions are (x, y) pixels from the top left."""
+"""A page to put images and short texts on; positions are (x, y) pixels from the top left."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -72,10 +72,10 @@ class Canvas:
         corner = (position[0] + size[0] - 1, position[1] + size[1] - 1)
         self._draw.rounded_rectangle((*position, *corner), radius=6, fill=color)
 
-    def picture(
+    def image(
         self, position: tuple[int, int], size: tuple[int, int], rgb: Float[Tensor, "h w 3"]
     ) -> None:
-        """A picture scaled to ``size`` (width, height) with a thin frame just outside."""
+        """An image scaled to ``size`` (width, height) with a thin frame just outside."""
         x, y = position
         self._draw.rectangle((x - 1, y - 1, x + size[0], y + size[1]), outline=FRAME)
         scaled = Image.fromarray(to_bytes(rgb)).resize(size, Image.Resampling.LANCZOS)
@@ -87,7 +87,7 @@ class Canvas:
 
 
 def fitted(shape: torch.Size, box: tuple[int, int]) -> tuple[int, int]:
-    """The largest (width, height) inside ``box`` for a picture of shape (height, width, ...)."""
+    """The largest (width, height) inside ``box`` for an image of shape (height, width, ...)."""
     height, width = shape[:2]
     factor = min(box[0] / width, box[1] / height)
     return max(round(width * factor), 1), max(round(height * factor), 1)

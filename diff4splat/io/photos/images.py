@@ -1,7 +1,7 @@
 """Photographs in, PNG out. RGB in [0, 1], sRGB-referred, upright; axes ``h w 3``.
 
 Strict by default: anything but an 8-bit RGB photograph is refused in one line, because a silent
-conversion (alpha, palette, 16 bits) changes the picture in ways that show only in the result.
+conversion (alpha, palette, 16 bits) changes the image in ways that show only in the result.
 """
 
 import io
@@ -36,7 +36,7 @@ class Photo:
     focal_35mm: float | None
     """35 mm equivalent focal length from EXIF, in millimetres; None when the file does not say."""
     notes: tuple[str, ...] = ()
-    """What was done to the picture, in words."""
+    """What was done to the image, in words."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ def read_photo(file: Path | str, convert: bool = False) -> Photo:
 
 
 def write_png(rgb: Float[Tensor, "h w 3"], file: Path | str) -> None:
-    """Write an 8-bit PNG whole or not at all; equal pictures give equal bytes.
+    """Write an 8-bit PNG whole or not at all; equal images give equal bytes.
 
     Raises:
         OutputError: the folder cannot be made or written.
@@ -116,12 +116,12 @@ def _load(image: Image.Image, file: Path) -> None:
 
 def _damaged(file: Path) -> InputError:
     return InputError(
-        f"{file}: expected a whole picture, got a cut off or damaged one; copy it again"
+        f"{file}: expected a whole image, got a cut off or damaged one; copy it again"
     )
 
 
 def _read_exif(image: Image.Image) -> _Exif:
-    """What EXIF says; it is often damaged, and the picture is good without it."""
+    """What EXIF says; it is often damaged, and the image is good without it."""
     try:
         exif = image.getexif()
         orientation = exif.get(_ORIENTATION)

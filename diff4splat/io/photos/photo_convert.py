@@ -1,4 +1,4 @@
-"""From any picture that Pillow can hold to 8-bit RGB in sRGB, with a note for every change."""
+"""From any image that Pillow can hold to 8-bit RGB in sRGB, with a note for every change."""
 
 import io
 from pathlib import Path
@@ -59,7 +59,7 @@ def _decode(file: Path, grey: bool) -> np.ndarray:
         pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.dtype == np.uint8 or (pixels.ndim == 2) != grey:
         raise InputError(
-            f"{file}: expected a whole picture of 16 bits per channel, got one that cannot be "
+            f"{file}: expected a whole image of 16 bits per channel, got one that cannot be "
             "decoded; convert it to 8-bit RGB"
         )
     return pixels if grey else pixels[..., [2, 1, 0, 3][: pixels.shape[2]]]
@@ -85,5 +85,5 @@ def _apply_profile(color: Image.Image, profile: bytes | None) -> Noted:
         target = ImageCms.createProfile("sRGB")
         converted = ImageCms.profileToProfile(color, source, target, outputMode="RGB")
     except (ImageCms.PyCMSError, OSError, ValueError):
-        return color, ("ICC profile is damaged or does not fit the picture and was ignored",)
+        return color, ("ICC profile is damaged or does not fit the image and was ignored",)
     return converted, (f"ICC profile {name[:60]!r} converted to sRGB",)

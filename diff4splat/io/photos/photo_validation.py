@@ -1,4 +1,4 @@
-"""Which pictures are photographs we take as they are, judged from the header before decoding."""
+"""Which images are photographs we take as they are, judged from the header before decoding."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from PIL import Image
 
 from diff4splat.errors import InputError
 
-WANTED = "a JPEG, PNG, WebP, AVIF, TIFF or BMP picture"
+WANTED = "a JPEG, PNG, WebP, AVIF, TIFF or BMP image"
 FORMATS = ("JPEG", "PNG", "WEBP", "AVIF", "TIFF", "BMP", "GIF")
 """What Pillow may try; its other readers are for old formats, and one starts Ghostscript."""
 MAX_PIXELS = 100_000_000
@@ -34,7 +34,7 @@ def require_size(image: Image.Image, file: Path) -> None:
     if min(width, height) < MIN_SIDE_PX:
         raise InputError(
             f"{file}: expected at least {MIN_SIDE_PX}x{MIN_SIDE_PX} pixels, got {width}x{height}; "
-            "use a larger picture"
+            "use a larger image"
         )
     if image.format == "TIFF" and int(image.tag_v2.get(_REDUCED_COPY, 0)) & 1:
         raise InputError(
@@ -46,7 +46,7 @@ def require_plain(image: Image.Image, file: Path) -> None:
     """Refuse everything but 8-bit RGB.
 
     Raises:
-        InputError: the picture is of a kind that only ``convert`` accepts.
+        InputError: the image is of a kind that only ``convert`` accepts.
     """
     found = _unusual(image)
     if found:
@@ -57,7 +57,7 @@ def require_plain(image: Image.Image, file: Path) -> None:
 
 
 def too_large(file: Path, got: str) -> InputError:
-    """The refusal of an enormous picture."""
+    """The refusal of an enormous image."""
     limit = MAX_PIXELS // 1_000_000
     return InputError(
         f"{file}: expected at most {limit} megapixels, got {got}; make it smaller first"
@@ -71,9 +71,9 @@ def is_deep(image: Image.Image) -> bool:
 
 
 def first_of_many(image: Image.Image) -> tuple[str, ...]:
-    """A note when the file holds more than the picture that is used."""
+    """A note when the file holds more than the image that is used."""
     count = _frame_count(image)
-    return (f"the first of {count} pictures in the file was used",) if count > 1 else ()
+    return (f"the first of {count} images in the file was used",) if count > 1 else ()
 
 
 def describe_unknown(file: Path) -> str:
@@ -83,28 +83,28 @@ def describe_unknown(file: Path) -> str:
     if start[4:8] == b"ftyp" and start[8:12] in (b"heic", b"heix", b"hevc", b"mif1", b"msf1"):
         return f"expected {WANTED}, got HEIC; save or export it as JPEG"
     if start.startswith(_MAGIC):
-        return "expected a whole picture, got a cut off or damaged one; copy it again"
+        return "expected a whole image, got a cut off or damaged one; copy it again"
     return f"expected {WANTED}, got another kind of file; convert it to one of these"
 
 
 def _unusual(image: Image.Image) -> str | None:
-    """What makes a picture more or less than 8-bit RGB."""
+    """What makes an image more or less than 8-bit RGB."""
     frames = _frame_count(image)
     found = {
         # Phones store a second view or a depth map behind an ordinary JPEG and call the file MPO.
-        f"an animation or a stack of {frames} pictures": frames > 1 and image.format != "MPO",
+        f"an animation or a stack of {frames} images": frames > 1 and image.format != "MPO",
         "16-bit or deeper channels": is_deep(image),
-        "a palette picture": image.mode in ("P", "PA"),
-        "a picture with an alpha channel or transparency": image.mode != "P"
+        "a palette image": image.mode in ("P", "PA"),
+        "an image with an alpha channel or transparency": image.mode != "P"
         and image.has_transparency_data,
-        "a grey picture": image.mode in ("1", "L"),
+        "a grey image": image.mode in ("1", "L"),
         _ODD_MODES.get(image.mode, f"colours of kind {image.mode}"): image.mode != "RGB",
     }
     return next((what for what, holds in found.items() if holds), None)
 
 
 def _frame_count(image: Image.Image) -> int:
-    """Pictures in the file; a damaged directory of further ones counts as none."""
+    """Images in the file; a damaged directory of further ones counts as none."""
     try:
         return getattr(image, "n_frames", 1)
     except (TypeError, ValueError, KeyError, OSError, SyntaxError):

@@ -22,7 +22,7 @@ from diff4splat.io.scene_files.tensor_file import (
     read_tensors,
     write_tensors,
 )
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
@@ -126,4 +126,4 @@ def _read_path(tensors: Mapping[str, Tensor], size_px: tuple[int, int]) -> Camer
         world_from_camera=take_floats(tensors, "path_world_from_camera", (count, 4, 4)),
         size_px=size_px,
     )
-    return require_usable(CameraPath(cameras=cameras, times_s=times_s), "path")
+    return require_valid_path(CameraPath(cameras=cameras, times_s=times_s), "path")

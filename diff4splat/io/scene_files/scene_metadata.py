@@ -29,7 +29,7 @@ CONVENTIONS = {
 
 
 MAX_SIDE_PX = 16384
-"""Larger pictures are damage, not wishes."""
+"""Larger images are damage, not wishes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class SceneMetadata:
     motion: Mapping[str, Any]
     """Settings of the motion, see ``motion_tensors``."""
     size_px: tuple[int, int]
-    """(height, width) of the suggested path's pictures."""
+    """(height, width) of the suggested path's images."""
     provenance: Provenance
     dilation_px2: float = DILATION_PX2
     """What the scene asks renderers for; files that do not say mean the usual."""
@@ -68,7 +68,7 @@ def decode(strings: Mapping[str, str]) -> SceneMetadata:
     _require_version(strings)
     document = _parse(strings.get("scene", ""))
     provenance = take_value(document, "provenance", dict)
-    height, width = take_numbers(take_value(document, "path", dict), "size_px", 2, whole=True)
+    height, width = take_numbers(take_value(document, "path", dict), "size_px", 2, integer=True)
     if not (1 <= height <= MAX_SIDE_PX and 1 <= width <= MAX_SIDE_PX):
         raise FileFormatError(
             f"path.size_px: expected 1 to {MAX_SIDE_PX} pixels per side, got {height} and {width}"

@@ -88,17 +88,19 @@ def take_value(
     return value
 
 
-def take_numbers(source: Mapping[str, Any], key: str, count: int, whole: bool = False) -> list[Any]:
+def take_numbers(
+    source: Mapping[str, Any], key: str, count: int, integer: bool = False
+) -> list[Any]:
     """The JSON list of ``count`` finite numbers under ``key``, whole ones on demand.
 
     Raises:
         FileFormatError: it is missing, of another length, or holds something else.
     """
     values = take_value(source, key, list)
-    kinds = int if whole else int | float
+    kinds = int if integer else int | float
     # A comparison, not isfinite: JSON allows whole numbers that no float can hold.
     fine = [isinstance(v, kinds) and not isinstance(v, bool) and abs(v) < 1e300 for v in values]
     if len(values) != count or not all(fine):
-        wanted = f"{count} {'whole ' if whole else ''}numbers"
+        wanted = f"{count} {'whole ' if integer else ''}numbers"
         raise FileFormatError(f"metadata '{key}': expected {wanted}, got {repr(values)[:60]}")
     return values

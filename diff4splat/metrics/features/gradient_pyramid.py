@@ -1,6 +1,6 @@
 """A perceptual stand-in with nothing learnt: edges in eight directions, on four scales.
 
-Axes: ``n`` pictures, ``c`` opponent colours, ``o`` directions, ``h w`` pixels. RGB in [0, 1].
+Axes: ``n`` images, ``c`` opponent colours, ``o`` directions, ``h w`` pixels. RGB in [0, 1].
 Nobody's judgement was fitted. It shares with LPIPS that it compares pooled edges instead of
 pixels, forgives a small shift, and punishes blur; its numbers are not LPIPS numbers.
 
@@ -12,7 +12,7 @@ every second pixel:
     structure = Σ_{c o} (e − e')² / (Σ_{c o} (e² + e'²) + ε²)  contrast-normalised, 0 to 1
     distance  = mean of structure over scales and pixels + MSE of the coarsest scale's colours
 
-Both pictures are divided by their *common* contrast: each by its own would hide a blur.
+Both images are divided by their *common* contrast: each by its own would hide a blur.
 """
 
 import math
@@ -52,7 +52,7 @@ class GradientPyramidFeatures:
     def distance(
         self, image: Float[Tensor, "n 3 h w"], reference: Float[Tensor, "n 3 h w"]
     ) -> Float[Tensor, " n"]:
-        """Distance of each pair; 0 with zero gradient for equal pictures, symmetric, any size.
+        """Distance of each pair; 0 with zero gradient for equal images, symmetric, any size.
 
         Raises:
             ShapeError: the shapes differ, or there is no pixel.
@@ -60,16 +60,16 @@ class GradientPyramidFeatures:
         require_alike("image", image, reference)
         if 0 in image.shape[1:]:
             raise ShapeError(f"image: expected a pixel, got {tuple(image.shape)}")
-        pictures = torch.cat(promote(image, reference))
-        with no_autocast(pictures):
-            scales = _pyramid(_opponent(pictures))
+        images = torch.cat(promote(image, reference))
+        with no_autocast(images):
+            scales = _pyramid(_opponent(images))
             structure = torch.stack([_structure(colors) for colors in scales]).mean(0)
         one, other = scales[-1].chunk(2)
         return structure + (one - other).square().mean((1, 2, 3))
 
 
-def _opponent(pictures: Tensor) -> Tensor:
-    return torch.einsum("oc,nchw->nohw", pictures.new_tensor(OPPONENT), pictures)
+def _opponent(images: Tensor) -> Tensor:
+    return torch.einsum("oc,nchw->nohw", images.new_tensor(OPPONENT), images)
 
 
 def _pyramid(colors: Tensor) -> list[Tensor]:

@@ -1,10 +1,10 @@
 """LPIPS, version 0.1 (Zhang et al., arXiv 1801.03924), without its weights.
 
-Axes: ``n`` pictures, ``h w`` pixels. RGB in [0, 1] here; the published networks take [−1, 1].
+Axes: ``n`` images, ``h w`` pixels. RGB in [0, 1] here; the published networks take [−1, 1].
 
     distance = Σ_slices mean_{h w} Σ_channels w_c (f̂_c − ĝ_c)²,     f̂ = f / (‖f‖₂ + 1e-10)
 
-with f and g the outputs of a slice for both pictures, and w the ``lin`` weights. The same numbers
+with f and g the outputs of a slice for both images, and w the ``lin`` weights. The same numbers
 as the ``lpips`` package with ``normalize=True``; what it multiplies by during training (dropout)
 is left out, because nothing is trained here.
 """
@@ -21,7 +21,7 @@ from diff4splat.metrics.features.backbones import Backbone
 
 SHIFT = (-0.030, -0.088, -0.188)
 SCALE = (0.458, 0.448, 0.450)
-"""ImageNet's mean and deviation, for pictures in [−1, 1]."""
+"""ImageNet's mean and deviation, for images in [−1, 1]."""
 NORM_FLOOR = 1e-10
 
 
@@ -42,28 +42,28 @@ class Lpips:
     def distance(
         self, image: Float[Tensor, "n 3 h w"], reference: Float[Tensor, "n 3 h w"]
     ) -> Float[Tensor, " n"]:
-        """LPIPS of each pair; finite gradients, and 0 with zero gradient for equal pictures.
+        """LPIPS of each pair; finite gradients, and 0 with zero gradient for equal images.
 
         Raises:
             ShapeError: the shapes differ, or a side is below the trunk's ``least_px``.
         """
         require_alike("image", image, reference)
         self._require_size(image)
-        pictures = torch.cat(promote(image, reference))
-        with no_autocast(pictures):
-            weights = self._weights_like(pictures)
-            slices = self._trunk.outputs(_standardized(pictures), weights)
+        images = torch.cat(promote(image, reference))
+        with no_autocast(images):
+            weights = self._weights_like(images)
+            slices = self._trunk.outputs(_standardized(images), weights)
             parts = [
                 _slice_distance(output, weights[f"lin{number}.model.1.weight"])
                 for number, output in enumerate(slices)
             ]
         return torch.stack(parts).sum(0)
 
-    def _weights_like(self, pictures: Tensor) -> dict[str, Tensor]:
+    def _weights_like(self, images: Tensor) -> dict[str, Tensor]:
         first = next(iter(self._weights.values()))
-        if first.device != pictures.device or first.dtype != pictures.dtype:
+        if first.device != images.device or first.dtype != images.dtype:
             # Kept, so that a training moves them to its device once.
-            self._weights = {key: value.to(pictures) for key, value in self._weights.items()}
+            self._weights = {key: value.to(images) for key, value in self._weights.items()}
         return self._weights
 
     def _require_size(self, image: Tensor) -> None:
@@ -71,14 +71,14 @@ class Lpips:
         if min(image.shape[-2:]) < least:
             height, width = image.shape[-2:]
             raise ShapeError(
-                f"LPIPS-{self._trunk.name}: expected pictures of at least {least} px a side, "
+                f"LPIPS-{self._trunk.name}: expected images of at least {least} px a side, "
                 f"got {height} by {width}; enlarge them or use the stand-in"
             )
 
 
-def _standardized(pictures: Tensor) -> Tensor:
-    shift, scale = (pictures.new_tensor(values)[:, None, None] for values in (SHIFT, SCALE))
-    return (2 * pictures - 1 - shift) / scale
+def _standardized(images: Tensor) -> Tensor:
+    shift, scale = (images.new_tensor(values)[:, None, None] for values in (SHIFT, SCALE))
+    return (2 * images - 1 - shift) / scale
 
 
 def _slice_distance(output: Tensor, head: Tensor) -> Tensor:

@@ -22,7 +22,7 @@ from diff4splat.metrics.features.backbones import Backbone
 from diff4splat.metrics.features.lpips import SCALE, SHIFT
 
 SCALING = {"scaling_layer.shift": SHIFT, "scaling_layer.scale": SCALE}
-SHOWN = 4
+MAX_LISTED = 4
 """Names listed in an error message before "and so on"."""
 
 
@@ -115,5 +115,5 @@ def _read(file: Path) -> dict[str, Tensor]:
 
 def _refuse(found: list[str], what: str) -> None:
     if found:
-        listed = ", ".join(found[:SHOWN]) + (", …" if len(found) > SHOWN else "")
+        listed = ", ".join(found[:MAX_LISTED]) + (", …" if len(found) > MAX_LISTED else "")
         raise CheckpointError(f"{what} {len(found)} ({listed}); choose files of that network")

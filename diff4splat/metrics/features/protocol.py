@@ -1,6 +1,6 @@
 """What a perceptual distance is, so that losses and tables need not know which one it is.
 
-Axes: ``n`` pictures, ``h w`` pixels. RGB in [0, 1].
+Axes: ``n`` images, ``h w`` pixels. RGB in [0, 1].
 """
 
 from typing import Protocol, runtime_checkable
@@ -11,7 +11,7 @@ from torch import Tensor
 
 @runtime_checkable
 class PerceptualFeatures(Protocol):
-    """A distance between pictures that should agree with people's judgement."""
+    """A distance between images that should agree with people's judgement."""
 
     @property
     def name(self) -> str:
@@ -21,5 +21,5 @@ class PerceptualFeatures(Protocol):
     def distance(
         self, image: Float[Tensor, "n 3 h w"], reference: Float[Tensor, "n 3 h w"]
     ) -> Float[Tensor, " n"]:
-        """0 for equal pictures, more for worse ones; differentiable, float32 or better."""
+        """0 for equal images, more for worse ones; differentiable, float32 or better."""
         ...

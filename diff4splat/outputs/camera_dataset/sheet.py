@@ -18,7 +18,7 @@ _TITLE, _HEADING = Style(size_px=40), Style(size_px=22)
 _SMALL = Style(size_px=17, color=FAINT)
 _LEAST_COLUMNS = 3
 
-Picture = Float[Tensor, "h w 3"]
+Image = Float[Tensor, "h w 3"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,13 +27,13 @@ class SheetRow:
 
     name: str
     facts: str
-    pictures: tuple[tuple[float, Picture], ...]
-    """(seconds, picture)"""
+    images: tuple[tuple[float, Image], ...]
+    """(seconds, image)"""
 
 
-def camera_sheet(rows: Sequence[SheetRow], license: str) -> Picture:
+def camera_sheet(rows: Sequence[SheetRow], license: str) -> Image:
     """The page."""
-    columns = max(_LEAST_COLUMNS, *(len(row.pictures) for row in rows))
+    columns = max(_LEAST_COLUMNS, *(len(row.images) for row in rows))
     width = 2 * _MARGIN + columns * (_BOX[0] + _GAP) - _GAP
     facts = [wrap(row.facts, _SMALL, width - 2 * _MARGIN - _name_width(rows)) for row in rows]
     top = _MARGIN + _TITLE.line_px + _SMALL.line_px + _GAP
@@ -47,7 +47,7 @@ def camera_sheet(rows: Sequence[SheetRow], license: str) -> Picture:
     return canvas.to_rgb()
 
 
-def thumbnail(rgb: Picture) -> Picture:
+def thumbnail(rgb: Image) -> Image:
     """A copy no larger than the page needs."""
     width, height = fitted(rgb.shape, _BOX)
     if height >= rgb.shape[0]:
@@ -63,14 +63,14 @@ def _draw(canvas: Canvas, y: int, row: SheetRow, facts: list[str], indent: int) 
     for number, line in enumerate(facts):
         canvas.text((_MARGIN + indent, y + 4 + number * _SMALL.line_px), line, _SMALL)
     top = y + _head_height(facts)
-    for column, (time_s, picture) in enumerate(row.pictures):
-        x, size = _MARGIN + column * (_BOX[0] + _GAP), fitted(picture.shape, _BOX)
-        canvas.picture((x, top), size, picture)
+    for column, (time_s, image) in enumerate(row.images):
+        x, size = _MARGIN + column * (_BOX[0] + _GAP), fitted(image.shape, _BOX)
+        canvas.image((x, top), size, image)
         canvas.text((x, top + size[1] + 8), f"{time_s:.3f} s", _SMALL)
 
 
 def _height(row: SheetRow, facts: list[str]) -> int:
-    tallest = max(fitted(picture.shape, _BOX)[1] for _, picture in row.pictures)
+    tallest = max(fitted(image.shape, _BOX)[1] for _, image in row.images)
     return _head_height(facts) + tallest + _SMALL.line_px + 8 + _MARGIN
 
 

@@ -1,4 +1,4 @@
-"""Matched sequences as folders: pictures, depth, masks and the exact truth about every camera.
+"""Matched sequences as folders: images, depth, masks and the exact truth about every camera.
 
     out/dataset.json  out/contact-sheet.png
     out/<effect>/camera.json  frame_0000.png …  depth/frame_0000.exr …  valid.png
@@ -43,7 +43,7 @@ from diff4splat.scene.scene import Scene
 
 FORMAT, VERSION = "diff4splat-camera-dataset", 1
 DATASET, SHEET, VALID = "dataset.json", "contact-sheet.png", "valid.png"
-SHOWN = 5
+MAX_THUMBNAILS = 5
 """Frames of each sequence on the contact sheet."""
 BLIND_GREY = 0.2
 
@@ -111,9 +111,9 @@ def require_empty(folder: Path) -> None:
 def _write_sequence(
     job: DatasetJob, sequence: _Sequence, log: RunLog
 ) -> tuple[CaptureStats, SheetRow]:
-    stats, pictures = CaptureStats(), []
+    stats, images = CaptureStats(), []
     count = len(sequence.physical_path)
-    shown = set(torch.linspace(0, count - 1, min(count, SHOWN)).round().int().tolist())
+    shown = set(torch.linspace(0, count - 1, min(count, MAX_THUMBNAILS)).round().int().tolist())
     with log.phases.phase(sequence.name, count) as advance:
         frames = render_photographs(
             freeze_time(job.scene, job.time_s),
@@ -127,7 +127,7 @@ def _write_sequence(
         for index, photo in enumerate(frames):
             files.append(_write_frame(sequence, index, photo))
             if index in shown:
-                pictures.append((sequence.physical_path.time_s(index), thumbnail(_shown(photo))))
+                images.append((sequence.physical_path.time_s(index), thumbnail(_shown(photo))))
     blind = stats.valid is not None and not bool(stats.valid.all())
     if blind:
         write_png(stats.valid[..., None].expand(-1, -1, 3).float(), sequence.folder / VALID)
@@ -145,11 +145,11 @@ def _write_sequence(
         interval_error_px=stats.interval_error_px,
     )
     write_camera_record(record, sequence.folder / FILE)
-    return stats, SheetRow(name=sequence.name, facts=stats.lines()[0], pictures=tuple(pictures))
+    return stats, SheetRow(name=sequence.name, facts=stats.lines()[0], images=tuple(images))
 
 
 def _shown(photo: Photograph) -> Float[Tensor, "h w 3"]:
-    """The picture, grey where the lens sees nothing."""
+    """The image, grey where the lens sees nothing."""
     return torch.where(photo.valid[..., None], photo.rgb, BLIND_GREY)
 
 
@@ -192,7 +192,7 @@ def _contents(job: DatasetJob, stats: Mapping[str, CaptureStats]) -> dict[str, o
                 "intervals": stats[name].intervals,
                 "interval_error_px": stats[name].interval_error_px,
                 "blind_share": stats[name].blind_share,
-                "left_out": list(stats[name].left_out),
+                "left_out": list(stats[name].skipped_effects),
             }
             for name, physical_path in job.sequences.items()
         ],

@@ -21,11 +21,11 @@ from diff4splat.paths.formats.checks import checked_path, exact_poses
 from diff4splat.paths.formats.json_fields import (
     FrameRecord,
     frame_records,
+    image_size,
     load_object,
     number_for_all,
     numbers,
     optional_number,
-    picture_size,
 )
 from diff4splat.paths.formats.source import DEFAULT_FPS, PathSource
 from diff4splat.paths.messages import quoted
@@ -42,7 +42,7 @@ def parse(text: str, source: PathSource) -> CameraPath:
     _require_perspective(root, source.name)
     frames = frame_records(root, "camera_path", source.name)
     labels = [frame.label for frame in frames]
-    size_px = picture_size(root, ("render_height", "render_width"), source.name)
+    size_px = image_size(root, ("render_height", "render_width"), source.name)
     view = fitted(source.view.to(torch.float64), size_px or source.view.size_px)
     poses = exact_poses(_matrices(frames), labels, source.name)
     focals = [_focal_px(frame, view) for frame in frames]

@@ -103,8 +103,8 @@ def number_list(values: object, count: int, where: str) -> list[float]:
     return finite_numbers(values, where)
 
 
-def picture_side(record: Mapping[str, object], key: str, where: str) -> int | None:
-    """A picture width or height in pixels, or None when missing."""
+def image_side(record: Mapping[str, object], key: str, where: str) -> int | None:
+    """An image width or height in pixels, or None when missing."""
     value = optional_number(record, key, where)
     if value is not None and not (value == int(value) and 1 <= value <= _LARGEST_SIDE_PX):
         raise FileFormatError(
@@ -114,7 +114,7 @@ def picture_side(record: Mapping[str, object], key: str, where: str) -> int | No
     return None if value is None else int(value)
 
 
-def picture_size(
+def image_size(
     record: Mapping[str, object], keys: tuple[str, str], where: str
 ) -> tuple[int, int] | None:
     """(height, width) under ``keys``, or None when both are missing.
@@ -122,7 +122,7 @@ def picture_size(
     Raises:
         FileFormatError: only one of the two is given.
     """
-    height, width = (picture_side(record, key, where) for key in keys)
+    height, width = (image_side(record, key, where) for key in keys)
     if (height is None) != (width is None):
         raise FileFormatError(
             f"{where}: expected both '{keys[0]}' and '{keys[1]}' or neither; add the other"

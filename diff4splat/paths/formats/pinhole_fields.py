@@ -1,7 +1,7 @@
 """Pinhole intrinsics out of one ``transforms.json`` record: fl_x fl_y cx cy, or fields of view.
 
 A missing focal length is that of the other axis, a missing principal point the middle of the
-picture; without any focal length the view's stands in. Lens distortion is refused.
+image; without any focal length the view's stands in. Lens distortion is refused.
 """
 
 import math
@@ -21,7 +21,7 @@ Record = Mapping[str, object]
 
 
 def pinhole_px(record: Record, where: str, view: Camera) -> tuple[float, float, float, float]:
-    """(f_x, f_y, c_x, c_y) in a picture of the size of ``view``.
+    """(f_x, f_y, c_x, c_y) in an image of the size of ``view``.
 
     Raises:
         FileFormatError: naming the key.
@@ -60,7 +60,7 @@ def _require_pinhole(record: Record, where: str) -> None:
     if not isinstance(model, str) or model.upper() not in _PLAIN_MODELS:
         raise FileFormatError(
             f"{where}: expected a pinhole camera_model, got {quoted(model)}; "
-            "undistort the pictures first"
+            "undistort the images first"
         )
     coefficients = [(key, optional_number(record, key, where) or 0.0) for key in _DISTORTION]
     packed = record.get("distortion_params")
@@ -71,5 +71,5 @@ def _require_pinhole(record: Record, where: str) -> None:
         if value != 0:
             raise FileFormatError(
                 f"{where}: expected no lens distortion, got {key} = {value:g}; "
-                "undistort the pictures first"
+                "undistort the images first"
             )

@@ -1,9 +1,9 @@
 """RealEstate10K and CameraCtrl text files.
 
 Axes: ``t`` poses. One optional heading (the video's address), then 19 numbers per line: timestamp
-in microseconds; f_x f_y c_x c_y, those of x divided by the picture width and those of y by its
+in microseconds; f_x f_y c_x c_y, those of x divided by the image width and those of y by its
 height; two distortion coefficients (zero); the upper 3×4 of camera_from_world, row by row, OpenCV
-axes (https://google.github.io/realestate10k). The picture size is not in the file.
+axes (https://google.github.io/realestate10k). The image size is not in the file.
 """
 
 import torch
@@ -21,11 +21,11 @@ from diff4splat.paths.formats.text_table import TextTable, read_table
 COLUMNS = 19
 _LAYOUT = "time, 4 intrinsics, 2 zeros, 12 of the pose"
 _LARGEST_NORMALIZED = 50.0
-"""A focal length of 50 picture widths sees one degree; anything above is a value in pixels."""
+"""A focal length of 50 image widths sees one degree; anything above is a value in pixels."""
 
 
 def parse(text: str, source: PathSource) -> CameraPath:
-    """Poses as in the file, float64; the picture size is that of ``source.view``.
+    """Poses as in the file, float64; the image size is that of ``source.view``.
 
     Raises:
         FileFormatError: naming the line.
@@ -82,11 +82,11 @@ def _require_plain_lens(table: TextTable, name: str) -> None:
         if row[4] != 0 or row[5] != 0:
             raise FileFormatError(
                 f"{name}: {label}: expected no lens distortion (columns 6 and 7 zero), got "
-                f"{row[4]:g} and {row[5]:g}; undistort the pictures first"
+                f"{row[4]:g} and {row[5]:g}; undistort the images first"
             )
         if max(row[:2]) > _LARGEST_NORMALIZED:
             raise FileFormatError(
-                f"{name}: {label}: expected intrinsics divided by the picture size, got a focal "
-                f"length of {max(row[:2]):g} picture widths; divide f_x, c_x by the width and f_y, "
+                f"{name}: {label}: expected intrinsics divided by the image size, got a focal "
+                f"length of {max(row[:2]):g} image widths; divide f_x, c_x by the width and f_y, "
                 "c_y by the height"
             )

@@ -15,7 +15,7 @@ class PathSource:
 
     name: str
     view: Camera
-    """One camera: intrinsics and picture size for files that have none."""
+    """One camera: intrinsics and image size for files that have none."""
     fps: float = DEFAULT_FPS
     """Frame rate for files without times."""
 

@@ -21,10 +21,10 @@ from diff4splat.paths.formats.checks import checked_path, exact_poses
 from diff4splat.paths.formats.json_fields import (
     FrameRecord,
     frame_records,
+    image_size,
     load_object,
     number_for_all,
     number_list,
-    picture_size,
 )
 from diff4splat.paths.formats.pinhole_fields import pinhole_px
 from diff4splat.paths.formats.source import PathSource
@@ -93,14 +93,14 @@ def _cameras(
 ) -> Camera:
     # A frame's own value goes before the one given for all.
     records = [ChainMap(frame.fields, root) for frame in frames]
-    size_px = picture_size(records[0], ("h", "w"), frames[0].where) or source.view.size_px
+    size_px = image_size(records[0], ("h", "w"), frames[0].where) or source.view.size_px
     view = fitted(source.view.to(torch.float64), size_px)
     lenses = []
     for frame, record in zip(frames, records, strict=True):
-        own_size_px = picture_size(record, ("h", "w"), frame.where) or size_px
+        own_size_px = image_size(record, ("h", "w"), frame.where) or size_px
         if own_size_px != size_px:
             raise FileFormatError(
-                f"{frame.where}: expected the picture size of the first frame, {size_px[1]} x "
+                f"{frame.where}: expected the image size of the first frame, {size_px[1]} x "
                 f"{size_px[0]}, got {own_size_px[1]} x {own_size_px[0]}; split the file"
             )
         lenses.append(pinhole_px(record, frame.where, view))

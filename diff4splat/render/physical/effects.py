@@ -1,4 +1,4 @@
-"""Which effects a picture has, given its camera and its scene; the others are left out and named.
+"""Which effects an image has, given its camera and its scene; the others are left out and named.
 
 A lens that bends nothing, an aperture of radius 0, and a shutter or an exposure while nothing moves
 change no pixel. A camera with no effect at all is a pinhole, which the rasteriser draws faster.
@@ -26,7 +26,7 @@ from diff4splat.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effects:
-    """What a picture needs."""
+    """What an image needs."""
 
     bends: bool
     """The lens is no pinhole."""
@@ -37,11 +37,11 @@ class Effects:
     exposes: bool
     """Rays of a pixel have times that differ, and that shows."""
     scene_moves: bool
-    """While the picture is taken."""
+    """While the image is taken."""
     covers: bool
     """Rays of a pixel go through all of its square."""
     samples: int
-    left_out: tuple[str, ...] = field(default=())
+    skipped_effects: tuple[str, ...] = field(default=())
 
     @property
     def scatters(self) -> bool:
@@ -57,32 +57,34 @@ class Effects:
 def find_effects(
     subject: Scene | Gaussians, camera: PhysicalCamera, time_s: float, settings: PhotoSettings
 ) -> Effects:
-    """The effects that show in a picture of ``subject`` at ``time_s``."""
-    optics, left_out = camera.optics, []
+    """The effects that show in an image of ``subject`` at ``time_s``."""
+    optics, skipped_effects = camera.optics, []
     aperture, shutter = optics.aperture, optics.shutter
     bends = not is_pinhole(optics.lens)
     spreads = aperture is not None and counts(aperture.radius)
     if not bends and not isinstance(optics.lens, Pinhole):
-        left_out.append("distortion: all coefficients are 0")
+        skipped_effects.append("distortion: all coefficients are 0")
     if aperture is not None and not spreads:
-        left_out.append("aperture: its radius is 0")
+        skipped_effects.append("aperture: its radius is 0")
     # What is learned may grow to any size.
     learned = is_learned(optics.exposure_s) or (shutter and is_learned(shutter.readout_s))
     window = (-math.inf, math.inf) if learned else optics.window_s(time_s)
     scene_moves = _moves(subject, window)
-    moves = scene_moves or camera.moves_between(*window)
+    moves = scene_moves or camera.is_moving_between(*window)
     rolls = shutter is not None and counts(shutter.readout_s)
     exposes = counts(optics.exposure_s)
     if not moves and (rolls or exposes):
         names = " and ".join(
             name for name, there in (("read-out", rolls), ("exposure", exposes)) if there
         )
-        left_out.append(f"{names}: neither scene nor camera moves meanwhile")
+        skipped_effects.append(f"{names}: neither scene nor camera moves meanwhile")
     rolls, exposes = rolls and moves, exposes and moves
     spread_over = spreads or exposes or settings.pixel_area
     samples = _samples(settings, spreads, exposes) if spread_over else 1
     if settings.samples is not None and settings.samples > samples:
-        left_out.append(f"{settings.samples} samples per pixel: all rays of a pixel are the same")
+        skipped_effects.append(
+            f"{settings.samples} samples per pixel: all rays of a pixel are the same"
+        )
     return Effects(
         bends=bends,
         spreads=spreads,
@@ -91,7 +93,7 @@ def find_effects(
         scene_moves=scene_moves and (rolls or exposes),
         covers=settings.pixel_area,
         samples=samples,
-        left_out=tuple(left_out),
+        skipped_effects=tuple(skipped_effects),
     )
 
 

@@ -58,7 +58,7 @@ class Exposure:
             samples=self.effects.samples,
             intervals=len(subject.intervals),
             interval_error_px=subject.intervals.error_px,
-            left_out=self.effects.left_out,
+            skipped_effects=self.effects.skipped_effects,
             dropped_nonfinite=subject.dropped,
         )
 

@@ -1,4 +1,4 @@
-"""Into which intervals the time of a picture is split, so that Gaussians may go straight in each.
+"""Into which intervals the time of an image is split, so that Gaussians may go straight in each.
 
 An interval is halved until, for everything the camera sees, places in it are as near to the
 straight line, and shapes, opacities and colours as near to those halfway, as the tolerance asks
@@ -62,7 +62,7 @@ class Intervals:
 def choose_intervals(
     scene: Scene, camera: PhysicalCamera, time_s: float, cone: ViewCone, settings: PhotoSettings
 ) -> Intervals:
-    """Intervals for one picture of a scene that moves meanwhile."""
+    """Intervals for one image of a scene that moves meanwhile."""
     window = camera.optics.window_s(time_s)
     first, last = (edge - time_s for edge in window)
     if is_linear(scene):

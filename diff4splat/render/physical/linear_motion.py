@@ -69,7 +69,7 @@ def static_segment(gaussians: Gaussians, earliest_s: float, latest_s: float) -> 
     return LinearSegment(gaussians=gaussians, moving=None, earliest_s=earliest_s, latest_s=latest_s)
 
 
-def segment_between(
+def linear_segment(
     early: Gaussians, late: Gaussians, earliest_s: float, latest_s: float
 ) -> LinearSegment:
     """The segment from one state to another."""

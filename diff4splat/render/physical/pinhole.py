@@ -32,18 +32,21 @@ def rasterize_pinhole(
     rendered = render(
         subject, posed, middle, outputs=requested, settings=settings.raster, backend=backend
     )
-    pictures: dict[str, Float[Tensor, "h w ..."]] = {
+    images: dict[str, Float[Tensor, "h w ..."]] = {
         name: getattr(rendered, name) for name in outputs & _SAME
     }
     if "distance" in outputs:
-        pictures["distance"] = distance_from_depth(posed, rendered.depth)
+        images["distance"] = distance_from_depth(posed, rendered.depth)
     if "time_s" in outputs:
-        pictures["time_s"] = posed.focal_px.new_full(posed.size_px, middle - time_s)
+        images["time_s"] = posed.focal_px.new_full(posed.size_px, middle - time_s)
     return Photograph(
-        **pictures,
+        **images,
         valid=torch.ones(posed.size_px, dtype=torch.bool, device=posed.focal_px.device),
         backend="raster",
-        left_out=("rays: no effect of the camera shows, the rasteriser draws", *effects.left_out),
+        skipped_effects=(
+            "rays: no effect of the camera shows, the rasteriser draws",
+            *effects.skipped_effects,
+        ),
         dropped_nonfinite=rendered.dropped_nonfinite,
     )
 

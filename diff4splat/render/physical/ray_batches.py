@@ -14,8 +14,8 @@ from diff4splat.geometry.optics import Optics
 from diff4splat.render.physical.intervals import Intervals
 from diff4splat.render.physical.linear_motion import (
     LinearSegment,
+    linear_segment,
     native_segment,
-    segment_between,
     smoothed_segment,
     static_segment,
 )
@@ -141,7 +141,7 @@ class MovingScene:
             new = native_segment(scene, earliest_s, latest_s, base_s)
         else:
             states = (self._end(scene, at) for at in (earliest_s, latest_s))
-            new = segment_between(*states, earliest_s, latest_s)
+            new = linear_segment(*states, earliest_s, latest_s)
         return self._smoothed(new)
 
     def _end(self, scene: Scene, at_s: float) -> Gaussians:

@@ -13,7 +13,7 @@ from diff4splat.render.settings import RenderSettings, require_accepted
 from diff4splat.render.trace.settings import TraceSettings
 
 OUTPUTS = ("rgb", "alpha", "depth", "median_depth", "distance", "time_s")
-"""Every picture that a physical camera can make; ``valid`` comes with all of them."""
+"""Every image that a physical camera can make; ``valid`` comes with all of them."""
 GEOMETRY = frozenset({"depth", "median_depth", "distance", "time_s"})
 """Outputs of the one ray through the middle of pixel, lens and exposure."""
 LENS_SAMPLES, EXPOSURE_SAMPLES, PIXEL_SAMPLES = 64, 16, 16
@@ -24,7 +24,7 @@ _LEAST_MEMORY = 16 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhotoSettings:
-    """How a picture is taken."""
+    """How an image is taken."""
 
     samples: int | None = None
     """Rays per pixel; None is 64 with an aperture, 16 with an exposure or pixel areas, else 1. What
@@ -74,7 +74,7 @@ _EXPECTED = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Photograph:
-    """The pictures asked for, None for the others. Pixels that see nothing through the lens are 0.
+    """The images asked for, None for the others. Pixels that see nothing through the lens are 0.
 
     Colour and alpha are means over the samples of a pixel. Depth, distance and time are those of
     the ray through the middle of pixel, lens and exposure: what is there, not how it is blurred.
@@ -95,10 +95,10 @@ class Photograph:
     samples: int = 1
     """Rays per pixel."""
     intervals: int = 1
-    """Into how many parts the time of the picture was split."""
+    """Into how many parts the time of the image was split."""
     interval_error_px: float = 0.0
     """How far anything was from its place at most, as far as it was looked at."""
-    left_out: tuple[str, ...] = ()
-    """What this picture did not need, in words."""
+    skipped_effects: tuple[str, ...] = ()
+    """What this image did not need, in words."""
     dropped_nonfinite: int = 0
     """Gaussians left out because a parameter is NaN, infinite or too large."""

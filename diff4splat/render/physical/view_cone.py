@@ -117,7 +117,7 @@ def _grid(camera: Camera) -> Float[Tensor, "g 2"]:
 
 
 def _least_cosine(camera: Camera, optics: Optics) -> float:
-    """Over the edge of the picture and a grid inside, with a tenth of a radian to spare."""
+    """Over the edge of the image and a grid inside, with a tenth of a radian to spare."""
     directions, exist = optics.lens.directions((_grid(camera) - camera.center_px) / camera.focal_px)
     if not bool(exist.any()):
         return 1.0

@@ -47,7 +47,7 @@ def unsupported_reason(job: RenderJob) -> str | None:
 
 def render(job: RenderJob) -> RenderOutput:
     """Render the outputs of ``job``."""
-    # Numba is loaded with the first picture, not with the library.
+    # Numba is loaded with the first image, not with the library.
     from diff4splat.render.raster.function import rasterize
     from diff4splat.render.raster.jit import GROUP
 

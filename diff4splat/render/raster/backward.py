@@ -1,6 +1,6 @@
 """The backward pass: blend → sums per Gaussian → colours → Gaussians and camera.
 
-Sums over the picture run in the order of the tiles, sums over Gaussians part by part in float64, so
+Sums over the image run in the order of the tiles, sums over Gaussians part by part in float64, so
 gradients have the same bits whatever the number of threads.
 """
 
@@ -37,7 +37,7 @@ class Drawn:
 
     plan: RasterSettings
     view: View
-    found: Footprints
+    footprints: Footprints
     values: Floats
     image: PaddedImage
     binned: Binned
@@ -61,11 +61,13 @@ def gradients(drawn: Drawn, cloud: Cloud, sh: Floats, incoming: Floats) -> Gradi
     moments = np.zeros((len(sh), MOMENTS), np.float32)
     value_grads = np.zeros(drawn.values.shape, np.float32)
     for region in drawn.binned.regions:
-        filled = drawn.filled or fill_region(drawn.found, drawn.plan.grid, drawn.binned, region)
+        filled = drawn.filled or fill_region(
+            drawn.footprints, drawn.plan.grid, drawn.binned, region
+        )
         _blend_backward(drawn, filled, incoming, moments, value_grads)
     grads = Cloud(*(np.zeros(array.shape, np.float32) for array in cloud))
     sh_grads = np.zeros(sh.shape, np.float32)
-    visible, prints = drawn.found.visible, drawn.found.prints
+    visible, prints = drawn.footprints.visible, drawn.footprints.prints
     parts = ranges(len(visible), GAUSSIANS_PER_PART)
     camera = np.zeros((len(parts), CAMERA_COLUMNS))
 
@@ -88,14 +90,14 @@ def _blend_backward(
     drawn: Drawn, filled: Filled, incoming: Floats, moments: Floats, value_grads: Floats
 ) -> None:
     """Add the gradients of the tiles of a region."""
-    order, image = drawn.found.order, drawn.image
+    order, image = drawn.footprints.order, drawn.image
     slots = empty(len(filled.lists.members), MOMENTS + drawn.values.shape[1])
 
     tiles = tiles_of(filled.region, drawn.plan.grid)
 
     def blend_tiles(first: int, last: int) -> None:
         blend_backward(
-            tiles[first:last], drawn.plan.grid, filled.lists, drawn.found.prints, drawn.values,
+            tiles[first:last], drawn.plan.grid, filled.lists, drawn.footprints.prints, drawn.values,
             drawn.plan.rules, image.light, image.stops, incoming, slots,
         )  # fmt: skip
 

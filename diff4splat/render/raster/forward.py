@@ -1,7 +1,7 @@
 """The forward pass: project → sort by depth → colours → lists of tiles → blend.
 
 Every stage is spread over threads in parts whose results do not depend on which thread does them.
-A picture with more pairs (tile, Gaussian) than may be kept is cut into regions of tiles that are
+An image with more pairs (tile, Gaussian) than may be kept is cut into regions of tiles that are
 done one after another.
 """
 
@@ -115,13 +115,13 @@ def channel_table(
     return values
 
 
-def bin_footprints(found: Footprints, plan: RasterSettings) -> Binned:
-    """Count pairs, and cut the picture into regions of few enough of them or one tile."""
-    grid, pieces = plan.grid, _pieces(found.order)
+def bin_footprints(projected: Footprints, plan: RasterSettings) -> Binned:
+    """Count pairs, and cut the image into regions of few enough of them or one tile."""
+    grid, pieces = plan.grid, _pieces(projected.order)
     counts = np.zeros((len(pieces), grid.rows * grid.columns), np.int32)
 
     def work(piece: int, first: int, last: int) -> None:
-        count_pairs(first, last, found.order, found.prints, grid, counts[piece])
+        count_pairs(first, last, projected.order, projected.prints, grid, counts[piece])
 
     parallel_for(work, numbered(pieces))
     per_tile = counts.sum(0, dtype=np.int64).reshape(grid.rows, grid.columns)
@@ -129,7 +129,7 @@ def bin_footprints(found: Footprints, plan: RasterSettings) -> Binned:
     return Binned(counts=counts, regions=list(regions))
 
 
-def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -> Filled:
+def fill_region(projected: Footprints, grid: Grid, binned: Binned, region: Region) -> Filled:
     """The lists of the tiles in ``region``."""
     top, bottom, left, right = region
     cursors = np.zeros((len(binned.counts), grid.rows, grid.columns), np.int64)
@@ -141,25 +141,25 @@ def fill_region(found: Footprints, grid: Grid, binned: Binned, region: Region) -
     place_lists(cursors, starts)
     pairs = int(starts[-1])
     lists = Lists(starts, empty(pairs, dtype=torch.int32), empty(pairs, dtype=torch.int32))
-    first_slots = np.empty(len(found.order) + 1, np.int64)
+    first_slots = np.empty(len(projected.order) + 1, np.int64)
     first_slots[-1] = pairs
 
     def work(piece: int, first: int, last: int) -> None:
         fill_lists(
-            first, last, found.order, found.prints, grid, np.array(region), cursors[piece],
+            first, last, projected.order, projected.prints, grid, np.array(region), cursors[piece],
             first_slot[piece], first_slots, lists,
         )  # fmt: skip
 
-    parallel_for(work, numbered(_pieces(found.order)))
+    parallel_for(work, numbered(_pieces(projected.order)))
     return Filled(region=region, lists=lists, first_slots=first_slots)
 
 
 def blend_region(
-    plan: RasterSettings, filled: Filled, found: Footprints, values: Floats, image: PaddedImage
+    plan: RasterSettings, filled: Filled, projected: Footprints, values: Floats, image: PaddedImage
 ) -> None:
     """Blend the tiles of a region into ``image``."""
     tiles = tiles_of(filled.region, plan.grid)
-    blend_tiles(plan, tiles, filled.lists, found.prints, values, image)
+    blend_tiles(plan, tiles, filled.lists, projected.prints, values, image)
 
 
 def blend_tiles(

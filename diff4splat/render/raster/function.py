@@ -22,7 +22,7 @@ from diff4splat.scene.gaussians import Gaussians
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Raster:
-    """The planes of a picture, before the background."""
+    """The planes of an image, before the background."""
 
     planes: Float[Tensor, "c h w"]
     light: Float[Tensor, "h w"]
@@ -79,7 +79,7 @@ class _Rasterize(torch.autograd.Function):
             ctx.save_for_backward(*tensors)
             kept = filled if len(binned.regions) == 1 else None
             ctx.drawn = Drawn(
-                plan=plan, view=view, found=found, values=values, image=image, binned=binned,
+                plan=plan, view=view, footprints=found, values=values, image=image, binned=binned,
                 filled=kept,
             )  # fmt: skip
         medians = image.padded(image.medians)

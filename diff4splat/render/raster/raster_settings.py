@@ -82,5 +82,5 @@ def _grid(size_px: tuple[int, int], edge: int) -> Grid:
 
 
 def _limits(size: float, center: float, focal: float) -> tuple[float, float]:
-    """Tangents at the picture's sides, moved out by the guard band."""
+    """Tangents at the image's sides, moved out by the guard band."""
     return (-GUARD_BAND * size - center) / focal, ((1 + GUARD_BAND) * size - center) / focal

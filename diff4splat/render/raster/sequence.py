@@ -72,11 +72,11 @@ class Sequence:
 
     @property
     def depth(self) -> Float[Tensor, " n"]:
-        """Z of every Gaussian that the last picture could see; any number for the others."""
+        """Z of every Gaussian that the last image could see; any number for the others."""
         return torch.from_numpy(self._depth)
 
     def draw(self, view: View, time_s: float, rows: tuple[int, int] | None = None) -> Raster:
-        """The picture at ``time_s``.
+        """The image at ``time_s``.
 
         With pixel ``rows`` (first, one past last) only the tiles in these rows are brought up to
         the time while the camera stands; the others keep what they showed, as under a rolling
@@ -91,7 +91,7 @@ class Sequence:
             self._draw_all(order, tiles_in_rows)
             # Any of them may show something that moves; nobody kept which.
             self._stale[:] = True
-        return self._picture(unusable + self._still.unusable)
+        return self._raster(unusable + self._still.unusable)
 
     def _see_still(self, view: View) -> None:
         """Project, sort and colour what does not move."""
@@ -208,7 +208,7 @@ class Sequence:
             prints=self._prints, depth=self._depth, visible=order, order=order, unusable=nothing
         )
 
-    def _picture(self, unusable: NDArray[np.int64]) -> Raster:
+    def _raster(self, unusable: NDArray[np.int64]) -> Raster:
         """Copies, because the next image overwrites the planes."""
         image = self._image
         return Raster(

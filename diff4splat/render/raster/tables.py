@@ -61,7 +61,7 @@ class Rules(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Square tiles over a picture whose rows are padded to whole tiles."""
+    """Square tiles over an image whose rows are padded to whole tiles."""
 
     edge: int
     """Pixels along a tile, 2 to the ``shift``, at least 8."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from diff4splat.kernels.parallel import parallel_for, ranges
 from diff4splat.render.raster.padded_image import empty
-from diff4splat.render.trace.bvh.boxes import PRIMITIVES_PER_PART, boxes_between
+from diff4splat.render.trace.bvh.boxes import PRIMITIVES_PER_PART, swept_boxes
 from diff4splat.render.trace.bvh.leaves import gather_leaves
 from diff4splat.render.trace.bvh.primitives import prepare
 from diff4splat.render.trace.bvh.tree import NO_ORDER, build_tree
@@ -90,7 +90,7 @@ def make_scene(
     """
     primitives, reach = make_primitives(cloud, motion, rules)
     earliest, latest = (float(times.min()), float(times.max())) if len(times) else (0.0, 0.0)
-    tree = build_tree(boxes_between(primitives, reach, earliest, latest), order)
+    tree = build_tree(swept_boxes(primitives, reach, earliest, latest), order)
     moment = 0.5 * (earliest + latest)
     leaves = gather_leaves(tree, primitives, reach, moment)
     return TraceScene(primitives, tree, leaves, moment, colors)

@@ -59,9 +59,9 @@ class MovingCloud:
 
 @torch.no_grad()
 def valid_motion(
-    moving: MovingCloud, usable: Bool[Tensor, " n"]
+    moving: MovingCloud, valid_mask: Bool[Tensor, " n"]
 ) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
-    """Those of the ``usable`` that are finite, can be squared, and have a deviation above 0.
+    """Those of ``valid_mask`` that are finite, can be squared, and have a deviation above 0.
 
     And how many of them are not, by the first such parameter.
     """
@@ -73,7 +73,7 @@ def valid_motion(
     }
     dropped = {}
     for name, valid in fine.items():
-        if count := int((usable & ~valid).sum()):
+        if count := int((valid_mask & ~valid).sum()):
             dropped[name] = count
-        usable = usable & valid
-    return usable, dropped
+        valid_mask = valid_mask & valid
+    return valid_mask, dropped

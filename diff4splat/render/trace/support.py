@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool
 from torch import Tensor
 
-from diff4splat.render.support import usable_gaussians
+from diff4splat.render.support import renderable_gaussians
 from diff4splat.render.trace.moving import MovingCloud, valid_motion
 from diff4splat.scene.gaussians import Gaussians
 
@@ -34,7 +34,7 @@ def valid_gaussians(
     gaussians: Gaussians, moving: MovingCloud | None
 ) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
     """Which Gaussians are valid, and counts of the others by their first invalid parameter."""
-    valid, dropped = usable_gaussians(gaussians)
+    valid, dropped = renderable_gaussians(gaussians)
     if moving is not None:
         valid, more = valid_motion(moving, valid)
         dropped = dropped | more

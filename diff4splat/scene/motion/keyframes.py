@@ -72,10 +72,10 @@ class KeyframeMotion:
             scales=gaussians.scales.index_copy(0, index, gaussians.scales[index] * stretch),
         )
 
-    def select(self, kept: Bool[Tensor, " n"]) -> "KeyframeMotion":
-        """Keep the moving Gaussians that ``kept`` keeps, with indices into the smaller set."""
-        survives = kept[self.moving_index]
-        new_index = kept.long().cumsum(0)[self.moving_index[survives]] - 1
+    def select(self, keep: Bool[Tensor, " n"]) -> "KeyframeMotion":
+        """Keep the moving Gaussians where ``keep`` is true, with indices into the smaller set."""
+        survives = keep[self.moving_index]
+        new_index = keep.long().cumsum(0)[self.moving_index[survives]] - 1
         return replace(
             self,
             moving_index=new_index,

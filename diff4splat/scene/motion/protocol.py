@@ -30,7 +30,7 @@ class Motion(Protocol):
         """The Gaussians as they stand at ``time_s``."""
         ...
 
-    def select(self, kept: Bool[Tensor, " n"]) -> "Motion":
+    def select(self, keep: Bool[Tensor, " n"]) -> "Motion":
         """The motion of the Gaussians that a mask keeps."""
         ...
 

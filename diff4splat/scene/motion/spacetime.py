@@ -90,10 +90,10 @@ class SpacetimeMotion:
         """The factor p on the opacity of each moving Gaussian, in [0, 1]."""
         return self._pulse(self._elapsed(time_s))
 
-    def select(self, kept: Bool[Tensor, " n"]) -> "SpacetimeMotion":
-        """Keep the moving Gaussians that ``kept`` keeps, with indices into the smaller set."""
-        survives = kept[self.moving_index]
-        new_index = kept.long().cumsum(0)[self.moving_index[survives]] - 1
+    def select(self, keep: Bool[Tensor, " n"]) -> "SpacetimeMotion":
+        """Keep the moving Gaussians where ``keep`` is true, with indices into the smaller set."""
+        survives = keep[self.moving_index]
+        new_index = keep.long().cumsum(0)[self.moving_index[survives]] - 1
         return replace(self.rows(survives), moving_index=new_index)
 
     def rows(self, which: Bool[Tensor, " m"]) -> "SpacetimeMotion":

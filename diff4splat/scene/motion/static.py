@@ -25,9 +25,9 @@ class StaticMotion:
         del time_s
         return gaussians
 
-    def select(self, kept: Bool[Tensor, " n"]) -> "StaticMotion":
+    def select(self, keep: Bool[Tensor, " n"]) -> "StaticMotion":
         """The same motion."""
-        del kept
+        del keep
         return self
 
     def to(self, target: torch.device | torch.dtype) -> "StaticMotion":

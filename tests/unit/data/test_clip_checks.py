@@ -7,7 +7,7 @@ import pytest
 import torch
 from oracles_clips import make_clip
 
-from diff4splat.data.checks import require_first_camera, require_usable
+from diff4splat.data.checks import require_first_camera, require_valid_clip
 from diff4splat.data.clip import Clip, Tracks, View
 from diff4splat.errors import InputError
 
@@ -17,7 +17,7 @@ from diff4splat.errors import InputError
     [make_clip(), make_clip(frames=1, views=1, tracks=0), make_clip(static=True, views=3)],
 )
 def test_whole_clips_pass(clip: Clip) -> None:
-    require_usable(clip, least_depth_share=0.5)
+    require_valid_clip(clip, least_depth_share=0.5)
     require_first_camera(clip)
 
 
@@ -147,7 +147,7 @@ WRONG = [
 def test_one_line_says_what_is_wrong(change: Callable[[Clip], Clip], says: str) -> None:
     broken = change(make_clip())
     with pytest.raises(InputError) as caught:
-        require_usable(broken)
+        require_valid_clip(broken)
     text = str(caught.value)
     assert text.startswith(f"clip '{broken.note.identifier}', ")
     assert says in text
@@ -158,17 +158,17 @@ def test_unknown_flow_may_be_anything() -> None:
     clip = make_clip(views=1)
     flow = clip.views[0].flow
     flow.to_next[~flow.known] = torch.nan
-    require_usable(clip)
+    require_valid_clip(clip)
 
 
 def test_a_clip_of_sky_is_told_apart_on_demand() -> None:
     clip = make_clip(views=1)
     empty = replace(clip, views=(replace(clip.views[0], depth=torch.zeros(5, 24, 32)),))
-    require_usable(empty)
+    require_valid_clip(empty)
     with pytest.raises(
         InputError, match=r"depth: expected some in 1% of all pixels or more, got 0"
     ):
-        require_usable(empty, least_depth_share=0.01)
+        require_valid_clip(empty, least_depth_share=0.01)
 
 
 def test_the_world_is_the_first_camera() -> None:

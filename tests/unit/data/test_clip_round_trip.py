@@ -70,9 +70,9 @@ def test_half_precision_refuses_what_it_cannot_hold(value: float) -> None:
 
 
 @pytest.mark.parametrize("size_px", [(24, 32), (25, 33)])
-def test_mp4_pictures(tmp_path: Path, size_px: tuple[int, int]) -> None:
+def test_mp4_images(tmp_path: Path, size_px: tuple[int, int]) -> None:
     clip = make_clip(views=1, size_px=size_px)
-    rgb = stored(tmp_path, clip, Coding(pictures="mp4")).views[0].rgb
+    rgb = stored(tmp_path, clip, Coding(images="mp4")).views[0].rgb
     assert rgb.shape == clip.views[0].rgb.shape
     error = (rgb.float() - clip.views[0].rgb.float()).abs().mean()
     mirrored = (rgb.flip(-1).float() - clip.views[0].rgb.float()).abs().mean()
@@ -136,8 +136,8 @@ def test_every_member_opens_without_us(tmp_path: Path) -> None:
         members = {m.name.split(".", 1)[1]: tar.extractfile(m).read() for m in tar.getmembers()}
     with zipfile.ZipFile(io.BytesIO(members["tracks.npz"])) as archive:
         assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-    picture = Image.open(io.BytesIO(members["rgb00.png"]))
-    assert np.array_equal(np.array(picture), clip.views[0].rgb.reshape(-1, 32, 3))
+    image = Image.open(io.BytesIO(members["rgb00.png"]))
+    assert np.array_equal(np.array(image), clip.views[0].rgb.reshape(-1, 32, 3))
     with np.load(io.BytesIO(members["camera.npz"]), allow_pickle=False) as camera:
         assert np.array_equal(
             camera["world_from_camera"][1], clip.views[1].cameras.world_from_camera

@@ -290,7 +290,7 @@ def test_other_lengths_and_sizes_of_depth(tmp_path: Path, encoded: EncodedClip) 
         assert "expected depth of 5 frames of (height, width) (24, 32), got" in message(folder)
 
 
-def test_a_picture_that_claims_to_be_enormous(tmp_path: Path, encoded: EncodedClip) -> None:
+def test_an_image_that_claims_to_be_enormous(tmp_path: Path, encoded: EncodedClip) -> None:
     header = bytearray(next(m.content for m in encoded.members if m.suffix == "rgb00.png"))
     header[16:24] = (60_000).to_bytes(4, "big") * 2
     folder = forged(tmp_path, encoded, "rgb00.png", bytes(header))

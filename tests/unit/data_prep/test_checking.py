@@ -127,7 +127,7 @@ def test_an_infinite_figure_is_not_taken_for_agreement(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("side", "share"), [(256, 0.95), (128, 0.95), (64, 0.9), (32, 0.8)])
-def test_small_pictures_may_have_more_points_at_edges(side: int, share: float) -> None:
+def test_small_images_may_have_more_points_at_edges(side: int, share: float) -> None:
     clip = make_clip(frames=1, size_px=(side, side), views=1, tracks=0)
     assert tolerances_for(clip).visible_share == pytest.approx(share)
     measured = replace(clip, note=replace(clip.note, metric="aligned"))

@@ -40,11 +40,11 @@ def test_clips_of_several_sizes_share_a_sheet() -> None:
     assert bool((sheet[36:, :left] == 1).all())
 
 
-def test_a_folder_becomes_a_picture(tmp_path: Path) -> None:
+def test_a_folder_becomes_an_image(tmp_path: Path) -> None:
     folder = write_shards(tmp_path / "shards", still=1, moving=1)
     write_clip_sheet(folder, tmp_path / "clips.png")
-    with Image.open(tmp_path / "clips.png") as picture:
-        assert picture.size == (2 * TILE[1], TILE[0])
+    with Image.open(tmp_path / "clips.png") as image:
+        assert image.size == (2 * TILE[1], TILE[0])
 
 
 def test_large_folders_are_sampled_evenly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,8 +52,8 @@ def test_large_folders_are_sampled_evenly(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr("diff4splat.data_prep.clip_sheet.MOST_CLIPS", 3)
     assert MOST_CLIPS == 64
     write_clip_sheet(folder, tmp_path / "clips.png")
-    with Image.open(tmp_path / "clips.png") as picture:
-        assert picture.size == (3 * TILE[1], TILE[0])
+    with Image.open(tmp_path / "clips.png") as image:
+        assert image.size == (3 * TILE[1], TILE[0])
 
 
 def test_a_folder_without_clips_is_refused(tmp_path: Path) -> None:

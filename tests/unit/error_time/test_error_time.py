@@ -93,9 +93,9 @@ def test_markdown_is_a_table_per_knob() -> None:
 )
 def test_any_sweep_can_be_drawn(result: SweepResult, tmp_path: Path) -> None:
     save_error_time_plot(result, tmp_path / "plot.png")
-    with Image.open(tmp_path / "plot.png") as picture:
-        assert picture.size == (1024, 672)
-        assert picture.convert("L").getextrema() == (0, 255)
+    with Image.open(tmp_path / "plot.png") as image:
+        assert image.size == (1024, 672)
+        assert image.convert("L").getextrema() == (0, 255)
 
 
 @pytest.mark.parametrize(
@@ -105,8 +105,8 @@ def test_any_sweep_can_be_drawn(result: SweepResult, tmp_path: Path) -> None:
 )
 def test_any_path_can_be_drawn(path: CameraPath, tmp_path: Path) -> None:
     save_path_preview(path, tmp_path / "path.png", "a $title_$ with {signs}")
-    with Image.open(tmp_path / "path.png") as picture:
-        assert picture.size == (1216, 1024)
+    with Image.open(tmp_path / "path.png") as image:
+        assert image.size == (1216, 1024)
 
 
 def test_speed_and_turning() -> None:

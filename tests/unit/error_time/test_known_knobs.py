@@ -94,14 +94,14 @@ def test_median_relative_error_ignores_one_stray_trajectory() -> None:
 
 def test_pruning_and_harmonics_errors_grow_with_what_is_left_out() -> None:
     cloud = scene_knobs.random_gaussians(count=300)
-    whole = scene_knobs.picture(cloud)
+    whole = scene_knobs.image(cloud)
     assert whole.shape == (12, 16, 3)
     pruned = [scene_knobs.prune_gaussians(cloud, opacity) for opacity in (0.0, 0.05, 0.5, 1.0)]
-    errors = [scene_knobs.rmse(scene_knobs.picture(part), whole) for part in pruned]
+    errors = [scene_knobs.rmse(scene_knobs.image(part), whole) for part in pruned]
     assert errors[0] == 0
     assert errors == sorted(errors)
     cut = [scene_knobs.truncate_harmonics(cloud, degree) for degree in (3, 2, 1, 0)]
-    errors = [scene_knobs.rmse(scene_knobs.picture(part), whole) for part in cut]
+    errors = [scene_knobs.rmse(scene_knobs.image(part), whole) for part in cut]
     assert errors[0] == 0
     assert errors == sorted(errors)
 

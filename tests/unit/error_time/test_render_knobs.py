@@ -11,7 +11,7 @@ import torch
 
 from diff4splat.error_time import render_knobs
 from diff4splat.error_time.knobs import ApproximationSetting
-from diff4splat.error_time.render_knobs import Arithmetic, Dilation, averaged_picture
+from diff4splat.error_time.render_knobs import Arithmetic, Dilation, averaged_image
 from diff4splat.error_time.scene_knobs import rmse
 from diff4splat.error_time.sweep import sweep
 from diff4splat.geometry.camera import pinhole
@@ -71,7 +71,7 @@ def test_a_lower_light_cutoff_is_more_exact() -> None:
     assert errors[-1] < 1e-7
 
 
-def test_the_picture_that_never_stops_is_that_of_the_reference_renderer() -> None:
+def test_the_image_that_never_stops_is_that_of_the_reference_renderer() -> None:
     knob = render_knobs.light_knob()
     height, width = render_knobs.SIZE_PX
     cloud = render_knobs.half_faint_gaussians(render_knobs.GAUSSIANS)
@@ -82,7 +82,7 @@ def test_the_picture_that_never_stops_is_that_of_the_reference_renderer() -> Non
 def test_averaged_samples_are_the_integral_over_the_pixel() -> None:
     height, width = render_knobs.SIZE_PX
     expected = 0.2 * mean_over_squares(height)[:, None] * mean_over_squares(width)
-    made = averaged_picture(speck(), render_knobs.dilation_knob().reference)
+    made = averaged_image(speck(), render_knobs.dilation_knob().reference)
     assert made.shape == (height, width, 3)
     for channel in made.double().unbind(-1):
         torch.testing.assert_close(channel, expected, atol=2e-5, rtol=0)
@@ -90,15 +90,15 @@ def test_averaged_samples_are_the_integral_over_the_pixel() -> None:
 
 def test_the_average_has_enough_samples() -> None:
     cloud, knob = render_knobs.fine_gaussians(render_knobs.GAUSSIANS), render_knobs.dilation_knob()
-    made = averaged_picture(cloud, knob.reference)
-    finer = averaged_picture(cloud, replace(knob.reference, samples=2 * render_knobs.SAMPLES))
+    made = averaged_image(cloud, knob.reference)
+    finer = averaged_image(cloud, replace(knob.reference, samples=2 * render_knobs.SAMPLES))
     assert rmse(made, finer) < 0.2 * min(errors_of(knob))
 
 
 def test_dilation_adds_light_and_compensation_takes_it_back() -> None:
-    exact = averaged_picture(speck(), Dilation(variance_px2=0.0, samples=8)).sum()
-    blurred = averaged_picture(speck(), Dilation(variance_px2=0.3)).sum()
-    kept = averaged_picture(speck(), Dilation(variance_px2=0.3, compensated=True)).sum()
+    exact = averaged_image(speck(), Dilation(variance_px2=0.0, samples=8)).sum()
+    blurred = averaged_image(speck(), Dilation(variance_px2=0.3)).sum()
+    kept = averaged_image(speck(), Dilation(variance_px2=0.3, compensated=True)).sum()
     more = (SIGMA_PX**2 + 0.3) / SIGMA_PX**2
     assert float(blurred / exact) == pytest.approx(more, rel=0.02)
     assert float(kept / exact) == pytest.approx(1, rel=0.02)

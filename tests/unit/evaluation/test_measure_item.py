@@ -49,7 +49,7 @@ def measure(task: Task, scene, answer=None) -> ItemResult:
 
 
 def test_the_truth_itself_is_near_perfect(moving: ItemResult) -> None:
-    # Pictures in 8 bits are 58.9 dB from what they were rounded from.
+    # Images in 8 bits are 58.9 dB from what they were rounded from.
     assert moving.value(SYSTEM, "psnr") > 57
     assert moving.value(SYSTEM, "ssim") > 0.999
     assert moving.value(SYSTEM, "depth_pearson") == pytest.approx(1, abs=1e-5)
@@ -170,7 +170,7 @@ def test_baselines_are_given_no_more_frames_than_the_system(row: str) -> None:
         assert torch.equal(seen.rgb, case.input_rgb(2))
 
 
-def test_without_depth_pictures_are_judged_and_the_rest_is_counted() -> None:
+def test_without_depth_images_are_judged_and_the_rest_is_counted() -> None:
     clip = filmed(wall_and_patch(SHIFT))
     views = tuple(replace(view, depth=torch.zeros_like(view.depth)) for view in clip.views)
     setup = Setup(protocol=tiny_protocol(), task="generation", system=Fixed(wall_and_patch(SHIFT)))

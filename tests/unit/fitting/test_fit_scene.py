@@ -150,7 +150,7 @@ def test_without_checks_for_stillness_the_fine_stage_still_runs(tmp_path: Path):
     assert [(line["stage"], line["step"]) for line in log] == [("fine", 20)]
 
 
-def test_a_few_broken_pictures_cost_their_steps_only(tmp_path: Path):
+def test_a_few_broken_images_cost_their_steps_only(tmp_path: Path):
     capture = ball_capture()
     capture.frames.shown[0].rgb[3, 3] = float("nan")
     result = fit_scene(run(tmp_path, capture=capture, coarse_steps=30, fine_steps=10))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from small_fits import Pictures, ball_capture
+from small_fits import Images, ball_capture
 from traced_fits import COUNT, flight, gaussians, photographed, said, scene
 
 from diff4splat.data.capture.capture import Capture
@@ -173,7 +173,7 @@ def test_pixels_that_the_lens_does_not_see_have_no_part():
         replace(frame, rgb=torch.where(seen[..., None], frame.rgb, 1.0))
         for frame in capture.frames.shown
     ]
-    other = objective(replace(capture, frames=Pictures(shown=spoilt)))
+    other = objective(replace(capture, frames=Images(shown=spoilt)))
     assert float(other.loss(made, 0.4, [0], 0).loss.detach()) == float(loss) < 0.01
     evaluator = Evaluator(renderer=other.renderer, store=other.store)
     assert (
@@ -190,7 +190,7 @@ def test_samples_differ_from_step_to_step_and_not_from_run_to_run():
     assert first == again != other
 
 
-def test_half_a_picture_is_as_long_for_rays_as_for_the_rasteriser():
+def test_half_an_image_is_as_long_for_rays_as_for_the_rasteriser():
     capture = ball_capture(views=1, times=1, held=())
     pose = capture.cameras.world_from_camera[0].float()
     ahead = pose[:3, 3] + pose[:3, 2] * torch.tensor([[1.0], [3.0], [-2.0]])

@@ -92,7 +92,7 @@ def test_counts_what_was_evaluated_and_what_was_saved() -> None:
     velocity = guided(conditional, unconditional, Guidance(weight=4.0, low=0.25, high=0.75), count)
     integrate(SAMPLERS["euler"], velocity, STATE, uniform_levels(8))
     # Levels 1, 0.875, 0.75, ..., 0.125: five of eight lie inside the interval.
-    assert (count.answers, count.conditional, count.unconditional, count.saved) == (8, 8, 5, 3)
+    assert (count.total, count.conditional, count.unconditional, count.saved) == (8, 8, 5, 3)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def test_a_batch_of_cameras_is_refused() -> None:
 
 def test_without_a_track_it_stands_still() -> None:
     own = PhysicalCamera(camera=pinhole(10.0, (4, 4)))
-    assert not own.moves_between(-1e9, 1e9)
+    assert not own.is_moving_between(-1e9, 1e9)
 
 
 def test_with_a_track_it_moves_while_the_track_does() -> None:
@@ -30,8 +30,8 @@ def test_with_a_track_it_moves_while_the_track_does() -> None:
     poses[2, 0, 3] = 1.0
     track = PoseTrack(times_s=torch.tensor([0.0, 1.0, 2.0]), world_from_camera=poses)
     own = PhysicalCamera(camera=pinhole(10.0, (4, 4)), track=track)
-    assert not own.moves_between(0.2, 0.9)
-    assert own.moves_between(0.9, 1.1)
+    assert not own.is_moving_between(0.2, 0.9)
+    assert own.is_moving_between(0.9, 1.1)
 
 
 def test_a_dtype_reaches_camera_and_optics_but_not_the_track() -> None:

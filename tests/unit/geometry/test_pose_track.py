@@ -56,18 +56,18 @@ def test_the_shorter_way_round_is_taken() -> None:
 def test_one_pose_is_the_pose_at_all_times() -> None:
     own = track([5.0], turned(0.3, (1, 2, 3)))
     assert torch.equal(at(own, 0.0, 9.0), turned(0.3, (1, 2, 3)).expand(2, 4, 4))
-    assert own.stands
+    assert own.is_static
 
 
 def test_whether_it_stands_depends_on_when() -> None:
     here, there = turned(0.0), turned(0.0, (1, 0, 0))
     own = track([0.0, 1.0, 2.0, 3.0], here, here, there, there)
-    assert not own.stands
+    assert not own.is_static
     stands = {(0.0, 1.0): True, (-9.0, 0.5): True, (0.5, 1.1): False, (1.2, 1.3): False}
     stands |= {(2.0, 2.5): True, (1.9, 2.0): False, (2.2, 99.0): True, (-9.0, 9.0): False}
     stands |= {(3.0, 3.0): True, (1.0, 1.0): True}
     for span, want in stands.items():
-        assert own.stands_between(*span) is want, span
+        assert own.is_static_between(*span) is want, span
 
 
 def test_times_far_from_zero_keep_their_differences() -> None:

@@ -23,7 +23,7 @@ from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 
 WRITERS: dict[str, Callable[[Path], object]] = {
-    "picture.png": lambda file: write_png(torch.rand(20, 20, 3), file),
+    "image.png": lambda file: write_png(torch.rand(20, 20, 3), file),
     "scene.safetensors": lambda file: save_scene(oracles_io.scene(), file),
     "state.ply": lambda file: write_ply(oracles_io.gaussians(), file),
     "video.mp4": lambda file: write_video(torch.rand(3, 6, 8, 3), file, 12.0),
@@ -99,7 +99,7 @@ def test_missing_folders_are_made(tmp_path: Path, name: str) -> None:
     assert (tmp_path / "new" / "folder" / name).is_file()
 
 
-@pytest.mark.parametrize("name", ["picture.png", "state.ply"])
+@pytest.mark.parametrize("name", ["image.png", "state.ply"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(errno.ENOSPC, "full")])
 def test_trouble_in_the_middle_of_the_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, error: BaseException

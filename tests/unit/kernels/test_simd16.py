@@ -71,7 +71,7 @@ def test_powers_of_two_are_right_to_a_few_units_in_the_last_place() -> None:
     want = np.exp2(numbers.astype(np.float64))
     error = exp2_in_lanes(numbers) / want - 1
     assert np.abs(error).max() <= 3e-7
-    # An error of one sign would darken or brighten every picture.
+    # An error of one sign would darken or brighten every image.
     assert abs(error.mean()) <= 3e-8
 
 
@@ -159,25 +159,25 @@ def test_whole_powers_are_exact() -> None:
 
 
 @njit
-def through_blocks(picture, offset, pitch, out):
-    prefetch(picture.reshape(-1, 8), 1)
-    block = load_block(picture, offset, pitch)
+def through_blocks(image, offset, pitch, out):
+    prefetch(image.reshape(-1, 8), 1)
+    block = load_block(image, offset, pitch)
     store(out, 0, block)
     store(out, LANES, block_columns())
     store(out, 2 * LANES, block_rows())
-    store_block(picture, offset, pitch, block + 100.0)
+    store_block(image, offset, pitch, block + 100.0)
 
 
 def test_a_block_is_eight_columns_by_two_rows() -> None:
-    picture, out = np.arange(64 * 4, dtype=FLOAT32), np.empty(3 * LANES, FLOAT32)
-    before = picture.copy().reshape(4, 64)
-    through_blocks(picture, 64 + 24, 64, out)
+    image, out = np.arange(64 * 4, dtype=FLOAT32), np.empty(3 * LANES, FLOAT32)
+    before = image.copy().reshape(4, 64)
+    through_blocks(image, 64 + 24, 64, out)
     block, columns, rows = out.reshape(3, 2, 8)
     np.testing.assert_array_equal(block, before[1:3, 24:32])
     np.testing.assert_array_equal(columns, np.tile(np.arange(8), (2, 1)))
     np.testing.assert_array_equal(rows, np.repeat([[0], [1]], 8, axis=1))
     before[1:3, 24:32] += 100
-    np.testing.assert_array_equal(picture.reshape(4, 64), before)
+    np.testing.assert_array_equal(image.reshape(4, 64), before)
 
 
 @njit

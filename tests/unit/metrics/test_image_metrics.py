@@ -24,7 +24,7 @@ def test_the_order_of_the_axes_does_not_matter() -> None:
     torch.testing.assert_close(psnr(image, reference), moved)
 
 
-def test_identical_pictures_have_no_noise() -> None:
+def test_identical_images_have_no_noise() -> None:
     assert float(psnr(torch.ones(2, 2, 3), torch.ones(2, 2, 3))) == math.inf
 
 
@@ -48,6 +48,6 @@ def test_shapes_must_agree() -> None:
 
 @pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize("shape", [(0, 2, 3), (2, 3)])
-def test_a_picture_has_pixels(shape: tuple[int, ...]) -> None:
+def test_an_image_has_pixels(shape: tuple[int, ...]) -> None:
     with pytest.raises(ShapeError, match="expected three axes of at least 1"):
         mse(torch.zeros(shape), torch.zeros(shape))

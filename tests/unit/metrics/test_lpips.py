@@ -28,7 +28,7 @@ def random_weights(trunk: Backbone, dtype: torch.dtype = F64) -> dict[str, torch
     return weights
 
 
-def pictures(size: int, count: int = 2, dtype: torch.dtype = F64) -> torch.Tensor:
+def images(size: int, count: int = 2, dtype: torch.dtype = F64) -> torch.Tensor:
     return torch.rand(2, count, 3, size, size + 1, dtype=dtype)
 
 
@@ -51,7 +51,7 @@ def test_against_torchvisions_layout_and_the_formula(trunk, features, taps, size
     for number, head in enumerate(heads):
         weights[f"lin{number}.model.1.weight"] = head.reshape(1, -1, 1, 1)
     assert set(weights) == set(expected_shapes(trunk))
-    image, reference = pictures(size)
+    image, reference = images(size)
     expected = oracle.lpips(layers, taps, heads, image, reference)
     got = Lpips(trunk, weights).distance(image, reference)
     torch.testing.assert_close(got, torch.tensor(expected, dtype=F64), rtol=1e-6, atol=1e-10)
@@ -61,7 +61,7 @@ def test_against_torchvisions_layout_and_the_formula(trunk, features, taps, size
 @given(seed=st.integers(0, 999))
 def test_it_is_symmetric_and_not_negative(seed: int) -> None:
     torch.manual_seed(seed)
-    image, reference = pictures(4)
+    image, reference = images(4)
     features = Lpips(TINY, random_weights(TINY))
     there, back = features.distance(image, reference), features.distance(reference, image)
     torch.testing.assert_close(there, back)
@@ -69,7 +69,7 @@ def test_it_is_symmetric_and_not_negative(seed: int) -> None:
 
 
 def test_each_pair_stands_for_itself() -> None:
-    image, reference = pictures(5, count=3)
+    image, reference = images(5, count=3)
     features = Lpips(TINY, random_weights(TINY))
     together = features.distance(image, reference)
     alone = [features.distance(image[i : i + 1], reference[i : i + 1]) for i in range(3)]
@@ -77,8 +77,8 @@ def test_each_pair_stands_for_itself() -> None:
 
 
 @pytest.mark.parametrize("fill", [None, 0.0, 0.5])
-def test_equal_pictures_have_no_distance_and_no_gradient(fill: float | None) -> None:
-    image = pictures(4)[0] if fill is None else torch.full((1, 3, 4, 5), fill, dtype=F64)
+def test_equal_images_have_no_distance_and_no_gradient(fill: float | None) -> None:
+    image = images(4)[0] if fill is None else torch.full((1, 3, 4, 5), fill, dtype=F64)
     weights = random_weights(TINY)
     for key in weights:
         if key.endswith("bias"):
@@ -91,7 +91,7 @@ def test_equal_pictures_have_no_distance_and_no_gradient(fill: float | None) -> 
 
 
 def test_gradient() -> None:
-    image, reference = pictures(3, count=1)
+    image, reference = images(3, count=1)
     image.requires_grad_()
     features = Lpips(TINY, random_weights(TINY))
     assert torch.autograd.gradcheck(lambda own: features.distance(own, reference), image)
@@ -99,14 +99,14 @@ def test_gradient() -> None:
 
 def test_weights_are_frozen() -> None:
     weights = {key: value.requires_grad_() for key, value in random_weights(TINY).items()}
-    image, reference = pictures(4)
+    image, reference = images(4)
     Lpips(TINY, weights).distance(image.requires_grad_(), reference).sum().backward()
     assert all(value.grad is None for value in weights.values())
 
 
-def test_precision_follows_the_pictures_and_mixed_precision_does_not() -> None:
+def test_precision_follows_the_images_and_mixed_precision_does_not() -> None:
     features = Lpips(TINY, random_weights(TINY))
-    image, reference = pictures(4)
+    image, reference = images(4)
     full = features.distance(image, reference)
     single = features.distance(image.float(), reference.float())
     assert single.dtype == torch.float32
@@ -123,9 +123,9 @@ def test_the_name_tells_weights_apart() -> None:
     assert Lpips(TINY, one).name != Lpips(TINY, other).name
 
 
-def test_too_small_pictures() -> None:
+def test_too_small_images() -> None:
     features = Lpips(ALEXNET, random_weights(ALEXNET, torch.float32))
-    with pytest.raises(ShapeError, match="LPIPS-alex: expected pictures of at least 31 px"):
+    with pytest.raises(ShapeError, match="LPIPS-alex: expected images of at least 31 px"):
         features.distance(*torch.zeros(2, 1, 3, 30, 64))
 
 

@@ -24,7 +24,7 @@ def test_equal_flows_have_a_finite_gradient() -> None:
 
 
 def test_nothing_valid_is_an_error() -> None:
-    with pytest.raises(InputError, match="expected a valid pixel in every picture, got none"):
+    with pytest.raises(InputError, match="expected a valid pixel in every image, got none"):
         endpoint_error(
             torch.zeros(1, 1, 2), torch.zeros(1, 1, 2), torch.zeros(1, 1, dtype=torch.bool)
         )

@@ -17,7 +17,7 @@ def test_layout_and_batch() -> None:
     torch.testing.assert_close(distance[1, 2], one[0])
 
 
-def test_one_picture_and_none() -> None:
+def test_one_image_and_none() -> None:
     features = load_features(None)
     assert perceptual_distance(*torch.rand(2, 8, 8, 3), features).shape == ()
     assert perceptual_distance(*torch.rand(2, 0, 8, 8, 3), features).shape == (0,)

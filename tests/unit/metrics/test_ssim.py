@@ -36,7 +36,7 @@ def test_against_the_formula_and_scikit_image() -> None:
 
 
 @pytest.mark.parametrize("fill", [None, 0.0, 1.0])
-def test_equal_pictures(fill: float | None) -> None:
+def test_equal_images(fill: float | None) -> None:
     image = torch.rand(11, 12, 3, dtype=F64) if fill is None else torch.full((11, 12, 3), fill)
     own = image.clone().requires_grad_()
     similarity = ssim(own, image)
@@ -45,7 +45,7 @@ def test_equal_pictures(fill: float | None) -> None:
     assert own.grad.isfinite().all()
 
 
-def test_flat_pictures_have_a_closed_form() -> None:
+def test_flat_images_have_a_closed_form() -> None:
     black, white = torch.zeros(11, 11, 3, dtype=F64), torch.ones(11, 11, 3, dtype=F64)
     assert float(ssim(black, white)) == pytest.approx(1e-4 / (1 + 1e-4))
 

@@ -77,7 +77,7 @@ def test_every_effect_has_its_folder_and_nothing_else_is_there(folder: Path) -> 
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_the_same_pictures_come_of_what_the_file_says(
+def test_the_same_images_come_of_what_the_file_says(
     folder: Path, tmp_path: Path, name: str
 ) -> None:
     own = read_camera_record(folder / name / "camera.json")
@@ -113,8 +113,8 @@ def test_the_file_holds_the_cameras_that_were_asked_for(folder: Path) -> None:
 
 
 def test_effects_differ_and_the_pinhole_is_what_the_renderer_draws(folder: Path) -> None:
-    pictures = {name: (folder / name / "frame_0001.png").read_bytes() for name in EFFECTS}
-    assert len(set(pictures.values())) == len(EFFECTS)
+    images = {name: (folder / name / "frame_0001.png").read_bytes() for name in EFFECTS}
+    assert len(set(images.values())) == len(EFFECTS)
     scene = filmed_scene()
     expected = render(scene, scene.path.cameras[1], float(scene.path.times_s[1])).rgb
     got = png_rgb(folder / "pinhole" / "frame_0001.png")
@@ -133,13 +133,13 @@ def test_the_list_says_what_was_taken_and_left_out(folder: Path) -> None:
     assert listed["pinhole"]["blind_share"] == 0
 
 
-def test_blind_pixels_are_black_in_the_mask_and_the_picture(folder: Path) -> None:
+def test_blind_pixels_are_black_in_the_mask_and_the_image(folder: Path) -> None:
     mask = png_rgb(folder / "fisheye" / "valid.png")[..., 0]
     assert set(mask.unique().tolist()) == {0.0, 1.0}
     assert float(mask[0, 0]) == 0
     assert float(mask[5, 6]) == 1
-    picture = png_rgb(folder / "fisheye" / "frame_0000.png")
-    assert not picture[mask == 0].any()
+    image = png_rgb(folder / "fisheye" / "frame_0000.png")
+    assert not image[mask == 0].any()
 
 
 def test_a_stopped_clock_is_told_and_only_the_camera_moves(tmp_path: Path) -> None:

@@ -5,12 +5,12 @@ import pytest
 import torch
 
 from diff4splat.errors import InputError, ShapeError
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 
 
 def test_a_usable_path_comes_back_as_it_is() -> None:
     path = oracles_paths.random_path(0, 4)
-    assert require_usable(path, "path") is path
+    assert require_valid_path(path, "path") is path
     assert len(path) == 4
 
 
@@ -32,14 +32,14 @@ def test_cameras_and_times_must_agree(as_shipped: None) -> None:
 def test_times_must_increase(times: list[float], words: str) -> None:
     path = oracles_paths.random_path(0, 3)
     with pytest.raises(InputError, match=words):
-        require_usable(replace(path, times_s=torch.tensor(times)), "path")
+        require_valid_path(replace(path, times_s=torch.tensor(times)), "path")
 
 
 def test_no_poses_are_refused() -> None:
     path = oracles_paths.random_path(0, 3)
     empty = CameraPath(cameras=path.cameras[:0], times_s=path.times_s[:0])
     with pytest.raises(InputError, match=r"path.txt: expected at least one camera pose, got none"):
-        require_usable(empty, "path.txt")
+        require_valid_path(empty, "path.txt")
 
 
 @pytest.mark.parametrize("focal_px", [0.0, -1.0, float("nan"), float("inf")])
@@ -47,7 +47,7 @@ def test_intrinsics_must_be_finite_and_positive(focal_px: float) -> None:
     path = oracles_paths.random_path(0, 3)
     broken = replace(path.cameras, focal_px=torch.full_like(path.cameras.focal_px, focal_px))
     with pytest.raises(InputError, match="expected finite intrinsics and focal lengths above 0"):
-        require_usable(replace(path, cameras=broken), "path")
+        require_valid_path(replace(path, cameras=broken), "path")
 
 
 @pytest.mark.parametrize(
@@ -58,4 +58,4 @@ def test_poses_must_be_rigid(corner: float, words: str) -> None:
     poses = path.cameras.world_from_camera.clone()
     poses[0, 0, 0] = corner
     with pytest.raises(InputError, match=words):
-        require_usable(replace(path, cameras=path.cameras.with_pose(poses)), "path")
+        require_valid_path(replace(path, cameras=path.cameras.with_pose(poses)), "path")

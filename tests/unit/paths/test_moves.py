@@ -20,7 +20,7 @@ CLOSED = [moves.arc, moves.figure8]
 
 
 def _seen(move: Move, point: tuple[float, float, float]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Pixels and depths of a point from every pose, in a 100 x 100 picture of focal length 50."""
+    """Pixels and depths of a point from every pose, in a 100 x 100 image of focal length 50."""
     cameras = pinhole(50.0, (100, 100), torch.float64).with_pose(move.world_from_camera)
     points = torch.tensor([[point]], dtype=torch.float64).expand(len(PROGRESS), 1, 3)
     pixels, depth = project(cameras, points)
@@ -112,11 +112,11 @@ def test_figure8_is_a_lemniscate() -> None:
     assert float(y[20].abs() + x[20].abs()) < 1e-15
 
 
-def test_roll_turns_the_picture_only() -> None:
+def test_roll_turns_the_image_only() -> None:
     pose = moves.roll(PROGRESS, math.pi / 2, FOCUS).world_from_camera
     assert bool((pose[:, :3, 3] == 0).all())
     torch.testing.assert_close(pose[:, :3, 2], pose.new_tensor([0, 0, 1]).expand(41, 3))
-    # A clockwise quarter turn: what was on the right of the picture is now at its top.
+    # A clockwise quarter turn: what was on the right of the image is now at its top.
     pixels, _ = _seen(moves.roll(PROGRESS, math.pi / 2, FOCUS), (1.0, 0.0, 2.0))
     torch.testing.assert_close(pixels[0], pixels.new_tensor([75.0, 50.0]))
     torch.testing.assert_close(pixels[-1], pixels.new_tensor([50.0, 25.0]))

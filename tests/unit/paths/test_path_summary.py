@@ -58,7 +58,7 @@ def test_an_orbit_in_words() -> None:
     assert found.turn_deg == pytest.approx(360, rel=1e-4)
     assert found.warnings == (
         "the camera goes 5.0 near depths away from where it starts; "
-        "expect to see places that the picture does not show",
+        "expect to see places that the image does not show",
     )
 
 

@@ -114,7 +114,7 @@ def test_rounded_rotations_are_made_exact() -> None:
         ),
         (
             f"0 500 500 320 240 0 0 {FRONT}",
-            "line 1: expected intrinsics divided by the picture size",
+            "line 1: expected intrinsics divided by the image size",
         ),
     ],
 )

@@ -35,7 +35,7 @@ def test_pixels_keep_their_shape_and_points_their_place(height: int, width: int)
     torch.testing.assert_close(after, (before - middle) * factor + new_middle)
 
 
-def test_a_square_cut_of_a_wide_picture() -> None:
+def test_a_square_cut_of_a_wide_image() -> None:
     path = oracles_paths.random_path(2, 3, centered=True)
     found = resized(path, (24, 24))
     torch.testing.assert_close(found.cameras.focal_px, path.cameras.focal_px / 2)

@@ -161,7 +161,7 @@ def _matrix(**entries: float) -> list[list[float]]:
         (_with(1, cx=math.nan), "frame 1: 'cx': expected a finite number"),
         (
             _with(1, w=10, h=10),
-            "frame 1: expected the picture size of the first frame, 64 x 48, got 10 x 10",
+            "frame 1: expected the image size of the first frame, 64 x 48, got 10 x 10",
         ),
         (_with(1, w=10), "frame 1: expected both 'h' and 'w' or neither"),
         (_root(w=0, h=10), "frame 0: 'w': expected a whole number of pixels from 1"),
@@ -177,7 +177,7 @@ def _matrix(**entries: float) -> list[list[float]]:
         (_root(camera_model=3), "expected a pinhole camera_model, got 3"),
         (
             _root(k1=0.1),
-            "frame 0: expected no lens distortion, got k1 = 0.1; undistort the pictures first",
+            "frame 0: expected no lens distortion, got k1 = 0.1; undistort the images first",
         ),
         (_with(1, p2=-1e-9), "frame 1: expected no lens distortion, got p2 = -1e-09"),
         (_root(distortion_params=[0, 0.2]), "got distortion_params = 0.2"),

@@ -16,17 +16,17 @@ def test_reads_as_one_line() -> None:
 
 
 def test_keeps_the_order_and_counts_repeats_once() -> None:
-    omissions = SkippedWorkList()
+    skipped_work = SkippedWorkList()
     for record in (MOTION, TEXT, MOTION):
-        omissions.add(record)
-    assert list(omissions) == [MOTION, TEXT]
-    assert len(omissions) == 2
+        skipped_work.add(record)
+    assert list(skipped_work) == [MOTION, TEXT]
+    assert len(skipped_work) == 2
 
 
 def test_survives_json() -> None:
-    omissions = SkippedWorkList()
-    omissions.add(MOTION)
-    assert json.loads(json.dumps(omissions.to_json())) == [
+    skipped_work = SkippedWorkList()
+    skipped_work.add(MOTION)
+    assert json.loads(json.dumps(skipped_work.to_json())) == [
         {
             "what": "deformation",
             "why": "nothing moves",

@@ -50,16 +50,16 @@ def spoilt(gaussians: Gaussians, name: str, value: float) -> Gaussians:
     ],
     ids=str,
 )
-def test_pictures_are_those_of_the_reference(bands: int, changes: dict) -> None:
+def test_images_are_those_of_the_reference(bands: int, changes: dict) -> None:
     view = replace(SMALL[0], sh=SMALL[0].sh[:, :bands]), SMALL[1]
     got, want = both(view, replace(everything(view), **changes))
-    oracles.assert_same_pictures(got, want, CLOSE_DECIBELS)
+    oracles.assert_same_images(got, want, CLOSE_DECIBELS)
     assert float(want.alpha.max()) > 0.5
 
 
 def test_one_gaussian_per_pixel() -> None:
     view = aligned_view(24)
-    oracles.assert_same_pictures(*both(view, everything(view)), CLOSE_DECIBELS)
+    oracles.assert_same_images(*both(view, everything(view)), CLOSE_DECIBELS)
 
 
 @pytest.mark.parametrize("antialias", [False, True])
@@ -150,7 +150,7 @@ def test_what_lies_on_the_near_plane_is_not_drawn(near_depth: float) -> None:
     assert bool(made.alpha.any())
 
 
-def test_far_from_the_origin_the_picture_is_the_same() -> None:
+def test_far_from_the_origin_the_image_is_the_same() -> None:
     gaussians, camera = SMALL
     # 1e6 + k / 16 is exact in float32, so nothing is lost before the renderer sees it.
     gaussians = replace(gaussians, means=(gaussians.means * 16).round() / 16)
@@ -165,7 +165,7 @@ def test_far_from_the_origin_the_picture_is_the_same() -> None:
 @pytest.mark.parametrize("view", EXTREMES.values(), ids=EXTREMES)
 def test_extremes_agree_and_have_finite_gradients(view: View) -> None:
     settings = everything(view)
-    oracles.assert_same_pictures(*both(view, settings))
+    oracles.assert_same_images(*both(view, settings))
     for outputs in (MADE, ("rgb",)):
         found = oracles.gradients(view, "gsplat", settings, outputs)
         for name, gradient in found.items():
@@ -190,7 +190,7 @@ def test_what_is_not_finite_is_counted_and_left_out(name: str, value: float) -> 
     settings = everything(SMALL)
     got, want = both(view, settings)
     assert got.dropped_nonfinite == 2
-    oracles.assert_same_pictures(got, want, CLOSE_DECIBELS)
+    oracles.assert_same_images(got, want, CLOSE_DECIBELS)
     for parameter, gradient in oracles.gradients(view, "gsplat", settings).items():
         assert bool(torch.isfinite(gradient).all()), parameter
 
@@ -214,7 +214,7 @@ def test_nothing_to_draw_shows_the_background(calls: list[dict], count: int) -> 
 
 def test_one_gaussian_on_one_pixel() -> None:
     view = SMALL[0].select(torch.tensor([0])), SMALL[1].resized((1, 1))
-    oracles.assert_same_pictures(*both(view, everything(view)), CLOSE_DECIBELS)
+    oracles.assert_same_images(*both(view, everything(view)), CLOSE_DECIBELS)
 
 
 def test_a_target_that_nobody_sees_has_no_say() -> None:

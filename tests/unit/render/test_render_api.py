@@ -52,7 +52,7 @@ def test_only_what_is_asked_for_is_made() -> None:
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
-def test_a_picture_is_the_same_alone_and_in_company(name: str) -> None:
+def test_an_image_is_the_same_alone_and_in_company(name: str) -> None:
     features = torch.rand(COUNT, 2, dtype=torch.float64)
     settings = RenderSettings(flow_camera=small_camera((6, 7)), features=features)
     gaussians = random_gaussians(COUNT)
@@ -112,7 +112,7 @@ def test_mixed_precision_is_refused() -> None:
         render(mixed, CAMERA)
 
 
-def test_a_batch_of_cameras_and_times_is_a_stack_of_pictures() -> None:
+def test_a_batch_of_cameras_and_times_is_a_stack_of_images() -> None:
     scene = scene_with(drifting((0.4, 0.0, 0.0)))
     times_s = torch.tensor([0.0, 0.25, 1.0])
     made = render(scene, scene.path.cameras, times_s, outputs=("rgb", "depth"))
@@ -129,7 +129,7 @@ def test_one_camera_serves_all_times_and_one_time_all_cameras() -> None:
     assert render(scene, scene.path.cameras, 0.5).rgb.shape == (3, 6, 7, 3)
 
 
-def test_what_is_left_out_counts_in_every_picture() -> None:
+def test_what_is_left_out_counts_in_every_image() -> None:
     gaussians = random_gaussians(COUNT, dtype=torch.float32)
     gaussians.scales[2] = float("nan")
     made = render(gaussians, CAMERA.with_pose(torch.eye(4).expand(2, 4, 4)))

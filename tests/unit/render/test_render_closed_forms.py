@@ -1,4 +1,4 @@
-"""Pictures that can be written down."""
+"""Images that can be written down."""
 
 import math
 from dataclasses import replace
@@ -21,7 +21,7 @@ CAMERA = pinhole(FOCAL_PX, (15, 15), torch.float64)
 def on_axis(
     opacity: float, depth: float = DEPTH, rgb: tuple[float, ...] = (1.0, 1.0, 1.0)
 ) -> Gaussians:
-    """One isotropic Gaussian in the middle of the picture, SIGMA_PX wide."""
+    """One isotropic Gaussian in the middle of the image, SIGMA_PX wide."""
     scale = SIGMA_PX * depth / FOCAL_PX
     return Gaussians(
         means=torch.tensor([[0.0, 0.0, depth]], dtype=torch.float64),

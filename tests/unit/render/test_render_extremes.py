@@ -1,4 +1,4 @@
-"""Value and gradient stay finite, and the picture stays right, where numbers are extreme."""
+"""Value and gradient stay finite, and the image stays right, where numbers are extreme."""
 
 from dataclasses import fields, replace
 
@@ -79,7 +79,7 @@ def with_gradients(gaussians: Gaussians) -> Gaussians:
 
 
 def assert_finite(gaussians: Gaussians, camera=CAMERA, settings=SETTINGS["plain"]) -> None:
-    """Every picture and every gradient, those of the camera included."""
+    """Every image and every gradient, those of the camera included."""
     gaussians = with_gradients(gaussians)
     tensors = {
         name: getattr(camera, name).clone().requires_grad_()
@@ -144,7 +144,7 @@ def test_nothing_is_counted_in_a_clean_scene() -> None:
     assert render(cloud(), CAMERA).dropped_nonfinite == 0
 
 
-def test_far_from_the_origin_the_picture_is_the_same() -> None:
+def test_far_from_the_origin_the_image_is_the_same() -> None:
     gaussians, camera = cloud(), small_camera(dtype=torch.float32)
     # 1e6 + k / 16 is exact in float32, so nothing is lost before the renderer sees it.
     gaussians = replace(gaussians, means=(gaussians.means * 16).round() / 16)
@@ -211,7 +211,7 @@ def test_many_coincident_gaussians_fit_in_little_memory() -> None:
     assert bool(torch.isfinite(stack.opacities.grad).all())
 
 
-def test_gaussians_over_the_whole_picture_fit_in_little_memory() -> None:
+def test_gaussians_over_the_whole_image_fit_in_little_memory() -> None:
     settings, wide = RenderSettings(memory_bytes=1 << 20), with_gradients(cloud(scales=100.0))
     with LargestTensor() as watch:
         rgb = render(wide, pinhole(64.0, (128, 128)), settings=settings).rgb

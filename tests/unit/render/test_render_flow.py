@@ -37,7 +37,7 @@ def moving(gaussians: Gaussians) -> Scene:
 
 
 def one() -> Gaussians:
-    """One Gaussian near the middle of the picture."""
+    """One Gaussian near the middle of the image."""
     gaussian = random_gaussians(1)
     return replace(gaussian, means=torch.tensor([[0.2, 0.1, 2.0]], dtype=torch.float64))
 
@@ -55,7 +55,7 @@ def test_a_moving_gaussian_carries_its_pixels_along() -> None:
     assert not flow[alpha == 0].any()
 
 
-def test_flow_over_a_short_time_is_the_velocity_on_the_picture() -> None:
+def test_flow_over_a_short_time_is_the_velocity_on_the_image() -> None:
     step_s = 1e-6
     flow, alpha = flow_and_alpha(moving(one()), RenderSettings(flow_time_s=0.25 + step_s))
     means = (one().means + 0.25 * VELOCITY).requires_grad_()

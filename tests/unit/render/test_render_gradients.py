@@ -1,4 +1,4 @@
-"""Analytic against numeric gradients, far from the cutoff, where the picture is continuous."""
+"""Analytic against numeric gradients, far from the cutoff, where the image is continuous."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ SMALL = (4, 5)
 def test_gaussian_parameters(name: str) -> None:
     gaussians, camera = random_gaussians(4), small_camera(SMALL)
 
-    def pictures(value: Tensor) -> Tensor:
+    def images(value: Tensor) -> Tensor:
         made = render(
             replace(gaussians, **{name: value}),
             camera,
@@ -28,14 +28,14 @@ def test_gaussian_parameters(name: str) -> None:
         )
         return torch.cat([made.rgb, made.depth[..., None]], -1)
 
-    assert gradcheck(pictures, getattr(gaussians, name).requires_grad_(), fast_mode=True)
+    assert gradcheck(images, getattr(gaussians, name).requires_grad_(), fast_mode=True)
 
 
 @pytest.mark.parametrize("name", ["world_from_camera", "focal_px", "center_px"])
 def test_camera_parameters(name: str) -> None:
     gaussians, camera = random_gaussians(4), small_camera(SMALL)
 
-    def pictures(value: Tensor) -> Tensor:
+    def images(value: Tensor) -> Tensor:
         made = render(
             gaussians,
             replace(camera, **{name: value}),
@@ -44,7 +44,7 @@ def test_camera_parameters(name: str) -> None:
         )
         return torch.cat([made.rgb, made.alpha[..., None]], -1)
 
-    assert gradcheck(pictures, getattr(camera, name).requires_grad_(), fast_mode=True)
+    assert gradcheck(images, getattr(camera, name).requires_grad_(), fast_mode=True)
 
 
 @pytest.mark.parametrize(
@@ -53,24 +53,24 @@ def test_camera_parameters(name: str) -> None:
 def test_dilation_and_its_compensation(settings: RenderSettings) -> None:
     gaussians, camera = random_gaussians(3), small_camera(SMALL)
 
-    def pictures(scales: Tensor) -> Tensor:
+    def images(scales: Tensor) -> Tensor:
         return render(replace(gaussians, scales=scales), camera, settings=settings).rgb
 
-    assert gradcheck(pictures, gaussians.scales.requires_grad_(), fast_mode=True)
+    assert gradcheck(images, gaussians.scales.requires_grad_(), fast_mode=True)
 
 
 def test_beyond_the_guard_band() -> None:
     gaussians, camera = random_gaussians(3), small_camera(SMALL)
     aside = gaussians.means + torch.tensor([2.0, 0.0, 0.0])
 
-    def pictures(means: Tensor) -> Tensor:
+    def images(means: Tensor) -> Tensor:
         return render(
             replace(gaussians, means=means, scales=gaussians.scales * 4),
             camera,
             settings=CONTINUOUS,
         ).rgb
 
-    assert gradcheck(pictures, aside.requires_grad_(), fast_mode=True)
+    assert gradcheck(images, aside.requires_grad_(), fast_mode=True)
 
 
 def test_flow() -> None:
@@ -79,9 +79,9 @@ def test_flow() -> None:
     pose[:3, 3] += torch.tensor([0.1, 0.05, 0.2])
     settings = replace(CONTINUOUS, flow_camera=camera.with_pose(pose))
 
-    def pictures(means: Tensor) -> Tensor:
+    def images(means: Tensor) -> Tensor:
         return render(
             replace(gaussians, means=means), camera, outputs=("flow",), settings=settings
         ).flow
 
-    assert gradcheck(pictures, gaussians.means.requires_grad_(), fast_mode=True)
+    assert gradcheck(images, gaussians.means.requires_grad_(), fast_mode=True)

@@ -1,4 +1,4 @@
-"""Laws that every picture obeys."""
+"""Laws that every image obeys."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from diff4splat.scene.gaussians import concatenate
 
 SEEDS = st.integers(0, 10_000)
 CONTINUOUS = RenderSettings(alpha_cutoff=1e-12)
-PICTURES = ("rgb", "alpha", "depth")
+IMAGES = ("rgb", "alpha", "depth")
 
 
 @settings(max_examples=15, deadline=None)
@@ -30,14 +30,14 @@ def test_moving_the_world_with_the_camera_changes_nothing(seed: int) -> None:
         means=rigid.transform_points(motion, gaussians.means),
         quats=quaternion.multiply(quaternion.normalize(quat).expand(12, 4), gaussians.quats),
     )
-    before = render(gaussians, camera, outputs=PICTURES, settings=CONTINUOUS)
+    before = render(gaussians, camera, outputs=IMAGES, settings=CONTINUOUS)
     after = render(
         moved,
         camera.with_pose(motion @ camera.world_from_camera),
-        outputs=PICTURES,
+        outputs=IMAGES,
         settings=CONTINUOUS,
     )
-    for name in PICTURES:
+    for name in IMAGES:
         torch.testing.assert_close(getattr(after, name), getattr(before, name), rtol=0, atol=1e-9)
 
 
@@ -78,7 +78,7 @@ def test_the_unit_of_length_does_not_matter(seed: int, factor: float) -> None:
 @settings(max_examples=15, deadline=None)
 @given(SEEDS)
 def test_a_cropped_camera_sees_the_crop(seed: int) -> None:
-    # The guard band moves with the picture, so only Gaussians well inside are compared.
+    # The guard band moves with the image, so only Gaussians well inside are compared.
     gaussians, camera = random_gaussians(12, seed), small_camera((16, 16))
     inside = replace(gaussians, means=gaussians.means * torch.tensor([0.3, 0.3, 1.0]))
     whole = render(inside, camera, settings=CONTINUOUS).rgb

@@ -9,7 +9,7 @@ from oracles_render import assert_close_to_oracle, brute_force, random_gaussians
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 
-PICTURES = ("rgb", "alpha", "depth", "median_depth")
+IMAGES = ("rgb", "alpha", "depth", "median_depth")
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -24,13 +24,13 @@ PICTURES = ("rgb", "alpha", "depth", "median_depth")
 def test_random_scenes_agree(settings: RenderSettings, dtype: torch.dtype) -> None:
     gaussians, camera = random_gaussians(30), small_camera()
     want = brute_force(gaussians, camera, settings)
-    got = render(gaussians.to(dtype), camera, outputs=PICTURES, settings=settings)
-    for name in PICTURES:
+    got = render(gaussians.to(dtype), camera, outputs=IMAGES, settings=settings)
+    for name in IMAGES:
         assert getattr(got, name).dtype == dtype
         assert_close_to_oracle(getattr(got, name), getattr(want, name), want.doubtful, terms=30)
 
 
-def test_gaussians_off_the_picture_reach_into_it() -> None:
+def test_gaussians_off_the_image_reach_into_it() -> None:
     gaussians, camera, settings = (
         random_gaussians(30, seed=3),
         small_camera((9, 9)),
@@ -42,8 +42,8 @@ def test_gaussians_off_the_picture_reach_into_it() -> None:
         scales=gaussians.scales * 4,
     )
     want = brute_force(aside, camera, settings)
-    got = render(aside, camera, outputs=PICTURES, settings=settings)
-    for name in PICTURES:
+    got = render(aside, camera, outputs=IMAGES, settings=settings)
+    for name in IMAGES:
         assert_close_to_oracle(getattr(got, name), getattr(want, name), want.doubtful, terms=30)
 
 
@@ -56,11 +56,11 @@ def test_gaussians_off_the_picture_reach_into_it() -> None:
         RenderSettings(tile_px=3, memory_bytes=1 << 20),
     ],
 )
-def test_tiles_and_memory_do_not_change_the_picture(settings: RenderSettings) -> None:
+def test_tiles_and_memory_do_not_change_the_image(settings: RenderSettings) -> None:
     gaussians, camera = random_gaussians(400, seed=1), small_camera()
-    plain = render(gaussians, camera, outputs=PICTURES)
-    other = render(gaussians, camera, outputs=PICTURES, settings=settings)
-    for name in PICTURES:
+    plain = render(gaussians, camera, outputs=IMAGES)
+    other = render(gaussians, camera, outputs=IMAGES, settings=settings)
+    for name in IMAGES:
         torch.testing.assert_close(getattr(other, name), getattr(plain, name), rtol=0, atol=1e-12)
 
 

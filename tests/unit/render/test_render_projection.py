@@ -14,7 +14,7 @@ COUNT = 40
 
 
 def spread_gaussians() -> Gaussians:
-    """Some on the picture, some beyond the guard band."""
+    """Some on the image, some beyond the guard band."""
     gaussians = random_gaussians(COUNT)
     return replace(gaussians, means=gaussians.means * torch.tensor([2.0, 2.0, 1.0]))
 

@@ -45,7 +45,7 @@ def test_support_shrinks_with_opacity() -> None:
     ]
 
 
-def test_boxes_end_at_the_picture() -> None:
+def test_boxes_end_at_the_image() -> None:
     assert box((15.0, 10.0), (1e20, 1e20), 0.5) == [0, 0, 30, 20]
     left, top, right, bottom = box((-50.0, 10.0), (2.0, 2.0), 0.5)
     assert right <= left

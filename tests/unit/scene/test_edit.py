@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.geometry.camera import pinhole, project
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.scene import harmonics
 from diff4splat.scene.edit import (
     Box,
@@ -19,7 +19,7 @@ from diff4splat.scene.edit import (
     crop,
     merge,
     prune,
-    static_if_still,
+    simplify_motion,
     transform,
     transform_gaussians,
 )
@@ -141,7 +141,7 @@ def test_transform_carries_covariances_and_colours_along() -> None:
 def test_cameras_see_the_transformed_scene_as_before() -> None:
     start, move = moving_scene(), similarity()
     after = transform(start, move)
-    require_usable(after.path, "transformed path")
+    require_valid_path(after.path, "transformed path")
     before_px, before_z = project(start.path.cameras[1], start.gaussians.means)
     after_px, after_z = project(after.path.cameras[1], after.gaussians.means)
     torch.testing.assert_close(after_px, before_px)
@@ -215,7 +215,7 @@ def test_refuses_motions_it_does_not_know() -> None:
         transform(drifting, similarity())
     with pytest.raises(ConfigError, match="merge: expected static or key-framed motion, got Drift"):
         merge(moving_scene(), drifting)
-    assert static_if_still(drifting) is drifting
+    assert simplify_motion(drifting) is drifting
 
 
 def test_crop_keeps_what_lies_inside_with_its_motion() -> None:
@@ -272,15 +272,15 @@ def test_still_gaussians_lose_their_keys() -> None:
     rotations[1, 3] = quaternion.normalize(torch.tensor([-1.0, 0.0, 1e-3, 0.0], dtype=F64))
     motion = replace(motion, offsets=offsets, rotations=rotations, log_scale_offsets=stretch)
     start = scene(gaussians(5), motion)
-    exact = static_if_still(start)
+    exact = simplify_motion(start)
     assert exact.motion.moving_index.tolist() == [1, 2, 4]
     assert_same_at_all_times(exact, start)
-    assert static_if_still(start, angle_rad=2.1e-3).motion.moving_index.tolist() == [1, 2]
-    assert static_if_still(start, angle_rad=1.9e-3).motion.moving_index.tolist() == [1, 2, 4]
+    assert simplify_motion(start, angle_rad=2.1e-3).motion.moving_index.tolist() == [1, 2]
+    assert simplify_motion(start, angle_rad=1.9e-3).motion.moving_index.tolist() == [1, 2, 4]
     far = float(offsets[:, 1].norm(dim=-1).max())
-    less = static_if_still(start, offset=1.01 * far, angle_rad=1.0)
+    less = simplify_motion(start, offset=1.01 * far, angle_rad=1.0)
     assert less.motion.moving_index.tolist() == [2]
-    assert static_if_still(start, offset=0.99 * far).motion.moving_index.tolist() == [1, 2, 4]
+    assert simplify_motion(start, offset=0.99 * far).motion.moving_index.tolist() == [1, 2, 4]
 
 
 def test_a_change_in_one_component_at_the_last_key_counts() -> None:
@@ -290,24 +290,24 @@ def test_a_change_in_one_component_at_the_last_key_counts() -> None:
     motion = keyframes([0.0, 0.5, 1.0], [0], offsets=quiet, log_scale_offsets=stretch)
     motion = replace(motion, rotations=quaternion.identity_like(motion.rotations))
     start = scene(gaussians(1), motion)
-    assert static_if_still(start, log_scale=0.19).motion.moving_index.tolist() == [0]
-    assert isinstance(static_if_still(start, log_scale=0.21).motion, StaticMotion)
+    assert simplify_motion(start, log_scale=0.19).motion.moving_index.tolist() == [0]
+    assert isinstance(simplify_motion(start, log_scale=0.21).motion, StaticMotion)
 
 
 def test_what_does_not_move_at_all_becomes_static() -> None:
     start = moving_scene()
-    still = static_if_still(start, offset=100.0, angle_rad=10.0, log_scale=100.0)
+    still = simplify_motion(start, offset=100.0, angle_rad=10.0, log_scale=100.0)
     assert still.motion == StaticMotion(time_range_s=(0.0, 1.0))
     nothing = scene(gaussians(2), keyframes([0.0, 1.0], []))
-    assert isinstance(static_if_still(nothing).motion, StaticMotion)
-    assert static_if_still(still) is still
+    assert isinstance(simplify_motion(nothing).motion, StaticMotion)
+    assert simplify_motion(still) is still
 
 
 @pytest.mark.parametrize("part", ["offsets", "log_scale_offsets"])
 def test_damaged_keys_are_not_called_still(part: str) -> None:
     motion = keyframes([0.0, 1.0], [0])
     broken = replace(motion, **{part: torch.full_like(getattr(motion, part), math.nan)})
-    kept = static_if_still(scene(gaussians(1), broken), offset=9.0, angle_rad=9.0, log_scale=9.0)
+    kept = simplify_motion(scene(gaussians(1), broken), offset=9.0, angle_rad=9.0, log_scale=9.0)
     assert kept.motion.moving_index.tolist() == [0]
 
 

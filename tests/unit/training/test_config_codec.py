@@ -32,7 +32,7 @@ GOOD = {"inner": {"share": 1}, "pairs": [[1, 2], [3, 4]], "own": "x"}
 
 
 def read(value: object) -> Outer:
-    return TypedReader(refusal=ConfigError, own={Own: Own}).read(Outer, value, "file")
+    return TypedReader(error_type=ConfigError, readers={Own: Own}).read(Outer, value, "file")
 
 
 def test_records_tuples_literals_and_numbers() -> None:
@@ -64,4 +64,4 @@ def test_what_does_not_fit_is_refused_with_its_place(change: dict, says: str) ->
 
 def test_the_caller_chooses_the_error() -> None:
     with pytest.raises(FileFormatError, match="file: expected an object, got none"):
-        TypedReader(refusal=FileFormatError).read(Inner, None, "file")
+        TypedReader(error_type=FileFormatError).read(Inner, None, "file")

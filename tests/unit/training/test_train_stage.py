@@ -127,12 +127,12 @@ def test_the_model_folder_loads_and_makes_a_scene(course: Run) -> None:
 
     pipeline = Diff4SplatPipeline.from_pretrained(course.folder / MODEL_FOLDER)
     side = course.recipe.model.size_px[0]
-    picture = InputImage(
+    image = InputImage(
         rgb=torch.rand(*course.recipe.model.size_px, 3),
         camera=pinhole(float(side), course.recipe.model.size_px),
         focal_source="test",
     )
-    scene = pipeline(picture, "spiral", "a ball", settings=GenerationSettings(steps=1))
+    scene = pipeline(image, "spiral", "a ball", settings=GenerationSettings(steps=1))
     assert not scene.provenance.untrained
     assert bool(torch.isfinite(scene.gaussians.means).all())
 

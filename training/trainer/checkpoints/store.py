@@ -34,7 +34,7 @@ from diff4splat.training.trainer.logs.run_files import CHECKPOINTS
 from diff4splat.training.trainer.loop.progress import Progress
 from diff4splat.training.trainer.settings import RunSettings
 
-SHOWN = 4
+MAX_LISTED = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +96,7 @@ class CheckpointStore:
         if found.stage == self.recipe.name and found.fingerprint in accepted:
             return
         changes = differences(found.recipe, plain(self.recipe))
-        listed = ", ".join(changes[:SHOWN]) + (", …" if len(changes) > SHOWN else "")
+        listed = ", ".join(changes[:MAX_LISTED]) + (", …" if len(changes) > MAX_LISTED else "")
         raise CheckpointError(
             f"{found.folder}: expected a checkpoint of stage {self.recipe.name} with fingerprint "
             f"{self.run.fingerprint}, got stage {found.stage} with {found.fingerprint} "

@@ -22,7 +22,7 @@ from diff4splat.training.trainer.loop.optim import local
 
 MOST_BYTES = 1 << 30
 """Tensors of one file together, roughly: a file is put together in memory before it is written."""
-SHOWN = 3
+MAX_LISTED = 3
 
 
 def write_tensors(folder: Path, tensors: Mapping[str, Tensor]) -> None:
@@ -112,7 +112,7 @@ def _require_shapes(
 def _refuse(folder: Path, what: str, found: Iterable[str]) -> None:
     names = list(found)
     if names:
-        listed = ", ".join(names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
+        listed = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
         raise CheckpointError(
             f"{folder}: expected every tensor of the stage, got {len(names)} {what} ({listed}); "
             "the checkpoint belongs to another configuration"

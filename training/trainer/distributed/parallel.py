@@ -48,7 +48,7 @@ class StageModule(nn.Module):
             return dict(self.stage.measure(batch))
 
     def panel(self, batch: Batch) -> Float[Tensor, "h w 3"]:
-        """A picture for people."""
+        """An image for people."""
         with torch.no_grad(), self._precision():
             return self.stage.panel(batch).float().cpu().clamp(0, 1)
 

@@ -66,7 +66,7 @@ class RunLogger:
             return
         self.event("evaluation", step, dict(measures))
         self._tensorboard.scalars(step, {f"evaluation/{k}": v for k, v in finite(measures).items()})
-        self._tensorboard.picture(step, panel)
+        self._tensorboard.image(step, panel)
         write_png(panel, self._run.folder / PANELS / f"step-{step:08d}.png")
 
     def event(self, event: str, step: int, values: Mapping[str, Any]) -> None:

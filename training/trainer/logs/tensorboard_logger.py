@@ -12,7 +12,7 @@ from torch import Tensor
 
 
 class TensorboardLogger:
-    """Scalars and pictures; does nothing without TensorBoard."""
+    """Scalars and images; does nothing without TensorBoard."""
 
     def __init__(self, folder: Path, note: Callable[[str], None]) -> None:
         self._writer, self._note = None, note
@@ -31,7 +31,7 @@ class TensorboardLogger:
             if value is not None:
                 self._tell("add_scalar", name, value, step)
 
-    def picture(self, step: int, rgb: Float[Tensor, "h w 3"]) -> None:
+    def image(self, step: int, rgb: Float[Tensor, "h w 3"]) -> None:
         """The panel of an evaluation."""
         self._tell("add_image", "panel", rgb.numpy(), step, dataformats="HWC")
 

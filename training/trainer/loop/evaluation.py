@@ -43,12 +43,12 @@ class Evaluation:
         return _means(self.processes.gather(found))
 
     def panel(self, module: StageModule, averages: WeightAverages) -> Float[Tensor, "h w 3"]:
-        """Picture of the first sample; all processes draw it, because sharded networks must."""
+        """Image of the first sample; all processes draw it, because sharded networks must."""
         module.set_training(False)
         with averages.swapped():
-            picture = module.panel(self._batch(0))
+            image = module.panel(self._batch(0))
         module.set_training(True)
-        return picture
+        return image
 
     def _mine(self) -> list[int]:
         rank, ranks = self.processes.rank, self.processes.count

@@ -52,18 +52,18 @@ class Progress:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, found: Mapping[str, Any]) -> "Progress":
+    def from_json(cls, record: Mapping[str, Any]) -> "Progress":
         """The same progress.
 
         Raises:
             FileFormatError: keys are missing or unknown, or a value has the wrong type.
         """
         example = asdict(cls())
-        wrong = [key for key in found if key not in example]
-        wrong += [key for key, value in example.items() if type(found.get(key)) is not type(value)]
+        wrong = [key for key in record if key not in example]
+        wrong += [key for key, value in example.items() if type(record.get(key)) is not type(value)]
         if wrong:
             raise FileFormatError(
                 f"progress: expected the keys {', '.join(item.name for item in fields(cls))}, got "
                 f"others or other types at {', '.join(wrong)}"
             )
-        return cls(**json.loads(json.dumps(dict(found))))
+        return cls(**json.loads(json.dumps(dict(record))))

@@ -1,7 +1,7 @@
 """Noise from hashed integers: values, gradients, sums of octaves, cells.
 
 Coordinates count features; ``footprint`` is how many of them one sample averages over. Octaves that
-are finer than the footprint fade out, so that nothing flickers. Natural pictures have amplitudes
+are finer than the footprint fade out, so that nothing flickers. Natural images have amplitudes
 that fall like 1/f (Field 1987): octaves of equal strength.
 """
 

@@ -1,10 +1,10 @@
 """Kernel: front-to-back blending of the lists of some tiles.
 
-Axes: ``c`` channels, planes are flat pictures whose rows are padded to whole tiles. Per pixel, with
+Axes: ``c`` channels, planes are flat images whose rows are padded to whole tiles. Per pixel, with
 the exponent of ``tables``:
 
     α = min(α_max, 2^e) where e reaches the cutoff and the light left has not fallen below its own
-    picture += α T channel,   T ← (1 - α) T
+    image += α T channel,   T ← (1 - α) T
 
 A tile's state lies in one buffer, plane by plane, block by block (8 × 2 pixels are one value of
 sixteen lanes), so that it stays in the first-level cache and every access is one aligned line.
@@ -91,7 +91,7 @@ def plane_stride(grid):
 
 @contracted
 def _begin(state, tile, grid, channels):
-    """Full light inside the picture, none in the padding; returns the number of pixels."""
+    """Full light inside the image, none in the padding; returns the number of pixels."""
     size, live = plane_stride(grid), 0
     left, top = corner(tile, grid)
     for block in range(grid.edge * grid.edge // LANES):
@@ -170,7 +170,7 @@ def _note_median(state, place, before, after, rank):
 
 @contracted
 def _finish(state, tile, grid, planes, light, stops):
-    """Write a tile to the picture."""
+    """Write a tile to the image."""
     size, pitch = plane_stride(grid), grid.columns << grid.shift
     left, top = corner(tile, grid)
     for block in range(grid.edge * grid.edge // LANES):

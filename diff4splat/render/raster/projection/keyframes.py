@@ -13,7 +13,7 @@ import numpy as np
 from diff4splat.kernels.jit import contracted
 from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.projection.footprint import quadruple, triple, unit
-from diff4splat.render.raster.projection.project import is_seen
+from diff4splat.render.raster.projection.project import is_visible
 from diff4splat.render.raster.tables import Doubles, Floats, Integers
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 
@@ -94,7 +94,7 @@ def project_keyframed(
         quat = _turned(quadruple(cloud.quats, i), place, keys, moment)
         scales = _stretched(triple(cloud.scales, i), place, keys, moment)
         state = (mean, quat, scales, np.float64(cloud.opacities[i]))
-        if is_seen(i, state, sh, view, rules, prints, depth, unusable):
+        if is_visible(i, state, sh, view, rules, prints, depth, unusable):
             visible[first + count] = i
             count += 1
     return count

@@ -54,14 +54,14 @@ def project(first, last, candidates, cloud, sh, view, rules, prints, depth, visi
         i = candidates[place]
         mean, quat = triple(cloud.means, i), quadruple(cloud.quats, i)
         state = (mean, quat, triple(cloud.scales, i), np.float64(cloud.opacities[i]))
-        if is_seen(i, state, sh, view, rules, prints, depth, unusable):
+        if is_visible(i, state, sh, view, rules, prints, depth, unusable):
             visible[first + count] = i
             count += 1
     return count
 
 
 @contracted
-def is_seen(i, state, sh, view, rules, prints, depth, unusable):
+def is_visible(i, state, sh, view, rules, prints, depth, unusable):
     """Whether a Gaussian leaves a footprint; counts it where a parameter cannot be used."""
     fault = _unusable_parameter(state, sh, i)
     if fault >= 0:

@@ -190,7 +190,7 @@ def _mean_backward(view, grad, mean, out, i, camera):
 
 @contracted
 def _horizontal(view, local, slopes, to_row, to_center, camera):
-    """Gradients of x and z of a mean through the x axis of the picture."""
+    """Gradients of x and z of a mean through the x axis of the image."""
     first, second, third = view.rotation
     lens = (view.focal_x, view.limits_x)
     return _axis_backward(

@@ -23,7 +23,7 @@ class Boxes(NamedTuple):
     upper: Doubles
 
 
-def boxes_between(primitives: Doubles, reach: Doubles, earliest: float, latest: float) -> Boxes:
+def swept_boxes(primitives: Doubles, reach: Doubles, earliest: float, latest: float) -> Boxes:
     """Boxes that hold ``primitives`` at every time from ``earliest`` to ``latest``."""
     count = len(primitives)
     boxes = Boxes(np.empty((count, 3)), np.empty((count, 3)))

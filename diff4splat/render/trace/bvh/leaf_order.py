@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from diff4splat.render.trace.bvh.boxes import Boxes, boxes_between, empty_boxes, united
+from diff4splat.render.trace.bvh.boxes import Boxes, empty_boxes, swept_boxes, united
 from diff4splat.render.trace.bvh.bvh import TimedGaussians
 from diff4splat.render.trace.bvh.tree import build_tree
 from diff4splat.render.trace.forward import make_primitives, make_rules
@@ -36,7 +36,7 @@ def _boxes(state: TimedGaussians, settings: TraceSettings) -> Boxes:
         _motion(moving),
         make_rules(settings, math.inf),
     )
-    boxes = boxes_between(primitives, reach, state.earliest_s, state.latest_s)
+    boxes = swept_boxes(primitives, reach, state.earliest_s, state.latest_s)
     if not dropped:
         return boxes
     padded = empty_boxes(len(kept))

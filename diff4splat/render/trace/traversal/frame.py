@@ -108,7 +108,7 @@ def make_frame(rays, first, last):
 
 @inlined
 def _across(ahead, rays, first, last):
-    """Along the step between the first two rays: of pixels, an axis of the picture."""
+    """Along the step between the first two rays: of pixels, an axis of the image."""
     step = triple(rays.directions, rays.order[min(first + 1, last - 1)])
     step = minus(step, triple(rays.directions, rays.order[first]))
     step = plus(step, ahead, -dot(step, ahead))

@@ -73,10 +73,10 @@ class HexPlaneMotion:
         moved = [residuals.apply(moving, one, self.rotation) for one in at_times]
         return [self._placed(gaussians, state, told) for state in moved]
 
-    def select(self, kept: Bool[Tensor, " n"]) -> "HexPlaneMotion":
-        """Keep the moving Gaussians that ``kept`` keeps, with indices into the smaller set."""
-        survives = kept[self.moving_index]
-        new_index = kept.long().cumsum(0)[self.moving_index[survives]] - 1
+    def select(self, keep: Bool[Tensor, " n"]) -> "HexPlaneMotion":
+        """Keep the moving Gaussians where ``keep`` is true, with indices into the smaller set."""
+        survives = keep[self.moving_index]
+        new_index = keep.long().cumsum(0)[self.moving_index[survives]] - 1
         return replace(self, moving_index=new_index)
 
     def to(self, target: torch.device | torch.dtype) -> "HexPlaneMotion":

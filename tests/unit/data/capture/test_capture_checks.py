@@ -7,7 +7,7 @@ import torch
 from small_captures import GreyFrames, small_capture
 
 from diff4splat.data.capture.capture import Capture
-from diff4splat.data.capture.checks import require_usable_capture
+from diff4splat.data.capture.checks import require_valid_capture
 from diff4splat.errors import InputError, ShapeError
 
 
@@ -23,7 +23,7 @@ def with_pose(capture: Capture, change) -> Capture:
 
 
 def test_a_good_capture_passes(capture: Capture) -> None:
-    assert require_usable_capture(capture) is capture
+    assert require_valid_capture(capture) is capture
     assert (len(capture), capture.time_range_s) == (4, (0.0, 1.0))
 
 
@@ -38,10 +38,10 @@ def test_a_good_capture_passes(capture: Capture) -> None:
 )
 def test_everything_is_there_once_per_frame(capture: Capture, change: dict, as_shipped) -> None:
     with pytest.raises(ShapeError, match="expected one entry per frame everywhere, got cameras"):
-        require_usable_capture(replace(capture, **change))
+        require_valid_capture(replace(capture, **change))
 
 
-def test_there_are_pictures(capture: Capture) -> None:
+def test_there_are_images(capture: Capture) -> None:
     nothing = replace(
         capture,
         cameras=capture.cameras[:0],
@@ -50,21 +50,21 @@ def test_there_are_pictures(capture: Capture) -> None:
         held_out=capture.held_out[:0],
         frames=GreyFrames(0),
     )
-    with pytest.raises(InputError, match="expected pictures, got none"):
-        require_usable_capture(nothing)
+    with pytest.raises(InputError, match="expected images, got none"):
+        require_valid_capture(nothing)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_times_are_finite(capture: Capture, value: float) -> None:
     times_s = torch.tensor([0, 1, value, 1], dtype=torch.float64)
     with pytest.raises(InputError, match="expected a finite time for every frame"):
-        require_usable_capture(replace(capture, times_s=times_s))
+        require_valid_capture(replace(capture, times_s=times_s))
 
 
-def test_a_camera_shows_one_picture_at_a_time(capture: Capture) -> None:
+def test_a_camera_shows_one_image_at_a_time(capture: Capture) -> None:
     times_s = torch.tensor([0, 1, 7, 7], dtype=torch.float64)
     with pytest.raises(InputError, match="got two of camera 1 at 7 s; give every frame its own"):
-        require_usable_capture(replace(capture, times_s=times_s))
+        require_valid_capture(replace(capture, times_s=times_s))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_camera_shows_one_picture_at_a_time(capture: Capture) -> None:
 )
 def test_poses_are_rotations_and_translations(capture: Capture, change, message: str) -> None:
     with pytest.raises(InputError, match=f"small: camera poses: {message}"):
-        require_usable_capture(with_pose(capture, change))
+        require_valid_capture(with_pose(capture, change))
 
 
 @pytest.mark.parametrize("value", [0.0, -3.0, float("nan"), float("inf")])
@@ -88,19 +88,17 @@ def test_focal_lengths_are_above_0(capture: Capture, value: float) -> None:
     focal_px = capture.cameras.focal_px.clone()
     focal_px[1, 1] = value
     with pytest.raises(InputError, match="expected focal lengths above 0; repair the cameras"):
-        require_usable_capture(
-            replace(capture, cameras=replace(capture.cameras, focal_px=focal_px))
-        )
+        require_valid_capture(replace(capture, cameras=replace(capture.cameras, focal_px=focal_px)))
 
 
 def test_one_place_is_enough_with_depth_alone() -> None:
     angles, times_s = [0, 0, 0], [0, 1, 2]
-    require_usable_capture(small_capture(angles, times_s, [0, 0, 1], [0, 0, 0], depth=True))
+    require_valid_capture(small_capture(angles, times_s, [0, 0, 1], [0, 0, 0], depth=True))
     with pytest.raises(InputError, match="got one standing camera and no depth; move the camera"):
-        require_usable_capture(small_capture(angles, times_s, [0, 0, 1], [0, 0, 0]))
+        require_valid_capture(small_capture(angles, times_s, [0, 0, 1], [0, 0, 0]))
 
 
 def test_places_that_are_held_out_say_nothing_of_depth() -> None:
-    with pytest.raises(InputError, match="pictures from at least two places"):
-        require_usable_capture(small_capture([0, 1], [0, 0], [0, 1]))
-    require_usable_capture(small_capture([0, 1], [0, 0], [0, 0]))
+    with pytest.raises(InputError, match="images from at least two places"):
+        require_valid_capture(small_capture([0, 1], [0, 0], [0, 1]))
+    require_valid_capture(small_capture([0, 1], [0, 0], [0, 0]))

@@ -39,7 +39,7 @@ def test_nothing_may_be_held_out_but_something_must_be_learnt_from() -> None:
         report_split(small_capture([0, 1], [0, 0], [1, 1]))
 
 
-def test_a_picture_that_training_sees_is_no_test() -> None:
+def test_an_image_that_training_sees_is_no_test() -> None:
     capture = small_capture([0, 1, 0, 1, 0], [0, 0, 1, 1, 1], [0, 0, 0, 0, 1])
     with pytest.raises(InputError, match=r"got frame 4, whose view .* \(1 such frames\); hold out"):
         report_split(capture)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from capture_folders import rig_cameras, seer, write_picture
+from capture_folders import rig_cameras, seer, write_image
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -85,7 +85,7 @@ def test_where_a_lens_folds_back_nothing_is_found() -> None:
     assert np.array_equal(column > -1.5, inside_px)
 
 
-def test_a_lens_follows_its_picture() -> None:
+def test_a_lens_follows_its_image() -> None:
     lens = Intrinsics(focal_px=(50.0, 55.0), center_px=(31.0, 17.0), size_px=(40, 60), skew_px=2.0)
     half = lens.downscaled(2)
     assert (half.focal_px, half.center_px, half.size_px) == ((25, 27.5), (15.5, 8.5), (20, 30))
@@ -94,9 +94,7 @@ def test_a_lens_follows_its_picture() -> None:
     assert lens.scaled_to((40, 60), "x") == lens
     assert lens.is_distorted
     assert not replace(lens, model="fisheye").is_distorted
-    with pytest.raises(
-        FileFormatError, match="x: expected a picture shaped as its camera, 60 x 40"
-    ):
+    with pytest.raises(FileFormatError, match="x: expected an image shaped as its camera, 60 x 40"):
         lens.scaled_to((40, 50), "x")
 
 
@@ -142,7 +140,7 @@ def test_names_that_stay_are_taken(tmp_path: Path, name: str) -> None:
 
 
 def test_a_suffix_may_be_left_away(tmp_path: Path) -> None:
-    write_picture(tmp_path / "r_0.1.png", np.zeros((2, 2, 3), np.uint8))
+    write_image(tmp_path / "r_0.1.png", np.zeros((2, 2, 3), np.uint8))
     assert find_image(tmp_path, "./r_0.1", "x") == tmp_path / "r_0.1.png"
     assert find_image(tmp_path, "r_0.1.png", "x") == tmp_path / "r_0.1.png"
 
@@ -162,7 +160,7 @@ def test_cameras_are_told_apart_by_what_comes_back() -> None:
     assert assign_camera_ids(poses(0.2, 0.1, 0.2, 0.1), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
     assert assign_camera_ids(poses(0.1, 0.2, 0.3, 0.4), [0.0, 1.0, 2.0, 3.0]) == [0, 0, 0, 0]
     assert assign_camera_ids(poses(0.1, 0.2, 0.3, 0.4), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
-    # The same place at the same time is no second picture of one camera.
+    # The same place at the same time is no second image of one camera.
     assert assign_camera_ids(poses(0.1, 0.1, 0.2, 0.2), [0.0, 0.0, 1.0, 1.0]) == [0, 1, 0, 1]
 
 
@@ -180,12 +178,12 @@ def test_a_store_forgets_what_was_not_used_for_longest() -> None:
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
-def test_grey_and_palette_pictures_are_pictures(tmp_path: Path, channels: int) -> None:
+def test_grey_and_palette_images_are_images(tmp_path: Path, channels: int) -> None:
     levels = np.full((5, 7, channels), 51, np.uint8)
     cv2.imwrite(str(tmp_path / "a.png"), levels)
-    picture = ImageFile(file=tmp_path / "a.png")
-    assert (picture.size_px(), picture.has_alpha()) == ((5, 7), channels == 4)
-    np.testing.assert_allclose(picture.read().rgb, 0.2, atol=1e-7)
+    image = ImageFile(file=tmp_path / "a.png")
+    assert (image.size_px(), image.has_alpha()) == ((5, 7), channels == 4)
+    np.testing.assert_allclose(image.read().rgb, 0.2, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +195,7 @@ def test_grey_and_palette_pictures_are_pictures(tmp_path: Path, channels: int) -
         (np.zeros((4, 4, 3), complex), "expected a NumPy array of numbers"),
     ],
 )
-def test_arrays_that_are_no_pictures_are_refused(tmp_path: Path, array, message: str) -> None:
+def test_arrays_that_are_no_images_are_refused(tmp_path: Path, array, message: str) -> None:
     np.save(tmp_path / "a.npy", array)
     with pytest.raises(FileFormatError, match=message):
         ImageFile(file=tmp_path / "a.npy").read()

@@ -73,7 +73,7 @@ def test_the_wrong_format_is_refused(tmp_path: Path) -> None:
         read_capture(tmp_path, ReadOptions(format="hypernerf"))
     with pytest.raises(FileFormatError, match=r"manifest\.json"):
         read_capture(tmp_path, ReadOptions(format="clips"))
-    with pytest.raises(FileFormatError, match=r"expected videos or pictures of cameras"):
+    with pytest.raises(FileFormatError, match=r"expected videos or images of cameras"):
         read_capture(tmp_path, ReadOptions(format="neu3d"))
 
 
@@ -105,7 +105,7 @@ def test_blocks_of_pixels_become_their_mean(tmp_path: Path, factor: int) -> None
     np.testing.assert_allclose(small.frames.read(1).rgb.numpy(), want.numpy(), atol=1e-6)
     np.testing.assert_allclose(small.cameras.center_px * factor, full.cameras.center_px)
     assert any("rows or columns were cut" in note for note in small.notes) == (factor == 5)
-    with pytest.raises(ConfigError, match="a downscale of at most 24, since pictures are 36 x 24"):
+    with pytest.raises(ConfigError, match="a downscale of at most 24, since images are 36 x 24"):
         read_capture(tmp_path, ReadOptions(downscale=25))
 
 

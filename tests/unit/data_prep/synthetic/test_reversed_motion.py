@@ -1,4 +1,4 @@
-"""Things that go against what their first picture suggests, and things that stand all the same."""
+"""Things that go against what their first image suggests, and things that stand all the same."""
 
 from dataclasses import replace
 from functools import cache

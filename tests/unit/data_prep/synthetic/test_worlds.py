@@ -11,7 +11,7 @@ from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.rigid import require_rigid
-from diff4splat.paths.camera_path import CameraPath, require_usable
+from diff4splat.paths.camera_path import CameraPath, require_valid_path
 
 PLACES = {"floor", "wall", "skirting", "ground", "rug", "table"}
 every_world = pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_cameras_are_rigid_and_clear(split: str, index: int) -> None:
     for view in made.views:
         assert view.world_from_camera.dtype == torch.float64
         require_rigid(view.world_from_camera, "view", tolerance=1e-8)
-        require_usable(CameraPath(cameras=view, times_s=torch.from_numpy(made.times_s)), "view")
+        require_valid_path(CameraPath(cameras=view, times_s=torch.from_numpy(made.times_s)), "view")
     for low, high in boxes_of(made).values():
         outside = np.maximum(np.maximum(low - eyes, eyes - high), 0)
         assert np.linalg.norm(outside, axis=1).min() > 0

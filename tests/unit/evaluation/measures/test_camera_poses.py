@@ -1,4 +1,4 @@
-"""Camera steps recovered from pictures of a scene, along a known path."""
+"""Camera steps recovered from images of a scene, along a known path."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def test_the_recovered_step_is_the_true_one_and_not_its_inverse(scene: Scene) ->
     assert torch.allclose(step[:3, 3], torch.tensor([-0.2, 0, 0]).double(), atol=0.03)
 
 
-def test_pictures_that_do_not_follow_their_cameras_show_an_error(scene: Scene) -> None:
+def test_images_that_do_not_follow_their_cameras_show_an_error(scene: Scene) -> None:
     walked, claimed = path("right:0.1"), path("left:0.1")
     frames = list(render_video(scene, walked, outputs=("rgb", "depth")))
     pair = (claimed.cameras[0], claimed.cameras[1])
@@ -63,7 +63,7 @@ def test_pictures_that_do_not_follow_their_cameras_show_an_error(scene: Scene) -
     assert float((step[:3, 3] - true[:3, 3]).norm()) == pytest.approx(0.8 / 3, abs=0.03)
 
 
-def test_blank_pictures_fail_and_are_counted(scene: Scene) -> None:
+def test_blank_images_fail_and_are_counted(scene: Scene) -> None:
     grey = slab(4.0, (4.0, 3.2), 0.16, 1)
     grey = replace(grey, sh=torch.zeros_like(grey.sh))
     blank = as_scene(grey, StaticMotion())

@@ -82,7 +82,7 @@ def test_a_camera_that_looks_away_shows_nothing() -> None:
     assert count(with_view(case, 0, cameras=away)) == 0
 
 
-def test_what_lies_beside_the_picture_is_not_seen() -> None:
+def test_what_lies_beside_the_image_is_not_seen() -> None:
     case = flat_case()
     poses = case.clip.views[0].cameras.world_from_camera.clone()
     # Three pixels to the right: 3 · 4 / 9.
@@ -154,7 +154,7 @@ def test_too_few_pixels_say_nothing() -> None:
 
 
 @pytest.mark.parametrize("task", ["generation", "reconstruction"])
-def test_rows_that_show_pictures_have_it(task: Task) -> None:
+def test_rows_that_show_images_have_it(task: Task) -> None:
     scene = wall_and_patch((0.3, -0.1, 0.2))
     setup = Setup(protocol=tiny_protocol(), task=task, system=Fixed(scene))
     clip = filmed(scene)
@@ -168,7 +168,7 @@ def test_rows_that_show_pictures_have_it(task: Task) -> None:
     assert result.value(ZERO_MOTION, "covisible_share") is None
 
 
-def test_pictures_that_show_nothing_seen_are_left_out_and_lower_the_share() -> None:
+def test_images_that_show_nothing_seen_are_left_out_and_lower_the_share() -> None:
     scene = wall_and_patch()
     clip = filmed(scene)
     depth = clip.views[1].depth.clone()

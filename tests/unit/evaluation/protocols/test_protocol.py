@@ -53,7 +53,7 @@ def test_the_second_one_judges_views_and_times_that_are_not_given() -> None:
     assert set(judged.source_frames) <= set(given)
     between = [frame for frame in second.track_frames if frame not in given]
     assert len(between) > len(second.track_frames) / 2
-    # The clips, and what is asked of one picture, are the same.
+    # The clips, and what is asked of one image, are the same.
     assert (second.source, second.generation) == (first.source, first.generation)
     assert second.input_frames("generation") == second.input_frames("text") == (0,)
 

@@ -134,7 +134,7 @@ def test_scores_leave_out_what_is_not_finite_and_say_when_nothing_is_left() -> N
     mixed = score("row", "psnr", [10.0, float("nan"), 20.0])
     assert (mixed.value, mixed.parts) == (15, (10.0, None, 20.0))
     assert score("row", "psnr", [float("nan")]) == Skip(
-        row="row", key="psnr", why="no picture allows it"
+        row="row", key="psnr", why="no image allows it"
     )
 
 
@@ -166,9 +166,9 @@ def test_what_is_neither_better_nor_worse_has_no_arrow_and_no_winner() -> None:
 
 @pytest.mark.parametrize("values", [[], [0.0], [-1.0, 2.0, 0.5] * 40])
 def test_charts_are_drawn_for_any_number_of_items(values: list[float]) -> None:
-    picture = difference_chart(values, "title")
-    assert picture.shape == (420, 960, 3)
-    assert bool(torch.isfinite(picture).all())
+    image = difference_chart(values, "title")
+    assert image.shape == (420, 960, 3)
+    assert bool(torch.isfinite(image).all())
 
 
 def test_bars_above_the_line_are_wins() -> None:

@@ -58,14 +58,14 @@ def test_pixels_go_where_their_rays_meet_the_plane(
         assert float(z[int(y), int(x)]) == pytest.approx(want[2], rel=1e-5)
 
 
-def test_the_camera_itself_sees_the_picture() -> None:
+def test_the_camera_itself_sees_the_image() -> None:
     rgb = torch.rand(12, 16, 3)
     own = camera((0, 1, 0), 0.2, (0.3, 0, 0))
     assert torch.allclose(warp_plane(rgb, own, own, 5.0), rgb, atol=1e-5)
     assert torch.allclose(plane_depth(own, own, 5.0), torch.full((12, 16), 5.0))
 
 
-def test_a_step_to_the_right_shifts_the_picture_to_the_left() -> None:
+def test_a_step_to_the_right_shifts_the_image_to_the_left() -> None:
     rgb = torch.rand(12, 16, 3)
     here = pinhole(30.0, (12, 16), F64)
     # Two pixels: 30 px · 0.4 / 6.

@@ -1,4 +1,4 @@
-"""Gaussians are split where the picture gradients, and faint ones go."""
+"""Gaussians are split where the image gradients, and faint ones go."""
 
 import math
 from dataclasses import replace

@@ -57,7 +57,7 @@ def test_with_depth_pulses_start_on_pixels_of_their_time():
     assert float(x[early & red].mean()) < -0.2 < 0.2 < float(x[late & red].mean())
 
 
-def test_without_depth_in_the_pictures_the_moving_ones_are_repeated():
+def test_without_depth_in_the_images_the_moving_ones_are_repeated():
     capture = ball_capture(views=3, times=3, held=(), with_depth=False)
     leaving = departed(capture, 5, 1000)
     assert int(leaving.moving_mask.sum()) == 4 * 5

@@ -1,4 +1,4 @@
-"""Who moves is found from pictures; who proved still leaves the motion."""
+"""Who moves is found from images; who proved still leaves the motion."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def test_the_ball_that_moves_varies_most_and_what_it_never_covers_hardly():
     assert float(varies[1:].amin()) < 0.02
 
 
-def test_what_no_picture_shows_does_not_vary():
+def test_what_no_image_shows_does_not_vary():
     away = replace(balls(0.0), means=balls(0.0).means + 100).to(torch.float32)
     varies = error_variation(
         away, FrameRenderer(capture=CAPTURE), FrameStore(CAPTURE), FrameSchedule(CAPTURE, 2, 0)

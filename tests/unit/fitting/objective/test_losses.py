@@ -55,7 +55,7 @@ def test_depth_compares_disparities_where_both_are_known():
     assert not nothing.grad.any()
 
 
-def test_flow_is_the_end_point_error_in_picture_widths():
+def test_flow_is_the_end_point_error_in_image_widths():
     frame = with_flow(Frame(rgb=RGB), 1, torch.tensor([3.0, 4.0]))
     made = torch.zeros(16, 20, 2, requires_grad=True)
     loss = flow_loss(made, frame.flow)

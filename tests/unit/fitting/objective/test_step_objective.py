@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 import torch
-from small_fits import Pictures, ball_capture, balls, with_flow
+from small_fits import Images, ball_capture, balls, with_flow
 
 from diff4splat.data.capture.capture import Capture
 from diff4splat.fitting.frames.frame_renderer import FrameRenderer
@@ -20,7 +20,7 @@ def flowing(offset_px: float) -> Capture:
     capture = ball_capture(views=2, times=2, held=())
     shown = list(capture.frames.shown)
     shown[0] = with_flow(shown[0], 1, torch.tensor([offset_px, 0.0]))
-    return replace(capture, frames=Pictures(shown=shown))
+    return replace(capture, frames=Images(shown=shown))
 
 
 def loss_and_velocity_gradient(

@@ -79,7 +79,7 @@ def test_only_a_camera_that_is_learning_has_gradients():
         ),
     ],
 )
-def test_a_mode_moves_the_picture_by_a_pixel_and_no_two_alike(lens, camera):
+def test_a_mode_moves_the_image_by_a_pixel_and_no_two_alike(lens, camera):
     changes = coefficients.displacement_modes(lens, camera)
     assert changes.shape[1] >= 3
     directions, exist = lens.directions(coefficients.image_plane_grid(camera))

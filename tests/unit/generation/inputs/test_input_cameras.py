@@ -58,7 +58,7 @@ def test_agreement_is_left_alone_and_reached_once(known: bool) -> None:
     assert twice[1] is once[1]
 
 
-def test_cameras_are_brought_to_the_identity_and_the_size_of_the_picture() -> None:
+def test_cameras_are_brought_to_the_identity_and_the_size_of_the_image() -> None:
     turn = quaternion.to_matrix(torch.randn(4))
     poses = rigid.from_parts(turn, torch.tensor([5.0, 6, 7])).expand(3, 4, 4)
     cameras = pinhole(80.0, (64, 96)).with_pose(poses)

@@ -55,7 +55,7 @@ def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
     assert infill.depth.shape == (31, 47)
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
-    assert built().shown_count == 31 * 47
+    assert built().visible_count == 31 * 47
 
 
 def test_without_border_cells_there_is_no_border_layer() -> None:
@@ -76,7 +76,7 @@ def test_from_the_input_camera_the_extended_layers_hide_nothing() -> None:
     gaussians = image_gaussians(image, TIMES_S).gaussians
     views = [
         render(each, camera, settings=RenderSettings(dilation_px2=0.0)).rgb
-        for each in (gaussians, gaussians.select(slice(image.shown_count)))
+        for each in (gaussians, gaussians.select(slice(image.visible_count)))
     ]
     torch.testing.assert_close(views[0], views[1], atol=0.045, rtol=0)
 

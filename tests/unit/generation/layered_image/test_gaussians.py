@@ -57,7 +57,7 @@ def test_layers_follow_one_another_with_their_pixels() -> None:
     assert torch.equal(gathered.gaussians.means, expected)
     pixels = [*range(24), *[NO_PIXEL] * 16, *index[checkered()].tolist()]
     assert gathered.pixel_index.tolist() == pixels
-    assert layered(*parts).shown_count == 24
+    assert layered(*parts).visible_count == 24
 
 
 def oracle(parts: tuple[ImageLayer, ...], fraction: float) -> Tensor:

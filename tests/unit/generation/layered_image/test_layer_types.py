@@ -27,4 +27,4 @@ def test_cells_of_the_image_are_counted_by_their_masks() -> None:
     mask[1, 2:5] = True
     shown = layer(torch.ones(4, 6), mask=mask, in_image=True)
     image = layered(shown, layer(torch.ones(2, 3), in_image=True), layer(torch.ones(9, 9)))
-    assert image.shown_count == 3 + 6
+    assert image.visible_count == 3 + 6

@@ -134,5 +134,5 @@ def test_from_half_the_distance_it_closes_most_gaps() -> None:
         shown = render(gaussians, near, outputs=("alpha",), settings=settings).alpha
         return shown[1:-1, 1:-1]
 
-    assert float(alpha(both.shown_count).min()) > 0.75
+    assert float(alpha(both.visible_count).min()) > 0.75
     assert float(alpha(30).min()) < 0.5

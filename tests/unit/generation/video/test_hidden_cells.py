@@ -11,9 +11,9 @@ from diff4splat.generation.video.hidden_cells import (
     FillGrid,
     at_grid,
     depth_ratio,
+    full_grid,
     hidden_grid,
     in_front_of_image,
-    whole_grid,
 )
 from diff4splat.generation.video.render_condition import RenderedImage
 from diff4splat.geometry.camera import Camera, pinhole
@@ -57,7 +57,7 @@ def depths(seed: int = 0) -> Tensor:
 def test_the_whole_grid_is_filled_at_the_depth_that_ldrm_predicts() -> None:
     plane, raw = torch.full((FRAMES, *SIZE_PX), 4.0), torch.randn(12, FRAMES, *SIZE_PX)
     config = ActivationConfig()
-    whole = whole_grid(raw, base(plane), config)
+    whole = full_grid(raw, base(plane), config)
     limit = config.log_distance_limit
     wanted = 4.0 * (limit * (raw[-1] / limit).tanh()).exp()
     torch.testing.assert_close(whole.depth, wanted)

@@ -1,4 +1,4 @@
-"""Cameras made for lenses, the equirectangular picture, and what constructors refuse."""
+"""Cameras made for lenses, the equirectangular image, and what constructors refuse."""
 
 import math
 
@@ -20,7 +20,7 @@ from diff4splat.geometry.lenses.sensor import sensor_directions
 
 
 @pytest.mark.parametrize("size_px", [(300, 400), (400, 300)])
-def test_the_longer_side_of_a_blender_picture_spans_the_sensor(size_px: tuple[int, int]) -> None:
+def test_the_longer_side_of_a_blender_image_spans_the_sensor(size_px: tuple[int, int]) -> None:
     camera = blender_camera(size_px)
     assert (max(size_px) / camera.focal_px).tolist() == pytest.approx([36.0, 36.0])
     assert camera.center_px.tolist() == [size_px[1] / 2, size_px[0] / 2]
@@ -50,7 +50,7 @@ def test_a_sensor_has_a_size(sensor_mm: float) -> None:
         blender_camera((480, 640), sensor_mm)
 
 
-def test_directions_on_the_equirectangular_picture() -> None:
+def test_directions_on_the_equirectangular_image() -> None:
     camera = equirectangular_camera((100, 200), torch.float64)
     pixels = doubles(((100, 50), (150, 50), (50, 50), (0, 50), (100, 100), (100, 0), (125, 75)))
     directions, exists = sensor_directions(camera, Equirectangular(), pixels)
@@ -60,7 +60,7 @@ def test_directions_on_the_equirectangular_picture() -> None:
     torch.testing.assert_close(directions, doubles(wanted))
 
 
-def test_outside_the_equirectangular_picture_is_nothing() -> None:
+def test_outside_the_equirectangular_image_is_nothing() -> None:
     camera = equirectangular_camera((100, 200))
     pixels = torch.tensor(
         [[-0.5, 50.0], [200.5, 50.0], [100.0, -0.5], [100.0, 100.5], [200.0, 0.0]]
@@ -69,7 +69,7 @@ def test_outside_the_equirectangular_picture_is_nothing() -> None:
     assert exists.tolist() == [False, False, False, False, True]
 
 
-def test_the_whole_sphere_is_on_the_equirectangular_picture() -> None:
+def test_the_whole_sphere_is_on_the_equirectangular_image() -> None:
     directions = torch.cat([torch.randn(100, 3), torch.eye(3), -torch.eye(3)]).double()
     points, exists = Equirectangular().points(directions)
     back, _ = Equirectangular().directions(points)

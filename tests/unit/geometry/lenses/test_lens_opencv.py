@@ -170,7 +170,7 @@ def test_points_near_the_end_of_the_lens_find_their_way_back() -> None:
     torch.testing.assert_close(back[:, :2] / back[:, 2:], ring[exists])
 
 
-def test_the_backward_axis_has_no_place_on_a_fisheye_picture() -> None:
+def test_the_backward_axis_has_no_place_on_a_fisheye_image() -> None:
     lens = OpenCVFisheye(coefficients=torch.zeros(4, dtype=torch.float64))
     behind = doubles(((0.0, 0.0, -1.0), (0.0, 1e-3, -1.0)))
     assert lens.points(behind)[1].tolist() == [False, True]

@@ -57,7 +57,7 @@ def test_nothing_touches_the_margin(size: tuple[int, int], alpha: bool, note: st
     assert bool(pixels_of(sheet, NOTE_PAPER).any()) == (note is not None)
 
 
-def test_a_row_more_for_coverage_and_the_same_picture_every_time() -> None:
+def test_a_row_more_for_coverage_and_the_same_image_every_time() -> None:
     page = content(5)
     plain, covered = contact_sheet(page), contact_sheet(replace(page, alpha=torch.ones(5, 30, 40)))
     assert covered.shape[0] > plain.shape[0]

@@ -1,4 +1,4 @@
-"""Orientation, colour profiles, focal length, and what ``convert`` makes of other pictures."""
+"""Orientation, colour profiles, focal length, and what ``convert`` makes of other images."""
 
 import io
 from pathlib import Path
@@ -40,7 +40,7 @@ def swapped_profile() -> bytes:
 
 @pytest.mark.parametrize("kind", ["PNG", "TIFF"])
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_pictures_are_upright(tmp_path: Path, kind: str, orientation: int) -> None:
+def test_images_are_upright(tmp_path: Path, kind: str, orientation: int) -> None:
     image = oracles_io.photograph()
     image.save(tmp_path / "a", kind, exif=exif(orientation))
     image.getexif()[ORIENTATION] = orientation
@@ -50,7 +50,7 @@ def test_pictures_are_upright(tmp_path: Path, kind: str, orientation: int) -> No
 
 
 @pytest.mark.parametrize("kind", ["JPEG", "WEBP", "AVIF", "MPO"])
-def test_lossy_pictures_are_upright_too(tmp_path: Path, kind: str) -> None:
+def test_lossy_images_are_upright_too(tmp_path: Path, kind: str) -> None:
     oracles_io.photograph(48, 20).save(tmp_path / "a", kind, exif=exif(6))
     photo = read_photo(tmp_path / "a")
     assert photo.rgb.shape == (48, 20, 3)
@@ -58,7 +58,7 @@ def test_lossy_pictures_are_upright_too(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tiff"])
-def test_deep_pictures_are_upright_too(tmp_path: Path, suffix: str) -> None:
+def test_deep_images_are_upright_too(tmp_path: Path, suffix: str) -> None:
     deep = np.asarray(oracles_io.photograph()).astype(np.uint16) * 257
     file = tmp_path / f"a{suffix}"
     cv2.imwrite(str(file), deep[..., ::-1])
@@ -105,7 +105,7 @@ def test_focal_lengths_that_are_none(
 
 
 @pytest.mark.parametrize("junk", [b"Exif\0\0junk", b"Exif\0\0MM\0*\xff\xff\xff\xff", b"Exif\0\0"])
-def test_damaged_exif_does_not_cost_the_picture(tmp_path: Path, junk: bytes) -> None:
+def test_damaged_exif_does_not_cost_the_image(tmp_path: Path, junk: bytes) -> None:
     oracles_io.photograph().save(tmp_path / "a.jpg", exif=junk)
     photo = read_photo(tmp_path / "a.jpg")
     assert photo.rgb.shape == (20, 24, 3)
@@ -124,7 +124,7 @@ def test_colour_profiles_are_applied(tmp_path: Path) -> None:
 def test_damaged_profiles_are_noted_and_ignored(tmp_path: Path, profile: bytes) -> None:
     oracles_io.photograph().save(tmp_path / "a.png", icc_profile=profile)
     photo = read_photo(tmp_path / "a.png")
-    assert photo.notes == ("ICC profile is damaged or does not fit the picture and was ignored",)
+    assert photo.notes == ("ICC profile is damaged or does not fit the image and was ignored",)
     assert np.array_equal(levels(photo), np.asarray(oracles_io.photograph()))
 
 
@@ -169,7 +169,7 @@ def test_floating_point_from_0_to_1_only(tmp_path: Path) -> None:
             read_photo(tmp_path / "a.tiff", convert=True)
 
 
-def test_damaged_deep_pictures(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_deep_images(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     deep = np.random.default_rng(0).integers(0, 65536, (40, 40, 3), np.uint16)
     cv2.imwrite(str(tmp_path / "a.tiff"), deep)
     whole = (tmp_path / "a.tiff").read_bytes()
@@ -251,12 +251,12 @@ def test_lab_goes_through_its_own_profile(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["GIF", "WEBP", "PNG", "TIFF"])
-def test_the_first_picture_of_an_animation(tmp_path: Path, kind: str) -> None:
+def test_the_first_image_of_an_animation(tmp_path: Path, kind: str) -> None:
     first = Image.new("RGB", (20, 20), (255, 0, 0))
     other = Image.new("RGB", (20, 20), (0, 0, 255))
     first.save(tmp_path / "a", kind, save_all=True, append_images=[other])
     photo = read_photo(tmp_path / "a", convert=True)
-    assert photo.notes[0] == "the first of 2 pictures in the file was used"
+    assert photo.notes[0] == "the first of 2 images in the file was used"
     assert np.abs(levels(photo)[9, 9].astype(int) - [255, 0, 0]).max() <= 3
 
 

@@ -63,10 +63,10 @@ def test_missing_folder_and_empty(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"hello, world", b"%PDF-1.7 ...", b"%!PS-Adobe-3.0 EPSF-3.0\n"]
 )
-def test_no_picture_at_all(tmp_path: Path, content: bytes) -> None:
+def test_no_image_at_all(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.jpg").write_bytes(content)
     message = refusal(tmp_path / "a.jpg")
-    assert "expected a JPEG, PNG, WebP, AVIF, TIFF or BMP picture, got another kind" in message
+    assert "expected a JPEG, PNG, WebP, AVIF, TIFF or BMP image, got another kind" in message
 
 
 @pytest.mark.parametrize("brand", [b"heic", b"heix", b"mif1"])
@@ -84,7 +84,7 @@ def test_cut_off_files(tmp_path: Path, kind: str) -> None:
     for length in steps:
         (tmp_path / "a").write_bytes(whole[:length])
         message = refusal(tmp_path / "a")
-        assert "expected a whole picture, got a cut off or damaged one" in message or (
+        assert "expected a whole image, got a cut off or damaged one" in message or (
             "got another kind of file" in message and kind == "AVIF"
         )
 
@@ -93,7 +93,7 @@ def test_cut_off_files(tmp_path: Path, kind: str) -> None:
 def test_a_cut_off_lossless_file_is_refused_or_every_pixel_is_right(
     tmp_path: Path, kind: str
 ) -> None:
-    """A PNG whose last check sum is missing still holds the whole picture."""
+    """A PNG whose last check sum is missing still holds the whole image."""
     whole, want = encoded(kind), np.asarray(oracles_io.photograph())
     for length in [*range(len(whole) // 2, len(whole), 17), *range(len(whole) - 22, len(whole))]:
         (tmp_path / "a").write_bytes(whole[:length])
@@ -110,7 +110,7 @@ def test_cut_off_deep_files_are_not_half_converted(tmp_path: Path, suffix: str) 
     cv2.imwrite(str(tmp_path / f"a{suffix}"), deep)
     whole = (tmp_path / f"a{suffix}").read_bytes()
     (tmp_path / f"a{suffix}").write_bytes(whole[: len(whole) * 3 // 4])
-    assert "expected a whole picture" in refusal(tmp_path / f"a{suffix}", convert=True)
+    assert "expected a whole image" in refusal(tmp_path / f"a{suffix}", convert=True)
 
 
 def test_damaged_pixels(tmp_path: Path) -> None:
@@ -118,21 +118,21 @@ def test_damaged_pixels(tmp_path: Path) -> None:
     start = whole.index(b"IDAT") + 4
     whole[start : start + 40] = bytes(40)
     (tmp_path / "a.png").write_bytes(whole)
-    assert "expected a whole picture" in refusal(tmp_path / "a.png")
+    assert "expected a whole image" in refusal(tmp_path / "a.png")
 
 
 @pytest.mark.parametrize(
     ("mode", "kind", "says"),
     [
-        ("L", "PNG", "a grey picture"),
-        ("L", "JPEG", "a grey picture"),
-        ("1", "PNG", "a grey picture"),
-        ("LA", "PNG", "a picture with an alpha channel or transparency"),
-        ("RGBA", "PNG", "a picture with an alpha channel or transparency"),
-        ("RGBA", "TIFF", "a picture with an alpha channel or transparency"),
-        ("P", "PNG", "a palette picture"),
-        ("P", "BMP", "a palette picture"),
-        ("P", "GIF", "a palette picture"),
+        ("L", "PNG", "a grey image"),
+        ("L", "JPEG", "a grey image"),
+        ("1", "PNG", "a grey image"),
+        ("LA", "PNG", "an image with an alpha channel or transparency"),
+        ("RGBA", "PNG", "an image with an alpha channel or transparency"),
+        ("RGBA", "TIFF", "an image with an alpha channel or transparency"),
+        ("P", "PNG", "a palette image"),
+        ("P", "BMP", "a palette image"),
+        ("P", "GIF", "a palette image"),
         ("I;16", "PNG", "16-bit or deeper channels"),
         ("I;16", "TIFF", "16-bit or deeper channels"),
         ("I", "TIFF", "16-bit or deeper channels"),
@@ -143,7 +143,7 @@ def test_damaged_pixels(tmp_path: Path) -> None:
         ("LAB", "TIFF", "CIE Lab colours"),
     ],
 )
-def test_other_kinds_of_picture_are_named(tmp_path: Path, mode: str, kind: str, says: str) -> None:
+def test_other_kinds_of_image_are_named(tmp_path: Path, mode: str, kind: str, says: str) -> None:
     oracles_io.photograph().convert(mode).save(tmp_path / "a", kind)
     message = refusal(tmp_path / "a")
     assert f"expected an 8-bit RGB photograph, got {says}; {ADVICE}" in message
@@ -154,17 +154,17 @@ def test_transparency_in_modern_formats(tmp_path: Path, kind: str) -> None:
     image = oracles_io.photograph().convert("RGBA")
     image.putalpha(100)
     image.save(tmp_path / "a", kind)
-    assert f"a picture with an alpha channel or transparency; {ADVICE}" in refusal(tmp_path / "a")
+    assert f"an image with an alpha channel or transparency; {ADVICE}" in refusal(tmp_path / "a")
 
 
 def test_a_transparent_colour_counts_as_transparency(tmp_path: Path) -> None:
     oracles_io.photograph().save(tmp_path / "rgb.png", transparency=(0, 0, 0))
-    assert f"a picture with an alpha channel or transparency; {ADVICE}" in refusal(
+    assert f"an image with an alpha channel or transparency; {ADVICE}" in refusal(
         tmp_path / "rgb.png"
     )
     palette = oracles_io.photograph().convert("P")
     palette.save(tmp_path / "p.png", transparency=3)
-    assert f"a palette picture; {ADVICE}" in refusal(tmp_path / "p.png")
+    assert f"a palette image; {ADVICE}" in refusal(tmp_path / "p.png")
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tiff"])
@@ -182,21 +182,21 @@ def test_animations_and_stacks(tmp_path: Path, kind: str) -> None:
     first = oracles_io.photograph()
     others = [first.rotate(90), first.rotate(180)]
     first.save(tmp_path / "a", kind, save_all=True, append_images=others)
-    assert f"an animation or a stack of 3 pictures; {ADVICE}" in refusal(tmp_path / "a")
+    assert f"an animation or a stack of 3 images; {ADVICE}" in refusal(tmp_path / "a")
 
 
-def test_a_phones_picture_with_a_second_one_behind_it_is_normal(tmp_path: Path) -> None:
+def test_a_phones_image_with_a_second_one_behind_it_is_normal(tmp_path: Path) -> None:
     first = oracles_io.photograph()
     first.save(tmp_path / "a.jpg", "MPO", save_all=True, append_images=[first.rotate(180)])
     first.save(tmp_path / "b.jpg", "JPEG")
     photo = read_photo(tmp_path / "a.jpg")
-    assert photo.notes == ("the first of 2 pictures in the file was used",)
+    assert photo.notes == ("the first of 2 images in the file was used",)
     assert bool((photo.rgb - read_photo(tmp_path / "b.jpg").rgb).abs().max() < 0.02)
 
 
 @pytest.mark.parametrize("size", [(15, 40), (40, 15), (1, 1)])
 @pytest.mark.parametrize("convert", [False, True])
-def test_tiny_pictures(tmp_path: Path, size: tuple[int, int], convert: bool) -> None:
+def test_tiny_images(tmp_path: Path, size: tuple[int, int], convert: bool) -> None:
     Image.new("RGB", size).save(tmp_path / "a.png")
     says = f"expected at least 16x16 pixels, got {size[0]}x{size[1]}"
     assert says in refusal(tmp_path / "a.png", convert)
@@ -212,7 +212,7 @@ def png_header(width: int, height: int) -> bytes:
     ("size", "got"), [((10_001, 10_000), "10001x10000"), ((50_000, 50_000), "far more")]
 )
 @pytest.mark.parametrize("convert", [False, True])
-def test_enormous_pictures_are_refused_by_their_header(
+def test_enormous_images_are_refused_by_their_header(
     tmp_path: Path, size: tuple[int, int], got: str, convert: bool
 ) -> None:
     (tmp_path / "a.png").write_bytes(png_header(*size))
@@ -220,10 +220,10 @@ def test_enormous_pictures_are_refused_by_their_header(
     assert f"expected at most 100 megapixels, got {got}; make it smaller first" in message
 
 
-def test_large_pictures_give_no_warning_of_their_own(tmp_path: Path) -> None:
+def test_large_images_give_no_warning_of_their_own(tmp_path: Path) -> None:
     """Pillow alone warns from 89 megapixels; here the warning would be an error."""
     (tmp_path / "a.png").write_bytes(png_header(10_000, 10_000))
-    assert "expected a whole picture" in refusal(tmp_path / "a.png")
+    assert "expected a whole image" in refusal(tmp_path / "a.png")
 
 
 def test_the_preview_inside_a_raw_file_is_not_the_photograph(tmp_path: Path) -> None:

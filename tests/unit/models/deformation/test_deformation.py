@@ -80,11 +80,11 @@ def test_sum_over_levels_is_one_convolution_over_stacked_levels() -> None:
     features = network._tokens_at(tokens, time)[0].permute(0, 3, 1, 2)
     total = torch.zeros(10, 16, 32, dtype=torch.float64)
     for index, head in enumerate(network.heads):
-        picture = features[-1]
+        image = features[-1]
         for scale in [2] * (3 - index) + [2]:
-            picture = oracle.upsampled_bilinear(picture, scale)
+            image = oracle.upsampled_bilinear(image, scale)
         total += (
-            torch.einsum("oc,chw->ohw", head.weight[:, :, 0, 0], picture) + head.bias[:, None, None]
+            torch.einsum("oc,chw->ohw", head.weight[:, :, 0, 0], image) + head.bias[:, None, None]
         )
         if index < 3:
             features = network.levels[index](features)

@@ -65,7 +65,7 @@ def test_where_nothing_can_be_told_the_start_remains() -> None:
     torch.testing.assert_close(track_flow(plain, plain, start), start)
 
 
-def test_moved_pictures_are_sampled_at_the_end_of_the_flow() -> None:
+def test_moved_images_are_sampled_at_the_end_of_the_flow() -> None:
     own = texture(side=16)
     flow = torch.tensor([2.0, -1.0])[None, :, None, None].expand(1, 2, 16, 16)
     want = own.roll((1, -2), (-2, -1))
@@ -74,7 +74,7 @@ def test_moved_pictures_are_sampled_at_the_end_of_the_flow() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 1000), size=st.floats(0, 1e4))
-def test_flow_is_finite_whatever_the_pictures_and_the_start(seed: int, size: float) -> None:
+def test_flow_is_finite_whatever_the_images_and_the_start(seed: int, size: float) -> None:
     generator = torch.Generator().manual_seed(seed)
     own, other = torch.rand(2, 1, 3, 16, 16, generator=generator).round().unbind()
     start = torch.randn(1, 2, 16, 16, generator=generator) * size

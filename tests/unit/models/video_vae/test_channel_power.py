@@ -29,7 +29,7 @@ def test_of_components_it_is_their_variance() -> None:
     torch.testing.assert_close(shortcut.channel_power(), std.square())
 
 
-def test_the_mean_of_pictures_does_not_count() -> None:
+def test_the_mean_of_images_does_not_count() -> None:
     shortcut = PcaShortcut(CONFIG)
     before = shortcut.channel_power()
     with torch.no_grad():

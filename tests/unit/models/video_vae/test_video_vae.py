@@ -49,7 +49,7 @@ def test_frames_never_see_later_latents(vae: VideoVae, changed: int) -> None:
     assert not moved[:first].any() and moved[first : first + 4].all()
 
 
-def test_first_latent_is_that_of_the_first_picture(vae: VideoVae) -> None:
+def test_first_latent_is_that_of_the_first_image(vae: VideoVae) -> None:
     video = torch.rand(1, 3, 5, 16, 16)
     torch.testing.assert_close(vae.encode(video).mean[:, :, :1], vae.encode(video[:, :, :1]).mean)
 

@@ -143,7 +143,7 @@ def both(
     assert sure.mean() > 0.9
     assert want.max() > 0.5
     assert want.std() > 0.05
-    assert made.left_out == ()
+    assert made.skipped_effects == ()
     assert made.samples == samples
     return made, want, sure
 

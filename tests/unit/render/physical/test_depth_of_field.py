@@ -1,6 +1,6 @@
 """A thin lens on one small Gaussian: a uniform disc of radius f_x A |1/f - 1/z| pixels.
 
-The mass of a Gaussian's picture is 2π σ² o and its variance per axis σ²; a uniform disc adds a
+The mass of a Gaussian's image is 2π σ² o and its variance per axis σ²; a uniform disc adds a
 quarter of its squared radius.
 """
 
@@ -81,8 +81,8 @@ def test_a_closed_aperture_is_a_pinhole_with_one_ray_per_pixel() -> None:
     assert torch.equal(closed.rgb, without.rgb)
     assert torch.equal(closed.alpha, without.alpha)
     assert closed.samples == 1
-    assert "aperture: its radius is 0" in closed.left_out
-    assert any("64 samples" in words for words in closed.left_out)
+    assert "aperture: its radius is 0" in closed.skipped_effects
+    assert any("64 samples" in words for words in closed.skipped_effects)
 
 
 def test_what_is_in_focus_stays_as_sharp_as_without_a_lens() -> None:
@@ -97,11 +97,11 @@ def test_what_is_in_focus_stays_as_sharp_as_without_a_lens() -> None:
 
 def test_more_samples_help_more_than_chance_would() -> None:
     cloud, camera = dots([(0, 0, 4)], 0.2), camera_of((15, 15))
-    pictures = {
+    images = {
         count: shot(cloud, camera, lens(0.8, 8.0), replace(FAINT, samples=count)).alpha
         for count in (8, 128, 2048)
     }
-    errors = [float((pictures[n] - pictures[2048]).square().mean().sqrt()) for n in (8, 128)]
+    errors = [float((images[n] - images[2048]).square().mean().sqrt()) for n in (8, 128)]
     order = math.log(errors[0] / errors[1]) / math.log(128 / 8)
     assert order > 0.7
 

@@ -35,7 +35,7 @@ def test_a_pinhole_is_drawn_as_ever() -> None:
     for name in ("rgb", "alpha", "depth", "median_depth"):
         assert torch.equal(getattr(made, name), getattr(drawn, name)), name
     assert made.backend == "raster"
-    assert made.left_out == ("rays: no effect of the camera shows, the rasteriser draws",)
+    assert made.skipped_effects == ("rays: no effect of the camera shows, the rasteriser draws",)
     assert bool(made.valid.all())
     assert not made.time_s.any()
     assert bool((made.distance >= made.depth).all())
@@ -47,10 +47,10 @@ def test_raster_settings_reach_the_rasteriser() -> None:
     assert torch.equal(made.rgb, render(CLOUD, camera_of(), settings=own).rgb)
 
 
-def test_what_was_left_out_is_told_with_the_picture() -> None:
+def test_what_was_left_out_is_told_with_the_image() -> None:
     optics = Optics(aperture=Aperture(radius=0.0, focus_distance=1.0), exposure_s=0.01)
     made = shot(scene_of(CLOUD), camera_of(), optics, PhotoSettings(samples=8))
-    assert made.left_out == (
+    assert made.skipped_effects == (
         "rays: no effect of the camera shows, the rasteriser draws",
         "aperture: its radius is 0",
         "exposure: neither scene nor camera moves meanwhile",
@@ -63,7 +63,7 @@ def test_time_does_not_show_where_nothing_moves(subject) -> None:
     effects = found(subject, BUSY)
     assert not effects.any
     assert effects.samples == 1
-    assert effects.left_out == (STILL,)
+    assert effects.skipped_effects == (STILL,)
 
 
 @pytest.mark.parametrize(
@@ -72,10 +72,10 @@ def test_time_does_not_show_where_nothing_moves(subject) -> None:
 def test_before_and_after_its_motion_a_scene_stands_still(time_s: float, moves: bool) -> None:
     effects = found(MOVING, BUSY, time_s)
     assert effects.scene_moves is effects.rolls is effects.exposes is effects.any is moves
-    assert effects.left_out == (() if moves else (STILL,))
+    assert effects.skipped_effects == (() if moves else (STILL,))
 
 
-def test_a_picture_outside_of_the_motion_is_that_of_its_end() -> None:
+def test_an_image_outside_of_the_motion_is_that_of_its_end() -> None:
     late = shot(MOVING, camera_of(), BUSY, SHARP, time_s=7.0, backend="trace")
     end = shot(MOVING.state_at(1.0), camera_of(), None, SHARP, backend="trace")
     assert torch.equal(late.rgb, end.rgb)
@@ -84,7 +84,7 @@ def test_a_picture_outside_of_the_motion_is_that_of_its_end() -> None:
 def test_a_shutter_without_read_out_is_none() -> None:
     effects = found(MOVING, Optics(shutter=Shutter(readout_s=0.0)))
     assert not effects.any
-    assert effects.left_out == ()
+    assert effects.skipped_effects == ()
     effects = found(MOVING, Optics(shutter=Shutter(readout_s=0.0), exposure_s=0.01))
     assert not effects.rolls
     assert effects.exposes
@@ -123,7 +123,7 @@ def test_what_is_learned_is_traced_even_at_zero(name: str) -> None:
     }[name]
     effects = found(MOVING, optics)
     assert effects.any
-    assert effects.left_out == ()
+    assert effects.skipped_effects == ()
     settings = PhotoSettings(samples=None if name == "readout" else 4)
     made = shot(MOVING, camera_of(), optics, settings, time_s=0.5)
     assert made.backend == "trace"
@@ -143,7 +143,7 @@ def test_a_lens_bends_and_samples_are_needless_to_it() -> None:
     assert effects.bends
     assert not effects.scatters
     assert effects.samples == 1
-    assert effects.left_out == ("32 samples per pixel: all rays of a pixel are the same",)
+    assert effects.skipped_effects == ("32 samples per pixel: all rays of a pixel are the same",)
 
 
 def test_samples_are_as_many_as_the_effects_need() -> None:

@@ -76,7 +76,7 @@ def random_field(seed: int) -> Scene:
 
 
 def displacements_px(scene: Scene, intervals: Intervals, time_s: float, focal_px: float) -> Tensor:
-    """True pixels next to those on the line, at random times, of what is in the picture."""
+    """True pixels next to those on the line, at random times, of what is in the image."""
     generator = torch.Generator().manual_seed(99)
     found = []
     for first, last in intervals.spans():
@@ -238,7 +238,7 @@ def test_times_find_their_interval() -> None:
     assert len(own) == 3
 
 
-def test_pictures_do_not_depend_on_the_order_of_intervals() -> None:
+def test_images_do_not_depend_on_the_order_of_intervals() -> None:
     # The same times in the reverse order of rows: every row by itself is that of its time.
     scene = random_keys(1, "cubic")
     camera = camera_of((16, 24), 20.0)

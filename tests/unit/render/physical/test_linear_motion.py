@@ -13,9 +13,9 @@ from diff4splat.geometry import quaternion
 from diff4splat.render.physical.linear_motion import (
     LinearSegment,
     is_linear,
+    linear_segment,
     midpoint,
     native_segment,
-    segment_between,
     smoothed_segment,
     static_segment,
 )
@@ -66,13 +66,13 @@ def test_times_of_centres_are_relative_in_full_precision() -> None:
 
 def test_between_two_states_means_go_from_one_to_the_other() -> None:
     early, late = scene(8, seed=0), scene(8, seed=1)
-    made = segment_between(early, late, -0.2, 0.6)
+    made = linear_segment(early, late, -0.2, 0.6)
     for share in (0.0, 0.25, 1.0):
         since = -0.2 + 0.8 * share - made.moving.time_centers_s[:, None]
         want = (1 - share) * early.means + share * late.means
         torch.testing.assert_close(made.gaussians.means + made.moving.velocities * since, want)
     assert bool(made.moving.time_deviations_s.isinf().all())
-    assert segment_between(early, late, 0.3, 0.3).moving is None
+    assert linear_segment(early, late, 0.3, 0.3).moving is None
 
 
 def test_halfway_is_half_of_a_turn_and_of_a_stretch() -> None:

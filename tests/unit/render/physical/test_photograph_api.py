@@ -173,7 +173,7 @@ def test_a_fisheye_sees_behind_itself() -> None:
     assert float(made.depth[20, column]) == float(made.median_depth[20, column]) == 0.0
 
 
-def test_an_equirectangular_picture_shows_everything() -> None:
+def test_an_equirectangular_image_shows_everything() -> None:
     camera, optics = equirectangular_camera((16, 32)), Optics(lens=Equirectangular())
     # (row, column) of (longitude, latitude): behind is at the edges, down is the last row.
     places = {(7, 31): (0.3, -0.3, -3), (8, 0): (-0.3, 0.3, -3), (8, 16): (0.3, 0.3, 3)}

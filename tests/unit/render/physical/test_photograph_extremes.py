@@ -1,4 +1,4 @@
-"""Empty, huge, tiny and far: finite pictures and finite gradients under every effect."""
+"""Empty, huge, tiny and far: finite images and finite gradients under every effect."""
 
 import math
 from dataclasses import replace
@@ -70,7 +70,7 @@ def test_an_empty_scene_is_its_background(name: str, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["still", "native", "key frames"])
 @pytest.mark.parametrize("name", ["lens", "sphere", "aperture", "shutter", "all"])
-def test_extreme_gaussians_have_finite_pictures_and_gradients(name: str, kind: str) -> None:
+def test_extreme_gaussians_have_finite_images_and_gradients(name: str, kind: str) -> None:
     means = [
         (0, 0, 0),
         (0, 0, 1e-3),

@@ -102,7 +102,7 @@ def test_they_are_those_of_finite_differences(name: str) -> None:
         return taken(others | {name: value})
 
     assert float(rgb(own[name]).detach().max()) > 0.3
-    # One random direction of the input against one of the picture, not every pair.
+    # One random direction of the input against one of the image, not every pair.
     assert torch.autograd.gradcheck(rgb, (own[name],), atol=2e-6, fast_mode=True)
 
 

@@ -1,6 +1,6 @@
 """Lines that are read one after another: constant velocity turns an edge into a sloped line.
 
-The edge is one Gaussian as long as the picture. With v pixels per second and read-out t1 - t0 its
+The edge is one Gaussian as long as the image. With v pixels per second and read-out t1 - t0 its
 centre moves v (t1 - t0) / (H - 1) pixels from row to row.
 """
 
@@ -46,19 +46,19 @@ def test_an_edge_becomes_a_sloped_line(direction: str, timestamp: str) -> None:
     velocity = (SPEED, 0, 0) if by_row else (0, SPEED, 0)
     scene, camera = drifting(edge(1 if by_row else 0), velocity), camera_of((33, 41))
     made = shot(scene, camera, rolling(direction, timestamp=timestamp), FAINT, outputs=("alpha",))
-    picture = made.alpha if by_row else made.alpha.T
-    count = len(picture)
+    image = made.alpha if by_row else made.alpha.T
+    count = len(image)
     shares = np.arange(count) / (count - 1)
     if direction in REVERSED:
         shares = shares[::-1]
     start_s = -READOUT / 2 if timestamp == "middle" else 0.0
     middle = 20.5 if by_row else 16.5
     want = middle + PX_PER_S * (start_s + shares * READOUT)
-    np.testing.assert_allclose(row_centers(picture), want, atol=0.02)
-    slope = np.polyfit(np.arange(count), row_centers(picture), 1)[0]
+    np.testing.assert_allclose(row_centers(image), want, atol=0.02)
+    slope = np.polyfit(np.arange(count), row_centers(image), 1)[0]
     sign = -1 if direction in REVERSED else 1
     assert slope == pytest.approx(sign * PX_PER_S * READOUT / (count - 1), rel=5e-3)
-    assert made.left_out == ()
+    assert made.skipped_effects == ()
 
 
 @pytest.mark.parametrize("direction", ["top-to-bottom", "right-to-left"])
@@ -76,7 +76,7 @@ def test_a_still_scene_is_unchanged_and_the_shutter_left_out() -> None:
     cloud, camera = dots([(0, 0, 4), (0.2, 0.3, 5)], 0.1), camera_of()
     made = shot(cloud, camera, rolling(), backend="trace")
     assert torch.equal(made.rgb, shot(cloud, camera, backend="trace").rgb)
-    assert made.left_out == ("read-out: neither scene nor camera moves meanwhile",)
+    assert made.skipped_effects == ("read-out: neither scene nor camera moves meanwhile",)
     drawn = shot(cloud, camera, rolling())
     assert drawn.backend == "raster"
 
@@ -101,14 +101,14 @@ def test_chunks_of_eight_rows_are_within_their_bound_of_single_rows() -> None:
 def test_straight_motion_needs_no_chunks() -> None:
     ends = torch.tensor([[[-0.2, 0, 0]], [[0.2, 0, 0]]])
     scene, camera = keyed(edge(1), [-0.05, 0.05], ends), camera_of((33, 41))
-    pictures = [
+    images = [
         shot(scene, camera, rolling(), replace(FAINT, rows_per_chunk=rows)).alpha
         for rows in (1, 7, 33, None)
     ]
-    for picture in pictures[1:]:
-        torch.testing.assert_close(picture, pictures[0], rtol=0, atol=2e-5)
+    for image in images[1:]:
+        torch.testing.assert_close(image, images[0], rtol=0, atol=2e-5)
     want = 20.5 + FOCAL / DEPTH * 4.0 * READOUT * (np.arange(33) / 32 - 0.5)
-    np.testing.assert_allclose(row_centers(pictures[0]), want, atol=0.02)
+    np.testing.assert_allclose(row_centers(images[0]), want, atol=0.02)
 
 
 def test_a_moving_camera_is_a_scene_that_moves_the_other_way() -> None:
@@ -147,7 +147,7 @@ def test_far_from_time_zero_rows_keep_their_times() -> None:
     torch.testing.assert_close(made.alpha, early.alpha, rtol=0, atol=1e-5)
 
 
-def test_a_picture_of_one_row_is_read_in_the_middle() -> None:
+def test_an_image_of_one_row_is_read_in_the_middle() -> None:
     scene, camera = drifting(edge(1), (SPEED, 0, 0)), camera_of((1, 41))
     made = shot(scene, camera, rolling(timestamp="start"), FAINT, outputs=("alpha", "time_s"))
     torch.testing.assert_close(made.time_s, torch.full((1, 41), READOUT / 2))

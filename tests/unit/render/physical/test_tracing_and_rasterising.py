@@ -37,7 +37,7 @@ def both(cloud: Gaussians, camera: Camera, smoothing_px2: float) -> tuple[Tensor
 
 
 def one(ratio: float, angle_deg: float, pixels_per_deviation: float) -> tuple[Gaussians, Camera]:
-    """A sphere at an angle, and the picture around it."""
+    """A sphere at an angle, and the image around it."""
     angle = math.radians(angle_deg)
     ball = dots([(3 * math.sin(angle), 0.0, 3 * math.cos(angle))], 3 * ratio, opacity=1.0)
     focal = pixels_per_deviation / ratio * math.cos(angle)
@@ -65,7 +65,7 @@ def test_smoothing_is_dilation_on_the_axis_and_near_it_elsewhere(
     ball, camera = one(0.003, angle_deg, pixels)
     traced, drawn = both(ball, camera, 0.3)
     angle = math.radians(angle_deg)
-    # A pixel is that of the middle of the picture, which is at the angle, in the rays' smoothing.
+    # A pixel is that of the middle of the image, which is at the angle, in the rays' smoothing.
     variance = pixels**2
     stretched = abs(math.cos(angle) ** -4 - math.cos(angle) ** 4) * 0.3 / (variance + 0.3)
     budget = 2 * 0.003 * math.tan(angle) + 3e-4 + math.exp(-1) * stretched
@@ -111,11 +111,11 @@ def test_thin_ones_do_not_vanish() -> None:
 @pytest.mark.parametrize("name", ["depth", "median_depth", "distance"])
 def test_distances_agree(name: str) -> None:
     ball, camera = dots([(0.4, -0.2, 4)], 0.08), camera_of((33, 41))
-    pictures = [
+    images = [
         shot(ball, camera, None, PhotoSettings(trace=TRACE), outputs=("alpha", name), backend=b)
         for b in ("trace", "auto")
     ]
-    seen = (pictures[0].alpha > 0.6) & (pictures[1].alpha > 0.6)
+    seen = (images[0].alpha > 0.6) & (images[1].alpha > 0.6)
     assert int(seen.sum()) > 5
-    traced, drawn = (getattr(picture, name)[seen] for picture in pictures)
+    traced, drawn = (getattr(image, name)[seen] for image in images)
     torch.testing.assert_close(traced, drawn, rtol=3e-3, atol=0)

@@ -82,7 +82,7 @@ def run(code: str, timeout_s: float = 600) -> str:
     return done.stdout
 
 
-def test_numba_is_loaded_with_the_first_picture_and_not_before() -> None:
+def test_numba_is_loaded_with_the_first_image_and_not_before() -> None:
     code = """
 import diff4splat.render.api
 from oracles_render import random_gaussians, small_camera
@@ -124,9 +124,9 @@ def test_four_callers_at_once() -> None:
 
     def both(gaussians: Gaussians) -> tuple[torch.Tensor, torch.Tensor]:
         own = leaves(gaussians)
-        picture = rgb(own, tile_px=8)
-        picture.square().sum().backward()
-        return picture.detach(), own.scales.grad
+        image = rgb(own, tile_px=8)
+        image.square().sum().backward()
+        return image.detach(), own.scales.grad
 
     def call(index: int) -> None:
         for _ in range(5):
@@ -183,8 +183,8 @@ def test_buffers_are_kept_for_the_way_back_only(kept: Callable[[], int]) -> None
 @pytest.mark.parametrize("curved", [False, True])
 def test_a_gradient_of_a_gradient_is_refused(curved: bool) -> None:
     own = leaves(cloud(20))
-    picture = rgb(own)
-    loss = picture.square().sum() if curved else picture.sum()
+    image = rgb(own)
+    loss = image.square().sum() if curved else image.sum()
     # Silence would be a gradient that lacks a term.
     with pytest.raises(RuntimeError, match=r"create_graph|differentiate twice"):
         (grad,) = torch.autograd.grad(loss, own.means, create_graph=True)
@@ -232,22 +232,22 @@ def test_inputs_are_left_as_they_were() -> None:
 def test_inputs_changed_before_the_way_back_are_noticed() -> None:
     own = cloud(20)
     scales = own.scales.clone().requires_grad_() * 1.0
-    picture = rgb(replace(own, scales=scales))
+    image = rgb(replace(own, scales=scales))
     scales.add_(1.0)
     with pytest.raises(RuntimeError, match="modified by an inplace operation"):
-        picture.sum().backward()
+        image.sum().backward()
 
 
 @pytest.mark.parametrize("name", ["rgb", "alpha", "depth", "features"])
-def test_pictures_may_be_changed_in_place(name: str) -> None:
+def test_images_may_be_changed_in_place(name: str) -> None:
     grads = []
     for in_place in (False, True):
         own = leaves(cloud(60))
         settings = RenderSettings(features=own.means * 1.0)
         made = render(own, CAMERA, outputs=(name,), settings=settings, backend="raster")
-        picture = getattr(made, name)
-        picture = picture.clamp_(0.1, 0.4) if in_place else picture.clamp(0.1, 0.4)
-        picture.sum().backward()
+        image = getattr(made, name)
+        image = image.clamp_(0.1, 0.4) if in_place else image.clamp(0.1, 0.4)
+        image.sum().backward()
         grads.append(own.means.grad)
     assert torch.equal(grads[0], grads[1])
 
@@ -258,9 +258,9 @@ def test_a_batch_of_cameras() -> None:
     poses[:, 0, 3] = torch.tensor([0.0, 0.2, -0.3])
     made = render(gaussians, CAMERA.with_pose(poses), backend="raster").rgb
     assert made.shape == (3, 40, 50, 3)
-    for pose, picture in zip(poses, made, strict=True):
+    for pose, image in zip(poses, made, strict=True):
         one = render(gaussians, CAMERA.with_pose(pose), backend="raster").rgb
-        assert torch.equal(picture, one)
+        assert torch.equal(image, one)
 
 
 @pytest.mark.usefixtures("as_shipped")

@@ -26,17 +26,17 @@ def _threads() -> Iterator[None]:
 
 
 def bits(threads: int = 1, **changes: object) -> dict[str, Tensor]:
-    """Every picture and every gradient."""
+    """Every image and every gradient."""
     torch.set_num_threads(threads)
     own, lens = leaves(CLOUD), lens_leaves(CAMERA, torch.float32)
     features = torch.linspace(-1, 1, 2 * len(CLOUD)).view(-1, 2).requires_grad_()
     settings = RenderSettings(features=features, **changes)
     made = render(own, lens, outputs=OUTPUTS, settings=settings, backend="raster")
     sum(getattr(made, name).square().mean() for name in OUTPUTS).backward()
-    pictures = {name: getattr(made, name).detach() for name in OUTPUTS}
+    images = {name: getattr(made, name).detach() for name in OUTPUTS}
     grads = {f"gradient of {name}": getattr(own, name).grad for name in PARAMETERS}
     grads |= {f"gradient of {name}": getattr(lens, name).grad for name in LENS}
-    return pictures | grads | {"gradient of features": features.grad}
+    return images | grads | {"gradient of features": features.grad}
 
 
 def assert_equal_bits(got: dict[str, Tensor], want: dict[str, Tensor]) -> None:
@@ -45,7 +45,7 @@ def assert_equal_bits(got: dict[str, Tensor], want: dict[str, Tensor]) -> None:
 
 
 def assert_same_up_to_the_order_of_regions(got: dict[str, Tensor], want: dict[str, Tensor]) -> None:
-    """Pictures bit by bit; sums over regions are rounded region by region."""
+    """Images bit by bit; sums over regions are rounded region by region."""
     assert_equal_bits({name: got[name] for name in OUTPUTS}, {name: want[name] for name in OUTPUTS})
     for name, exact in want.items():
         scale = max(float(exact.abs().max()), 1e-30)

@@ -1,4 +1,4 @@
-"""Finite pictures and gradients where numbers, counts and sizes are extreme."""
+"""Finite images and gradients where numbers, counts and sizes are extreme."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def assert_finite(
     names: tuple[str, ...] = OUTPUTS,
     **changes: object,
 ) -> RenderOutput:
-    """Every picture and every gradient, those of features, camera and background included."""
+    """Every image and every gradient, those of features, camera and background included."""
     own, lens = leaves(gaussians), lens_leaves(camera, torch.float32)
     features = torch.linspace(-1, 1, 2 * len(gaussians)).view(-1, 2).requires_grad_()
     background = torch.full((3,), 0.5, requires_grad=True)
@@ -153,7 +153,7 @@ def test_one_pixel() -> None:
 
 
 @pytest.mark.parametrize("size_px", [(1, 300), (300, 1), (7, 129)])
-def test_narrow_pictures(size_px: tuple[int, int]) -> None:
+def test_narrow_images(size_px: tuple[int, int]) -> None:
     assert assert_finite(cloud(50), pinhole(100.0, size_px)).alpha.shape == size_px
 
 
@@ -175,7 +175,7 @@ def test_a_million_in_one_pixel() -> None:
     assert float(made.alpha.detach()) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_one_gaussian_over_a_whole_picture() -> None:
+def test_one_gaussian_over_a_whole_image() -> None:
     one = some(means=[0.0, 0.0, 2.0], scales=50.0, opacities=0.9).select(torch.tensor([0]))
     made = assert_finite(one, pinhole(1500.0, (1080, 2048)), ("rgb", "alpha"))
     want = torch.full_like(made.alpha, 0.9)
@@ -183,7 +183,7 @@ def test_one_gaussian_over_a_whole_picture() -> None:
 
 
 @pytest.mark.slow
-def test_a_picture_of_eight_thousand_columns() -> None:
+def test_an_image_of_eight_thousand_columns() -> None:
     gaussians = cloud(50, spread_px=2.0)
     made = assert_finite(gaussians, pinhole(3000.0, (4320, 7680)), ("alpha",))
     small = render(gaussians, pinhole(3000 / 16, (270, 480)), outputs=("alpha",)).alpha

@@ -88,10 +88,10 @@ def loss(made: RenderOutput | Dense, names: tuple[str, ...], sure: Tensor) -> Te
     """Random weights on the pixels that are sure."""
     generator, total = torch.Generator().manual_seed(3), 0.0
     for name in names:
-        picture = getattr(made, name)
-        weight = torch.randn(picture.shape, generator=generator, dtype=torch.float64)
-        weight = weight * sure.view(*sure.shape, *[1] * (picture.ndim - 2))
-        total = total + (picture * weight.to(picture)).sum()
+        image = getattr(made, name)
+        weight = torch.randn(image.shape, generator=generator, dtype=torch.float64)
+        weight = weight * sure.view(*sure.shape, *[1] * (image.ndim - 2))
+        total = total + (image * weight.to(image)).sum()
     return total
 
 
@@ -123,12 +123,12 @@ def assert_gradients(
 
 @pytest.mark.parametrize("spread_px", [1.0, 6.0])
 @pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
-def test_of_all_pictures_at_once(changes: dict, spread_px: float) -> None:
+def test_of_all_images_at_once(changes: dict, spread_px: float) -> None:
     assert_gradients(cloud(COUNT, bands=4, spread_px=spread_px), **changes)
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
-def test_of_one_picture(name: str) -> None:
+def test_of_one_image(name: str) -> None:
     assert_gradients(cloud(COUNT, bands=4), names=(name,))
 
 

@@ -41,7 +41,7 @@ def arrays_in(thing: object) -> list[np.ndarray]:
 
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> list[Drawn]:
-    """What pictures keep for the way back."""
+    """What images keep for the way back."""
     GROUP.ensure_compiled()
     made = []
 

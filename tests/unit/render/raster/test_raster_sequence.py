@@ -179,7 +179,7 @@ def test_rows_do_not_depend_on_the_memory() -> None:
     scene = scene_with(keyed(torch.arange(COUNT)))
     wide = replace(scene.gaussians, scales=scene.gaussians.scales + 3.0)
     many = replace(scene, gaussians=wide.select(torch.arange(COUNT).repeat(60)))
-    pictures = []
+    images = []
     for memory_bytes in (1 << 20, 256 << 20):
         settings = RenderSettings(tile_px=8, memory_bytes=memory_bytes)
         plan = make_raster_settings(CAMERA, settings, colors=True, medians=False)
@@ -187,8 +187,8 @@ def test_rows_do_not_depend_on_the_memory() -> None:
         drawn = Sequence(many, plan, depths=False)
         for time_s in (0.0, 0.0):
             drawn.draw(view, time_s)
-        pictures.append(drawn.draw(view, 0.6, rows=(16, 32)).planes)
-    assert torch.equal(*pictures)
+        images.append(drawn.draw(view, 0.6, rows=(16, 32)).planes)
+    assert torch.equal(*images)
 
 
 def test_nothing_is_left_behind_where_lists_did_not_fit_for_a_while() -> None:

@@ -46,7 +46,7 @@ def spacetime_scene(bands: int, turning: bool, step: int = 2) -> Scene:
 @pytest.mark.parametrize("turning", [False, True])
 @pytest.mark.parametrize("bands", [1, 4])
 @pytest.mark.parametrize("step", [1, 2])
-def test_sequences_are_frame_by_frame_pictures(turning: bool, bands: int, step: int) -> None:
+def test_sequences_are_frame_by_frame_images(turning: bool, bands: int, step: int) -> None:
     scene = spacetime_scene(bands, turning, step)
     frames = list(render_video(scene, scene.path, outputs=OUTPUTS))
     for index, made in enumerate(frames):

@@ -19,7 +19,7 @@ def compiled() -> dict[str, int]:
     return {kernel.py_func.__name__: len(kernel.signatures) for kernel in GROUP.kernels}
 
 
-def test_warming_up_compiles_everything_that_pictures_need() -> None:
+def test_warming_up_compiles_everything_that_images_need() -> None:
     GROUP.precompile()
     before = compiled()
     assert GROUP.is_ready()
@@ -46,7 +46,7 @@ def test_what_is_compiled_has_nothing_to_report() -> None:
     assert heard == []
 
 
-PICTURE = """
+IMAGE = """
 from oracles_raster import cloud, render_raster, wide_camera
 from diff4splat.render.raster.jit import GROUP
 print(GROUP.is_ready())
@@ -60,7 +60,7 @@ def draw(folder: Path) -> tuple[list[str], str]:
     """What a fresh interpreter says whose kernels lie in ``folder``."""
     header = f"import sys; sys.path.insert(0, {str(SUPPORT)!r})\n"
     done = subprocess.run(
-        [sys.executable, "-c", header + PICTURE],
+        [sys.executable, "-c", header + IMAGE],
         capture_output=True, text=True, timeout=500, check=True,
         env={**os.environ, "NUMBA_CACHE_DIR": str(folder)},
     )  # fmt: skip
@@ -68,7 +68,7 @@ def draw(folder: Path) -> tuple[list[str], str]:
 
 
 @pytest.mark.slow
-def test_the_first_picture_on_a_machine_says_what_takes_so_long(tmp_path: Path) -> None:
+def test_the_first_image_on_a_machine_says_what_takes_so_long(tmp_path: Path) -> None:
     said, heard = draw(tmp_path)
     assert said == ["False", "True"]
     first, last = heard.strip().splitlines()

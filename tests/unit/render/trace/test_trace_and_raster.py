@@ -31,7 +31,7 @@ def rays_of(camera: Camera) -> Rays:
     return Rays(origins=origins.flatten(0, 1), directions=directions.flatten(0, 1))
 
 
-def pictures(cloud: Gaussians, camera: Camera) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def images(cloud: Gaussians, camera: Camera) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """(rgb, alpha) traced and rasterised."""
     made = trace(cloud, rays_of(camera), outputs=("rgb", "alpha"), settings=TRACED)
     drawn = render(cloud, camera, outputs=("rgb", "alpha"), settings=RASTER)
@@ -46,12 +46,12 @@ def test_one_sphere_is_as_close_as_the_linearisation(ratio: float, angle_deg: fl
     mean = torch.tensor([[3 * math.sin(angle), 0.0, 3 * math.cos(angle)]])
     one = scene(1, dtype=torch.float32, bands=1)
     one = replace(one, means=mean, scales=torch.full((1, 3), 3 * ratio), opacities=torch.ones(1))
-    # About ten pixels per standard deviation, and the picture around the sphere.
+    # About ten pixels per standard deviation, and the image around the sphere.
     focal = 10 / ratio * math.cos(angle)
     camera = pinhole(focal, (81, 81), torch.float32)
     center = torch.tensor([40.5 - focal * math.tan(angle), 40.5])
     camera = replace(camera, center_px=center)
-    _, traced, _, drawn = pictures(one, camera)
+    _, traced, _, drawn = images(one, camera)
     budget = 2 * ratio * math.tan(angle) + 3e-4
     assert float(drawn.max()) > 0.95
     off = (traced - drawn).abs()
@@ -71,7 +71,7 @@ def test_a_cloud_of_small_ones_looks_the_same() -> None:
         scales=ratio * depth * (0.5 + torch.rand(count, 3, generator=generator)),
     )
     camera = pinhole(300.0, (300, 300), torch.float32)
-    rgb, alpha, drawn_rgb, drawn_alpha = pictures(cloud, camera)
+    rgb, alpha, drawn_rgb, drawn_alpha = images(cloud, camera)
     assert float(drawn_alpha.mean()) > 0.02
     # Half a right angle is the diagonal; scales reach 1.5 ratios.
     budget = 2 * 1.5 * ratio * math.sqrt(0.5) + 1 / 255

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 import torch
-from oracles_trace import MOTION, PARAMETERS, answers, leaves, motion, picture, scene
+from oracles_trace import MOTION, PARAMETERS, answers, image, leaves, motion, scene
 from torch import Tensor
 
 from diff4splat.render.trace.api import trace
@@ -19,7 +19,7 @@ CLOUD = replace(
     scales=0.2 * scene(3000, seed=5, dtype=torch.float32).scales,
 )
 # More than two parts of packets.
-RAYS = replace(picture((50, 60), 40.0, torch.float32), time_s=torch.linspace(0, 1, 3000))
+RAYS = replace(image((50, 60), 40.0, torch.float32), time_s=torch.linspace(0, 1, 3000))
 MOVING = motion(3000, dtype=torch.float32)
 
 
@@ -80,7 +80,7 @@ def test_little_memory_cuts_packets_and_changes_rounding_only() -> None:
         one, means=place.repeat(20_000, 1), opacities=torch.full((20_000,), 0.005),
         scales=torch.ones(20_000, 3),
     )  # fmt: skip
-    rays = picture((8, 8), 60.0, torch.float32)
+    rays = image((8, 8), 60.0, torch.float32)
     # One mebibyte holds the hits of four of the sixty-four rays.
     little, plenty = (
         trace(wall, rays, outputs=("rgb", "hits"), settings=TraceSettings(memory_bytes=memory),

@@ -60,9 +60,9 @@ def assert_finite(
     time_s = None if rays.time_s is None else rays.time_s.to(dtype).requires_grad_()
     looking = Rays(origins=start, directions=toward, time_s=time_s)
     made = answers(own, looking, motion_leaves, **settings)
-    pictures = (made.rgb, made.distance, made.median_distance, made.alpha)
-    sum(picture.mean() for picture in pictures).backward()
-    found = [*pictures, start.grad, toward.grad, *(getattr(own, n).grad for n in PARAMETERS)]
+    images = (made.rgb, made.distance, made.median_distance, made.alpha)
+    sum(image.mean() for image in images).backward()
+    found = [*images, start.grad, toward.grad, *(getattr(own, n).grad for n in PARAMETERS)]
     if motion_leaves is not None:
         found += [getattr(motion_leaves, name).grad for name in MOTION]
         found.append(time_s.grad)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 from oracles_raster import assert_gradients_agree
-from oracles_trace import MOTION, PARAMETERS, answers, bundle, leaves, motion, picture, scene
+from oracles_trace import MOTION, PARAMETERS, answers, bundle, image, leaves, motion, scene
 from torch import Tensor
 
 from diff4splat.render.trace.moving import MovingCloud
@@ -60,11 +60,11 @@ def test_compiled_are_those_of_brute_force(bands: int, moves: bool, name: str) -
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.02], ids=["pinhole", "lens"])
-def test_of_a_picture(spread: float) -> None:
+def test_of_an_image(spread: float) -> None:
     # Many small Gaussians, of which each packet of rays meets some.
     cloud = scene(400, seed=8, bands=4, dtype=torch.float32)
     cloud = replace(cloud, scales=0.3 * cloud.scales)
-    compare(cloud, picture((24, 28), 20.0, torch.float32, spread), None, {"near_distance": 0.2})
+    compare(cloud, image((24, 28), 20.0, torch.float32, spread), None, {"near_distance": 0.2})
 
 
 @pytest.mark.parametrize("name", [*PARAMETERS, "origins", "directions", "time_s", *MOTION])
@@ -97,7 +97,7 @@ def test_what_no_ray_meets_has_none() -> None:
     means = cloud.means.clone()
     means[::2] = torch.tensor([0.0, 0.0, -50.0])
     own = leaves(replace(cloud, means=means))
-    answers(own, picture((8, 8), 8.0, torch.float32)).rgb.sum().backward()
+    answers(own, image((8, 8), 8.0, torch.float32)).rgb.sum().backward()
     for name in PARAMETERS:
         grad = getattr(own, name).grad
         assert not grad[::2].any()
@@ -107,7 +107,7 @@ def test_what_no_ray_meets_has_none() -> None:
 def test_what_is_held_to_the_largest_alpha_still_has_a_colour() -> None:
     cloud = scene(1, dtype=torch.float32)
     cloud = replace(cloud, opacities=torch.ones(1), means=torch.tensor([[0.0, 0.0, 3.0]]))
-    own, ahead = leaves(cloud), picture((1, 1), 1.0, torch.float32)
+    own, ahead = leaves(cloud), image((1, 1), 1.0, torch.float32)
     answers(own, ahead).rgb.sum().backward()
     assert float(own.opacities.grad) == 0.0
     assert not own.means.grad.any()

@@ -7,8 +7,8 @@ from oracles_trace import (
     assert_as_the_oracle,
     brute_force,
     bundle,
+    image,
     motion,
-    picture,
     scene,
 )
 
@@ -37,8 +37,8 @@ def test_random_rays(name: str, dtype: torch.dtype, room: float) -> None:
 
 @both
 @pytest.mark.parametrize("spread", [0.0, 0.05], ids=["pinhole", "lens"])
-def test_a_picture(spread: float, dtype: torch.dtype, room: float) -> None:
-    cloud, rays = scene(seed=2, dtype=dtype), picture((9, 11), 8.0, dtype, spread)
+def test_an_image(spread: float, dtype: torch.dtype, room: float) -> None:
+    cloud, rays = scene(seed=2, dtype=dtype), image((9, 11), 8.0, dtype, spread)
     made = answers(cloud, rays, near_distance=0.1)
     assert_as_the_oracle(made, oracle(cloud, rays, {"near_distance": 0.1}), room)
 

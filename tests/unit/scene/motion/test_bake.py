@@ -26,7 +26,7 @@ CAMERA = pinhole(100.0, (90, 120), F64)
 
 
 def cloud(count: int, dtype: torch.dtype = F64) -> Gaussians:
-    """In front of the camera, some beside the picture."""
+    """In front of the camera, some beside the image."""
     low, high = BOX.to(dtype)
     return Gaussians(
         means=low + torch.rand(count, 3, dtype=dtype) * (high - low),

@@ -12,7 +12,7 @@ from oracles_spacetime import motion, normal, still_gaussians
 
 from diff4splat.errors import ConfigError
 from diff4splat.geometry import quaternion
-from diff4splat.scene.edit import Similarity, merge, static_if_still, transform, transform_gaussians
+from diff4splat.scene.edit import Similarity, merge, simplify_motion, transform, transform_gaussians
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.spacetime import SpacetimeMotion
@@ -163,15 +163,15 @@ def resting(**changes: object) -> SpacetimeMotion:
 def kept(moving: SpacetimeMotion, **tolerances: float) -> list[int]:
     """Who still moves after what stands was let stand."""
     start = scene(replace(still_gaussians(3), opacities=torch.full((3,), 0.5).double()), moving)
-    return static_if_still(start, **tolerances).motion.moving_index.tolist()
+    return simplify_motion(start, **tolerances).motion.moving_index.tolist()
 
 
 def test_what_never_changes_becomes_static() -> None:
     start = scene(still_gaussians(3), resting())
-    assert static_if_still(start).motion == StaticMotion(time_range_s=(0.0, 2.0))
-    assert_same_at_all_times(static_if_still(start), start)
+    assert simplify_motion(start).motion == StaticMotion(time_range_s=(0.0, 2.0))
+    assert_same_at_all_times(simplify_motion(start), start)
     one = resting(velocities=torch.tensor([[0.0, 0, 0], [0, 1, 0]], dtype=F64))
-    left = static_if_still(scene(still_gaussians(3), one))
+    left = simplify_motion(scene(still_gaussians(3), one))
     assert left.motion.moving_index.tolist() == [2]
     assert_same_at_all_times(left, scene(still_gaussians(3), one))
 
@@ -206,4 +206,4 @@ def test_a_colour_wave_and_broken_numbers_are_never_still() -> None:
 
 def test_nobody_moving_becomes_static() -> None:
     start = scene(still_gaussians(3), motion([]))
-    assert isinstance(static_if_still(start).motion, StaticMotion)
+    assert isinstance(simplify_motion(start).motion, StaticMotion)

@@ -43,6 +43,6 @@ def test_twice_is_not_at_all() -> None:
         torch.testing.assert_close(again.times_s, clip.times_s)
 
 
-def test_a_window_larger_than_the_pictures_is_refused() -> None:
-    with pytest.raises(InputError, match="expected pictures of at least 25×32, got 24×32"):
+def test_a_window_larger_than_the_images_is_refused() -> None:
+    with pytest.raises(InputError, match="expected images of at least 25×32, got 24×32"):
         cropped(make_clip(), (25, 32), torch.Generator())

@@ -157,7 +157,7 @@ def test_full_clips_are_refused_where_keyframes_are_expected() -> None:
         sample(make_clip(frames=17), data)
 
 
-def test_smaller_pictures_keep_depth_and_rays_together() -> None:
+def test_smaller_images_keep_depth_and_rays_together() -> None:
     clip = make_clip(size_px=(48, 64), static=True)
     small = resized(clip, (24, 32))
     assert small.views[0].rgb.shape[1:3] == (24, 32)
@@ -170,8 +170,8 @@ def test_smaller_pictures_keep_depth_and_rays_together() -> None:
     assert abs(float(mean)) < 1
 
 
-def test_another_shape_of_picture_is_refused() -> None:
-    with pytest.raises(InputError, match="expected pictures of the shape 32×32, got 24×32"):
+def test_another_shape_of_image_is_refused() -> None:
+    with pytest.raises(InputError, match="expected images of the shape 32×32, got 24×32"):
         resized(make_clip(), (32, 32))
 
 

@@ -260,12 +260,12 @@ def test_clips_kept_in_memory_are_read_once_and_stay_as_they_were(
         FolderClips, "_read", lambda self, place: (read.append(place), plain(self, place))[1]
     )
 
-    def pictures(in_memory: bool) -> list[torch.Tensor]:
+    def images(in_memory: bool) -> list[torch.Tensor]:
         kept = replace(data, in_memory=in_memory)
         samples = ClipSamples.open(recipe(given, data=kept), seed=0)
         return [samples[index].video for index in (*range(40), *range(40))]
 
-    before, counted = pictures(in_memory=False), len(read)
-    after = pictures(in_memory=True)
+    before, counted = images(in_memory=False), len(read)
+    after = images(in_memory=True)
     assert counted == 80 and len(read) - counted == len(set(read[counted:])) < 40
     assert all(torch.equal(one, other) for one, other in zip(before, after, strict=True))

@@ -67,8 +67,8 @@ def test_still_clips_are_judged_at_all_frames_as_before(still: Clip) -> None:
         one, other = sample(still, index=index), sample(still, MOVING, index)
         assert torch.equal(one.target_rgb, other.target_rgb)
         assert torch.equal(one.target_time, other.target_time)
-        for picture in one.target_rgb[0, :, 1]:
-            seen |= {k for k, frame in enumerate(frames) if torch.equal(picture, frame)}
+        for image in one.target_rgb[0, :, 1]:
+            seen |= {k for k, frame in enumerate(frames) if torch.equal(image, frame)}
     assert len(seen) > 2
 
 
@@ -104,7 +104,7 @@ def test_targets_are_different_times_where_there_are_several(
     assert times == sorted(times) and times[-1] < frames
 
 
-def test_the_first_picture_is_all_that_is_left_of_the_input(moving: Clip, still: Clip) -> None:
+def test_the_first_image_is_all_that_is_left_of_the_input(moving: Clip, still: Clip) -> None:
     both = collate([sample(moving), sample(still)])
     alone = both.first_image()
     assert torch.equal(alone.video, both.video[:, :1])
@@ -115,7 +115,7 @@ def test_the_first_picture_is_all_that_is_left_of_the_input(moving: Clip, still:
         assert torch.equal(own, whole[:, :1])
 
 
-def test_targets_stay_when_the_first_picture_is_left(moving: Clip) -> None:
+def test_targets_stay_when_the_first_image_is_left(moving: Clip) -> None:
     both = sample(moving, MOVING)
     alone = both.first_image()
     for name in ("target_rgb", "target_depth", "target_time", "track_offset", "sample_index"):

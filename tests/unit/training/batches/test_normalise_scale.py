@@ -18,7 +18,7 @@ def test_the_first_input_frame_gets_the_depth_of_the_photographs_plane() -> None
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 250.0])
-def test_scaling_lengths_changes_no_picture(factor: float) -> None:
+def test_scaling_lengths_changes_no_image(factor: float) -> None:
     clip = make_clip(tracks=16)
     scaled = rescaled(clip, factor)
     for before, after in zip(clip.views, scaled.views, strict=True):

@@ -74,7 +74,7 @@ def test_each_clip_is_followed_by_its_mirror_image(encoded: Path) -> None:
     assert pack.is_static.tolist() == [True, True, False, False]
 
 
-def test_latents_are_those_of_the_pictures_and_of_the_pictures_in_a_mirror(encoded: Path) -> None:
+def test_latents_are_those_of_the_images_and_of_the_images_in_a_mirror(encoded: Path) -> None:
     pack, vae = read_packs(encoded), tiny_model().networks.vae
     for place, (seed, static) in enumerate(((0, True), (1, False))):
         rgb = exact_clip(seed, static).views[0].rgb[None].movedim(-1, 1).float() / 127.5 - 1

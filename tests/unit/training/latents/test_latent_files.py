@@ -109,7 +109,7 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path: Path, kept: int) -> None:
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     latent_folder(tmp_path, make_pack([True]))
-    (tmp_path / "latents-00001.safetensors").write_text("a picture, perhaps")
+    (tmp_path / "latents-00001.safetensors").write_text("an image, perhaps")
     with pytest.raises(FileFormatError, match="latents-00001"):
         read_packs(tmp_path)
 

@@ -48,7 +48,7 @@ def test_the_clean_first_frame_does_not_count() -> None:
     assert velocity.grad[:, :, 1:].all()
 
 
-def test_a_still_picture_leaves_nothing_to_learn() -> None:
+def test_a_still_image_leaves_nothing_to_learn() -> None:
     velocity, clean, noise = latents(2, 2, 1, 2, 2)
     velocity.requires_grad_()
     loss = flow_matching(velocity, clean, noise, first_frame_is_clean=True)

@@ -109,7 +109,7 @@ def coded(power: float) -> ModelStage:
     return make_stage(stage_recipe("video_diffusion", channel_power_exponent=power), model=model)
 
 
-def test_channels_count_by_their_share_in_pictures() -> None:
+def test_channels_count_by_their_share_in_images() -> None:
     stage = coded(0.5)
     share = stage.vae.pca_shortcut.to_block.weight.detach().norm(dim=0)
     torch.testing.assert_close(stage.flow._channels, share / share.mean())

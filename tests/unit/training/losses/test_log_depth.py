@@ -1,4 +1,4 @@
-"""Losses of the depth of single pictures."""
+"""Losses of the depth of single images."""
 
 import math
 
@@ -65,16 +65,16 @@ def test_gradients_are_right_and_nothing_comes_from_hidden_pixels() -> None:
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
-def test_every_picture_has_its_median_where_asked(unit: float) -> None:
+def test_every_image_has_its_median_where_asked(unit: float) -> None:
     depth = unit * (1 + torch.rand(3, 8, 8, dtype=torch.float64))
     depth[1, :3] = 0
     scaled, known = rescale_median(depth, 4.0)
-    for picture, mask in zip(scaled, known, strict=True):
-        assert float(picture[mask].median()) == pytest.approx(4.0)
+    for image, mask in zip(scaled, known, strict=True):
+        assert float(image[mask].median()) == pytest.approx(4.0)
     assert not known[1, :3].any() and bool((scaled[1, :3] == 1).all())
 
 
-def test_a_picture_with_next_to_no_depth_says_nothing() -> None:
+def test_an_image_with_next_to_no_depth_says_nothing() -> None:
     depth = torch.zeros(2, 8, 8)
     depth[0].view(-1)[: LEAST_PIXELS - 1] = 2.0
     depth[1, 0, 0] = torch.inf

@@ -32,12 +32,12 @@ Loss = Callable[..., torch.Tensor]
 LOSSES: tuple[Loss, ...] = (squared_error, first_pixel_error)
 
 
-def pictures() -> list[torch.Tensor]:
+def images() -> list[torch.Tensor]:
     return [torch.rand(2, 3, 4, 5, 3, dtype=F64) for _ in range(2)]
 
 
 def test_squared_error_and_distance() -> None:
-    image, reference = pictures()
+    image, reference = images()
     squares = ((image - reference) ** 2).numpy().reshape(2, -1).mean(1)
     np.testing.assert_allclose(squared_error(image, reference), squares, rtol=1e-12)
     first = (image - reference)[:, :, 0, 0, 0].abs().numpy().mean(1)
@@ -45,7 +45,7 @@ def test_squared_error_and_distance() -> None:
 
 
 def test_only_valid_pixels_count() -> None:
-    image, reference = pictures()
+    image, reference = images()
     valid = torch.rand(2, 3, 4, 5) < 0.5
     loss = squared_error(image, reference, valid)
     expected = [((image - reference)[b][valid[b]] ** 2).mean() for b in range(2)]
@@ -53,7 +53,7 @@ def test_only_valid_pixels_count() -> None:
 
 
 def test_hidden_pixels_show_the_reference() -> None:
-    image, reference = pictures()
+    image, reference = images()
     valid = torch.ones(2, 3, 4, 5, dtype=torch.bool)
     valid[:, :, 0, 0] = False
     image[:, :, 0, 0] = float("nan")
@@ -66,8 +66,8 @@ def test_hidden_pixels_show_the_reference() -> None:
     assert not image.grad[:, :, 0, 0].any()
 
 
-def test_a_picture_without_a_valid_pixel_does_not_count() -> None:
-    image, reference = pictures()
+def test_an_image_without_a_valid_pixel_does_not_count() -> None:
+    image, reference = images()
     valid = torch.ones(2, 3, 4, 5, dtype=torch.bool)
     valid[0, 1:] = False
     valid[1] = False
@@ -79,7 +79,7 @@ def test_a_picture_without_a_valid_pixel_does_not_count() -> None:
 @settings(max_examples=25, deadline=None)
 @given(error=st.floats(-1, 1))
 def test_a_constant_error_has_a_closed_form(error: float) -> None:
-    _, reference = pictures()
+    _, reference = images()
     for loss_of, expected in zip(LOSSES, (error**2, abs(error)), strict=True):
         loss = loss_of(reference + error, reference)
         torch.testing.assert_close(
@@ -97,7 +97,7 @@ def test_half_precision_is_widened(dtype: torch.dtype) -> None:
 
 @pytest.mark.parametrize("loss_of", LOSSES)
 def test_gradient(loss_of: Loss) -> None:
-    image, reference = (p[:, :1, :2, :2] for p in pictures())
+    image, reference = (p[:, :1, :2, :2] for p in images())
     image = image.detach().requires_grad_()
     assert torch.autograd.gradcheck(lambda own: loss_of(own, reference), image)
 
@@ -105,7 +105,7 @@ def test_gradient(loss_of: Loss) -> None:
 @pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize("loss_of", LOSSES)
 def test_shapes(loss_of: Loss) -> None:
-    image, reference = pictures()
+    image, reference = images()
     with pytest.raises(ShapeError, match=r"image: expected \(2, 3, 4, 5, 3\), got \(2, 1, 4"):
         loss_of(image[:, :1], reference)
     with pytest.raises(ShapeError, match=r"valid: expected \(2, 3, 4, 5\) bool, got \(2, 3, 4\)"):

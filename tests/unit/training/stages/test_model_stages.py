@@ -138,16 +138,16 @@ def test_measures_know_truth_from_standstill() -> None:
 
 
 @pytest.mark.parametrize("name", STAGES)
-def test_panels_are_pictures(name: str) -> None:
+def test_panels_are_images(name: str) -> None:
     recipe = stage_recipe(name)
     panel = make_stage(recipe).panel(make_batch(recipe))
     assert panel.shape[-1] == 3 and float(panel.min()) >= 0 and float(panel.max()) <= 1
 
 
-def test_lines_of_one_picture_do_not_show_in_the_next() -> None:
+def test_lines_of_one_image_do_not_show_in_the_next() -> None:
     batch = make_batch(stage_recipe("dynamic"))
     still = torch.zeros_like(batch.track_offset[0])
-    before = [picture.clone() for picture in motion_rows(still, batch)[1][1]]
+    before = [image.clone() for image in motion_rows(still, batch)[1][1]]
     moved = replace(batch, track_offset=batch.track_offset + 3.0)
     truth, own = (row for _, row in motion_rows(still, moved))
     assert not torch.equal(truth[0], before[0])

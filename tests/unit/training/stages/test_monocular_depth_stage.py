@@ -15,7 +15,7 @@ from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.kinds.monocular_depth import SKY_DEPTH, depth_images
 
 
-def test_every_key_frame_and_target_is_a_picture() -> None:
+def test_every_key_frame_and_target_is_an_image() -> None:
     recipe = depth_recipe()
     batch = with_sky(make_batch(recipe, (0, 1)))
     shown = depth_images(batch)
@@ -28,7 +28,7 @@ def test_every_key_frame_and_target_is_a_picture() -> None:
     torch.testing.assert_close(shown.rgb[each], first.float())
 
 
-def test_terms_are_finite_and_only_the_pictures_depth_learns() -> None:
+def test_terms_are_finite_and_only_the_images_depth_learns() -> None:
     recipe = depth_recipe()
     stage = make_stage(recipe, model=MODEL)
     shake_heads(stage)
@@ -84,7 +84,7 @@ def test_without_any_depth_there_is_nothing_to_learn_but_sky() -> None:
     assert bool(measures["depth_error"].isnan()) and bool(measures["depth_correlation"].isnan())
 
 
-def test_light_is_drawn_anew_for_every_picture_and_alike_every_time() -> None:
+def test_light_is_drawn_anew_for_every_image_and_alike_every_time() -> None:
     recipe = depth_recipe()
     stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe, (0, 1))
     count = len(depth_images(batch).rgb)

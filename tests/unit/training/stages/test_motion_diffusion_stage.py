@@ -51,7 +51,7 @@ def test_terms_and_gradients_are_finite_and_only_the_motion_network_learns() -> 
     assert all(bool(gradient.isfinite().all()) for gradient in gradients.values())
 
 
-def test_a_flip_changes_pictures_motion_and_captions_together() -> None:
+def test_a_flip_changes_images_motion_and_captions_together() -> None:
     recipe = motion_recipe()
     stage = make_stage(recipe, model=MODEL)
     batch = moving_batch(recipe, tuple(range(8)))
@@ -81,8 +81,8 @@ def test_panels_and_measures() -> None:
     recipe = motion_recipe()
     stage = make_stage(recipe, model=MODEL).eval()
     batch = moving_batch(recipe)
-    picture = stage.panel(batch)
-    assert picture.ndim == 3 and bool(picture.isfinite().all())
+    image = stage.panel(batch)
+    assert image.ndim == 3 and bool(image.isfinite().all())
     assert set(stage.measure(batch)) == {"flow_error", "motion_share"}
 
 

@@ -48,7 +48,7 @@ def test_terms_and_gradients_are_finite_and_reach_what_learns(name: str) -> None
         assert gradients and all(bool(g.isfinite().all()) for g in gradients), part
 
 
-def test_motion_alone_is_the_dynamic_stage_without_pictures() -> None:
+def test_motion_alone_is_the_dynamic_stage_without_images() -> None:
     stages = [make_stage(refined(name), model=MODEL) for name in (MOTION, "dynamic")]
     for stage in stages:
         shake_heads(stage)
@@ -74,7 +74,7 @@ def test_many_times_at_once_are_the_same_as_each_alone() -> None:
         torch.testing.assert_close(found, stage.deformation(tokens, time))
 
 
-def test_pictures_alone_need_no_autoencoder() -> None:
+def test_images_alone_need_no_autoencoder() -> None:
     recipe = refined(PRETRAIN)
     stage = make_stage(recipe, model=MODEL)
     assert not hasattr(stage, "vae")
@@ -83,7 +83,7 @@ def test_pictures_alone_need_no_autoencoder() -> None:
 
 
 @pytest.mark.parametrize("use_ground_truth_frames", [True, False])
-def test_the_first_picture_is_always_the_true_one(use_ground_truth_frames: bool) -> None:
+def test_the_first_image_is_always_the_true_one(use_ground_truth_frames: bool) -> None:
     recipe = replace(refined("static-low"), use_ground_truth_frames=use_ground_truth_frames)
     stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe)
     video = stage.scenes.posed_video(batch, encode_video(stage.vae, batch))

@@ -1,4 +1,4 @@
-"""Neural 3D Video: LLFF poses, cameras by name, videos and pictures, camera 0 held out."""
+"""Neural 3D Video: LLFF poses, cameras by name, videos and images, camera 0 held out."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from capture_checks import assert_pose, assert_sees, projected
-from capture_folders import llff_rows, rig_cameras, write_neu3d, write_picture, write_video
+from capture_folders import llff_rows, rig_cameras, write_image, write_neu3d, write_video
 
 from diff4splat.data.capture.split import report_split
 from diff4splat.data_prep.readers.files.lru_cache import LruCache
@@ -22,10 +22,10 @@ FPS, SIZE_PX = 25.0, (48, 80)
 
 def block_video(frames: int = 9, size_px: tuple[int, int] = SIZE_PX) -> list[np.ndarray]:
     """A grey level that tells the frame, and a white block in the upper left."""
-    pictures = [np.full((*size_px, 3), 20 + 20 * index, np.uint8) for index in range(frames)]
-    for picture in pictures:
-        picture[:16, :16] = (250, 10, 10)
-    return pictures
+    images = [np.full((*size_px, 3), 20 + 20 * index, np.uint8) for index in range(frames)]
+    for image in images:
+        image[:16, :16] = (250, 10, 10)
+    return images
 
 
 def write_videos(folder: Path, count: int = 3, frames: int = 9) -> Path:
@@ -64,13 +64,13 @@ def test_cameras_count_in_the_order_of_their_names_whatever_their_numbers(tmp_pa
     assert any("cam9 is 1, cam10 is 2" in note for note in capture.notes)
 
 
-def test_a_picture_that_is_missing_makes_a_gap_and_shifts_nothing(tmp_path: Path) -> None:
+def test_an_image_that_is_missing_makes_a_gap_and_shifts_nothing(tmp_path: Path) -> None:
     write_neu3d(tmp_path, frames=4)
     (tmp_path / "cam02" / "images" / "0001.png").unlink()
     capture = read_capture(tmp_path, ReadOptions(fps=10.0))
     times_s = capture.times_s[capture.camera_index == 2].tolist()
     assert times_s == pytest.approx([0, 0.2, 0.3])
-    assert any("cam02 lacks 1 of 4 pictures" in note for note in capture.notes)
+    assert any("cam02 lacks 1 of 4 images" in note for note in capture.notes)
 
 
 def test_every_second_time_of_every_camera(tmp_path: Path) -> None:
@@ -126,19 +126,19 @@ def test_videos_shrink_exactly_even_where_a_block_is_cut(tmp_path: Path) -> None
     assert float(small.frames.read(2).rgb[5, 10, 0]) * 255 == pytest.approx(60, abs=6)
 
 
-def test_pictures_are_preferred_to_videos_when_all_cameras_have_them(tmp_path: Path) -> None:
+def test_images_are_preferred_to_videos_when_all_cameras_have_them(tmp_path: Path) -> None:
     write_videos(tmp_path, count=2)
     for number in range(2):
         for frame in range(2):
-            picture = np.full((24, 40, 3), 7, np.uint8)
-            write_picture(tmp_path / f"cam{number:02d}" / "images" / f"{frame:04d}.png", picture)
+            image = np.full((24, 40, 3), 7, np.uint8)
+            write_image(tmp_path / f"cam{number:02d}" / "images" / f"{frame:04d}.png", image)
     capture = read_capture(tmp_path)
     assert (len(capture), capture.cameras.size_px) == (4, (24, 40))
     assert capture.cameras.focal_px[0].tolist() == [30, 30]
     shutil.rmtree(tmp_path / "cam01")
     assert len(read_capture(tmp_path)) == 18
     (tmp_path / "cam00.mp4").unlink()
-    with pytest.raises(FileFormatError, match="no video of cam00 and a video but no pictures of"):
+    with pytest.raises(FileFormatError, match="no video of cam00 and a video but no images of"):
         read_capture(tmp_path)
 
 
@@ -209,11 +209,11 @@ def test_cameras_that_are_not_there_cannot_be_held_out(tmp_path: Path) -> None:
         read_capture(tmp_path, ReadOptions(hold_out=(0, 1, 2, 3)))
 
 
-def test_pictures_need_numbers_of_their_own(tmp_path: Path) -> None:
+def test_images_need_numbers_of_their_own(tmp_path: Path) -> None:
     write_neu3d(tmp_path)
     images = tmp_path / "cam01" / "images"
     (images / "0002.png").rename(images / "last.png")
-    with pytest.raises(FileFormatError, match=r"last\.png: expected pictures numbered .*no number"):
+    with pytest.raises(FileFormatError, match=r"last\.png: expected images numbered .*no number"):
         read_capture(tmp_path)
     (images / "last.png").rename(images / "x_0001.png")
     with pytest.raises(FileFormatError, match=r"x_0001\.png: .*got that of 0001\.png again"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from capture_checks import assert_pose, assert_sees, middle_of_light, projected
-from capture_folders import blob_picture, seer, side_point_at, write_picture
+from capture_folders import blob_image, seer, side_point_at, write_image
 from colmap_folders import cloud, write_binary, write_moving, write_rig, write_text
 
 from diff4splat.data.capture.split import report_split
@@ -40,7 +40,7 @@ def test_what_the_layout_calls_test_is_not_used_as_one(tmp_path: Path) -> None:
     assert torch.equal(capture.held_out, capture.camera_index == 0)
     assert report_split(capture).kind == "new views"
     assert "camera 0 held out, by default" in capture.split_reason
-    assert "call test are training pictures" in capture.split_reason
+    assert "call test are training images" in capture.split_reason
     assert any("cam01 is 0" in note for note in capture.notes)
     chosen = read_capture(tmp_path, ReadOptions(hold_out=(3,)))
     assert chosen.split_reason == "cameras 3 held out, as asked for"
@@ -56,7 +56,7 @@ def test_the_point_lies_in_its_pixel_for_one_that_moves(tmp_path: Path, text: bo
         assert_pose(capture, index, cameras[original])
         assert_sees(capture, index, cameras[original], original / 30)
     assert capture.held_out.nonzero().flatten().tolist() == [0, 8]
-    assert any("1 of 12 pictures left out: COLMAP found no pose" in note for note in capture.notes)
+    assert any("1 of 12 images left out: COLMAP found no pose" in note for note in capture.notes)
 
 
 def test_two_cameras_miss_times_and_not_one_of_them(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_every_camera_model_that_can_be_read_is_straightened(
     focal_px = (31.0, 34.0) if model in ("PINHOLE", "OPENCV") else (31.0, 31.0)
     cameras = [seer(0.1 * index, focal_px=focal_px, **lens) for index in range(3)]
     for index, camera in enumerate(cameras):
-        write_picture(tmp_path / "images" / f"{index}.png", blob_picture(camera, index / 30))
+        write_image(tmp_path / "images" / f"{index}.png", blob_image(camera, index / 30))
     named = [(f"{index}.png", camera) for index, camera in enumerate(cameras)]
     (write_text if text else write_binary)(tmp_path / "sparse" / "0", named, cloud(), model)
     capture = read_capture(tmp_path)
@@ -139,11 +139,11 @@ def test_every_camera_model_that_can_be_read_is_straightened(
         assert middle_of_light(capture.frames.read(index).rgb) == pytest.approx(at, abs=0.12)
 
 
-def test_pictures_that_were_made_smaller_scale_their_cameras(tmp_path: Path) -> None:
+def test_images_that_were_made_smaller_scale_their_cameras(tmp_path: Path) -> None:
     cameras = write_rig(tmp_path, count=3, frames=1)
     for number in (1, 2, 3):
         file = tmp_path / f"cam0{number}" / "frame_00001.png"
-        write_picture(file, np.zeros((12, 18, 3), np.uint8))
+        write_image(file, np.zeros((12, 18, 3), np.uint8))
     capture = read_capture(tmp_path)
     assert capture.cameras.size_px == (12, 18)
     assert capture.cameras.focal_px[0].tolist() == [focal / 2 for focal in cameras[0].focal_px]

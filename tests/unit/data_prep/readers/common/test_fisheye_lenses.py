@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 from capture_checks import assert_pose
-from capture_folders import Seer, change_json, rig_cameras, seer, write_json, write_picture
+from capture_folders import Seer, change_json, rig_cameras, seer, write_image, write_json
 from colmap_folders import cloud, write_binary, write_text
 from oracles_physical import dots
 from torch import Tensor
@@ -41,7 +41,7 @@ def fisheye(coefficients: Sequence[float] = FOUR) -> OpenCVFisheye:
     return OpenCVFisheye(coefficients=torch.tensor(coefficients, dtype=torch.float64))
 
 
-def picture(camera: Seer, lens: Lens, focal_px: tuple[float, float] | None = None) -> np.ndarray:
+def image(camera: Seer, lens: Lens, focal_px: tuple[float, float] | None = None) -> np.ndarray:
     """8-bit RGB of the dots, through ``lens``."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = camera.rows().T, camera.position
@@ -56,7 +56,7 @@ def picture(camera: Seer, lens: Lens, focal_px: tuple[float, float] | None = Non
 
 
 def assert_renders(capture: Capture, index: int) -> None:
-    """What the capture's own camera shows is the picture in the file, and not an empty one."""
+    """What the capture's own camera shows is the image in the file, and not an empty one."""
     made, read = photograph(DOTS, capture.physical_camera(index)).rgb, capture.frames.read(index)
     torch.testing.assert_close(made, read.rgb, atol=0.51 / 255, rtol=0)
     assert float(read.rgb.max()) > 0.3
@@ -92,7 +92,7 @@ def write_colmap(folder: Path, model: str, four: Sequence[float], text: bool) ->
         seer(0.3 * index, **(WIDE if model == "OPENCV_FISHEYE" else ROUND)) for index in range(3)
     ]
     for index, camera in enumerate(cameras):
-        write_picture(folder / "images" / f"{index}.png", picture(camera, fisheye(four)))
+        write_image(folder / "images" / f"{index}.png", image(camera, fisheye(four)))
     named = [(f"{index}.png", camera) for index, camera in enumerate(cameras)]
     (write_text if text else write_binary)(folder / "sparse" / "0", named, cloud())
     lenses = [(model, numbers(camera, model, four)) for camera in cameras]
@@ -105,7 +105,7 @@ def write_nerfstudio(folder: Path, four: Sequence[float] = FOUR, **more: object)
     cameras, frames = [seer(0.3 * index, **WIDE) for index in range(3)], []
     for index, camera in enumerate(cameras):
         name = f"images/{index}.png"
-        write_picture(folder / name, picture(camera, fisheye(four)))
+        write_image(folder / name, image(camera, fisheye(four)))
         frames.append({"file_path": name, "transform_matrix": camera.opengl(), "time": index / 10})
     named = dict(zip(("k1", "k2", "k3", "k4"), four, strict=True))
     focal = {"fl_x": 6.0, "fl_y": 5.5, "cx": 9.3, "cy": 5.8, "w": 18, "h": 12}
@@ -188,14 +188,14 @@ def test_instant_ngp_calls_the_same_a_fisheye(tmp_path: Path) -> None:
 def test_focal_lengths_are_of_each_frame_and_the_lens_of_all(tmp_path: Path) -> None:
     cameras = write_nerfstudio(tmp_path)
     change_json(tmp_path / "transforms.json", lambda root: root["frames"][2].update(fl_x=4.0))
-    write_picture(tmp_path / "images/2.png", picture(cameras[2], fisheye(), (4.0, 5.5)))
+    write_image(tmp_path / "images/2.png", image(cameras[2], fisheye(), (4.0, 5.5)))
     capture = read_capture(tmp_path)
     assert capture.cameras.focal_px[:, 0].tolist() == [6.0, 6.0, 4.0]
     assert_renders(capture, 1)
     assert_renders(capture, 2)
 
 
-def test_smaller_pictures_are_seen_through_the_same_lens(tmp_path: Path) -> None:
+def test_smaller_images_are_seen_through_the_same_lens(tmp_path: Path) -> None:
     write_nerfstudio(tmp_path)
     fine, coarse = read_capture(tmp_path), read_capture(tmp_path, ReadOptions(downscale=2))
     assert coarse.cameras.size_px == (6, 9)
@@ -214,7 +214,7 @@ def test_whole_spheres_are_seen_around(tmp_path: Path, focal: dict) -> None:
     for index, camera in enumerate(cameras):
         per_radian = (9.0 / math.pi, 12.0 / math.pi)
         name = f"{index}.png"
-        write_picture(tmp_path / name, picture(camera, Equirectangular(), per_radian))
+        write_image(tmp_path / name, image(camera, Equirectangular(), per_radian))
         frames.append({"file_path": name, "transform_matrix": camera.opengl(), "time": index / 10})
     root = {"camera_model": "EQUIRECTANGULAR", **focal, "frames": frames}
     write_json(tmp_path / "transforms.json", root)
@@ -247,7 +247,7 @@ def test_masks_cover_fisheye_frames(tmp_path: Path) -> None:
     write_nerfstudio(tmp_path)
     mask = np.full((*SIZE, 3), 255, np.uint8)
     mask[:, :4] = 0
-    write_picture(tmp_path / "mask.png", mask)
+    write_image(tmp_path / "mask.png", mask)
     change_json(
         tmp_path / "transforms.json", lambda root: root["frames"][1].update(mask_path="mask.png")
     )
@@ -268,7 +268,7 @@ def test_a_rig_shares_one_lens(tmp_path: Path, text: bool) -> None:
     cameras = rig_cameras(3, **WIDE)
     for number, camera in enumerate(cameras, start=1):
         file = tmp_path / f"cam0{number}" / "frame_00001.png"
-        write_picture(file, picture(camera, fisheye()))
+        write_image(file, image(camera, fisheye()))
     named = [(f"image{number}.jpg", camera) for number, camera in enumerate(cameras, start=1)]
     (write_text if text else write_binary)(tmp_path / "sparse_", named, cloud())
     lenses = [("OPENCV_FISHEYE", numbers(camera, "OPENCV_FISHEYE", FOUR)) for camera in cameras]
@@ -298,7 +298,7 @@ def test_a_rig_shares_one_lens(tmp_path: Path, text: bool) -> None:
         ({"p1": 0.1}, "expected no lens distortion, got p1 = 0.1"),
         ({"k5": 0.1}, "expected no lens distortion, got k5 = 0.1"),
         ({"fl_x": None, "fl_y": None, "camera_angle_x": 2.0}, r"a focal length \(fl_x, fl_y\), go"),
-        ({"camera_model": "EQUIRECTANGULAR", "fl_x": 1.0}, "'fl_x': expected 9, since a picture"),
+        ({"camera_model": "EQUIRECTANGULAR", "fl_x": 1.0}, "'fl_x': expected 9, since an image"),
         ({"camera_model": "OPENCV"}, "expected no lens distortion, got k4 = 0.001"),
         ({"camera_model": 3}, "expected a pinhole camera_model"),
     ],

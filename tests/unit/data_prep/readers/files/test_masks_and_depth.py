@@ -1,4 +1,4 @@
-"""What lies beside a picture: masks, depth, transparency, and numbers in place of levels."""
+"""What lies beside an image: masks, depth, transparency, and numbers in place of levels."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import pytest
 import torch
 from capture_folders import (
     change_json,
-    write_picture,
+    write_image,
     write_transforms,
 )
 
@@ -36,7 +36,7 @@ def test_masked_pixels_do_not_count(tmp_path: Path) -> None:
     assert halves.shape == (12, 18)
     assert halves.sum(1).tolist() == [0, 0, 0] + [18] * 9
     cv2.imwrite(str(tmp_path / "mask.png"), mask[:-1])
-    with pytest.raises(FileFormatError, match=r"mask\.png: expected a mask as large as its pict"):
+    with pytest.raises(FileFormatError, match=r"mask\.png: expected a mask as large as its image"):
         read_capture(tmp_path).frames.read(2)
     cv2.imwrite(str(tmp_path / "mask.png"), mask * 0)
     with pytest.raises(FileFormatError, match=r"mask\.png: .*got black everywhere; black covers"):
@@ -90,7 +90,7 @@ def test_coarse_depth_is_repeated_and_rubbish_is_no_depth(tmp_path: Path) -> Non
     want = torch.tensor([[1.0, 2, 3], [4, 0, 0]]).repeat_interleave(12, 0).repeat_interleave(12, 1)
     assert torch.equal(got, want)
     for odd, message in (
-        (np.zeros((24, 24)), "depth shaped as its picture, 36 x 24, got 24 x 24"),
+        (np.zeros((24, 24)), "depth shaped as its image, 36 x 24, got 24 x 24"),
         (np.zeros((24, 36, 3)), "expected depth of one channel"),
     ):
         np.save(tmp_path / "d.npy", odd)
@@ -103,7 +103,7 @@ def test_one_standing_camera_is_enough_with_depth(tmp_path: Path) -> None:
     np.save(tmp_path / "d.npy", np.ones((24, 36), np.float32))
     pose = cameras[0].opengl()
     change_frames(tmp_path, lambda frame: frame.update(transform_matrix=pose))
-    with pytest.raises(InputError, match="pictures from at least two places"):
+    with pytest.raises(InputError, match="images from at least two places"):
         read_capture(tmp_path)
     change_frames(tmp_path, lambda frame: frame.update(depth_file_path="d.npy"))
     capture = read_capture(tmp_path)
@@ -111,7 +111,7 @@ def test_one_standing_camera_is_enough_with_depth(tmp_path: Path) -> None:
     assert report_split(capture).kind == "new times of training views"
 
 
-def test_float_pictures_have_pixels_that_do_not_count(tmp_path: Path) -> None:
+def test_float_images_have_pixels_that_do_not_count(tmp_path: Path) -> None:
     write_transforms(tmp_path, count=3)
     rgb = np.full((24, 36, 3), 0.25, np.float32)
     rgb[3, 4, 1] = np.nan
@@ -132,7 +132,7 @@ def test_float_pictures_have_pixels_that_do_not_count(tmp_path: Path) -> None:
         assert any("NaN do not count" in note for note in capture.notes)
     np.save(tmp_path / "a.npy", rgb * np.nan)
     change_frames(tmp_path, lambda frame: frame.update(file_path="a.npy"))
-    with pytest.raises(FileFormatError, match="expected a picture, got NaN everywhere"):
+    with pytest.raises(FileFormatError, match="expected an image, got NaN everywhere"):
         read_capture(tmp_path).frames.read(0)
 
 
@@ -140,7 +140,7 @@ def test_transparent_pixels_say_nothing_unless_a_background_is_given(tmp_path: P
     write_transforms(tmp_path, count=3)
     rgba = np.full((24, 36, 4), 200, np.uint8)
     rgba[:6, :, 3] = 0
-    write_picture(tmp_path / "images" / "frame_00001.png", rgba)
+    write_image(tmp_path / "images" / "frame_00001.png", rgba)
     capture = read_capture(tmp_path)
     assert capture.background is None
     assert capture.frames.read(0).counts.sum() == 18 * 36
@@ -151,7 +151,7 @@ def test_transparent_pixels_say_nothing_unless_a_background_is_given(tmp_path: P
     assert frame.rgb[0, 0].tolist() == [0, 0, 1]
 
 
-def test_damaged_float_pictures_are_named(tmp_path: Path) -> None:
+def test_damaged_float_images_are_named(tmp_path: Path) -> None:
     write_transforms(tmp_path, count=3)
     rgb = np.random.default_rng(0).random((24, 36, 3)).astype(np.float32)
     part = OpenEXR.Part(

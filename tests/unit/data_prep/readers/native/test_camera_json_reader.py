@@ -92,7 +92,7 @@ def test_one_camera_comes_back_bit_for_bit(films: Path) -> None:
     assert capture.source == "diff4splat cameras"
 
 
-def test_pictures_depth_and_masks_are_those_of_the_files(films: Path) -> None:
+def test_images_depth_and_masks_are_those_of_the_files(films: Path) -> None:
     folder = films / "cam0" / "bent"
     frame = read_capture(folder).frames.read(1)
     assert torch.equal(frame.rgb, png_rgb(folder / "frame_0001.png"))
@@ -123,11 +123,11 @@ def test_times_are_held_out_of_one_camera_and_a_camera_of_three(films: Path) -> 
     assert "cameras 2 held out, as asked for" in other.split_reason
 
 
-def test_pictures_that_training_sees_too_are_left_out(films: Path) -> None:
+def test_images_that_training_sees_too_are_left_out(films: Path) -> None:
     capture = read_capture(films, ReadOptions(clip="pinhole", hold_out=(0,)))
     assert len(capture) == 6
     assert not capture.held_out.any()
-    assert any("3 held-out pictures were left out" in note for note in capture.notes)
+    assert any("3 held-out images were left out" in note for note in capture.notes)
 
 
 def test_cameras_may_lie_side_by_side(films: Path, tmp_path: Path) -> None:
@@ -169,7 +169,7 @@ def test_cameras_with_other_optics_are_refused_by_what_differs(films: Path, tmp_
         read_capture(tmp_path)
 
 
-def test_smaller_pictures_have_shorter_readouts(films: Path) -> None:
+def test_smaller_images_have_shorter_readouts(films: Path) -> None:
     capture = read_capture(films / "cam0" / "bent", ReadOptions(downscale=2))
     # Ten lines became five: line 0 is the mean of lines 0 and 1, the last of 8 and 9.
     before, after = 0.03 * (torch.arange(10).double() / 9 - 0.5), capture.optics.shutter.readout_s

@@ -7,12 +7,12 @@ import pytest
 import torch
 from capture_checks import assert_pose, assert_sees, middle_of_light, projected
 from capture_folders import (
-    blob_picture,
+    blob_image,
     change_json,
     point_at,
     side_point_at,
     write_hypernerf,
-    write_picture,
+    write_image,
 )
 
 from diff4splat.data.capture.split import report_split
@@ -63,8 +63,8 @@ def test_points_lie_in_the_world_of_the_cameras(tmp_path: Path) -> None:
     ],
     ids=str,
 )
-def test_bent_pictures_are_straightened(tmp_path: Path, lens: dict) -> None:
-    cameras = write_hypernerf(tmp_path, count=3, draw=blob_picture, **lens)
+def test_bent_images_are_straightened(tmp_path: Path, lens: dict) -> None:
+    cameras = write_hypernerf(tmp_path, count=3, draw=blob_image, **lens)
     capture = read_capture(tmp_path)
     bent = 0.0
     for index, original in enumerate([0, 2, 4, 1, 3, 5]):
@@ -87,7 +87,7 @@ def test_what_straightening_leaves_empty_does_not_count(tmp_path: Path) -> None:
     assert frame.rgb[0, 0].tolist() == [0, 0, 0]
 
 
-def test_straight_pictures_are_left_as_they_are(tmp_path: Path) -> None:
+def test_straight_images_are_left_as_they_are(tmp_path: Path) -> None:
     write_hypernerf(tmp_path, count=2)
     capture = read_capture(tmp_path)
     assert capture.frames.read(0).counts is None
@@ -101,7 +101,7 @@ def test_without_val_ids_the_usual_rule_holds(tmp_path: Path) -> None:
     assert capture.held_out.tolist() == [False, True] * 4
     for index, original in enumerate(range(0, 16, 2)):
         assert_pose(capture, index, cameras[original])
-    assert "every 4th picture is learnt from" in capture.split_reason
+    assert "every 4th image is learnt from" in capture.split_reason
 
 
 def test_a_camera_can_be_held_out_in_place_of_val_ids(tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_a_camera_can_be_held_out_in_place_of_val_ids(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("downscale", "size"), [(1, (24, 36)), (2, (24, 36)), (4, (12, 18))])
-def test_pictures_of_the_right_size_are_found_or_made(
+def test_images_of_the_right_size_are_found_or_made(
     tmp_path: Path, downscale: int, size: tuple[int, int]
 ) -> None:
     cameras = write_hypernerf(tmp_path, count=2)
@@ -122,7 +122,7 @@ def test_pictures_of_the_right_size_are_found_or_made(
     column, row = cameras[0].straight_px(point_at(0.0))
     assert projected(capture, 0, 0.0) == pytest.approx((column / factor, row / factor))
     assert capture.frames.read(0).rgb.shape == (*size, 3)
-    noted = any("nothing to make pictures at 1/1 from" in note for note in capture.notes)
+    noted = any("nothing to make images at 1/1 from" in note for note in capture.notes)
     assert noted == (downscale == 1)
 
 
@@ -135,11 +135,11 @@ def test_a_side_that_does_not_halve_leaves_the_focal_length_halved(tmp_path: Pat
     assert capture.cameras.focal_px[0].tolist() == pytest.approx(cameras[0].focal_px, abs=1e-9)
 
 
-def test_pictures_at_full_size_are_taken_when_they_are_there(tmp_path: Path) -> None:
+def test_images_at_full_size_are_taken_when_they_are_there(tmp_path: Path) -> None:
     cameras = write_hypernerf(tmp_path, count=2)
     for index in range(4):
         name = f"{'left' if index % 2 == 0 else 'right'}1_{index // 2:06d}.png"
-        write_picture(tmp_path / "rgb" / "1x" / name, np.full((48, 72, 3), index, np.uint8))
+        write_image(tmp_path / "rgb" / "1x" / name, np.full((48, 72, 3), index, np.uint8))
     capture = read_capture(tmp_path)
     assert capture.cameras.size_px == (48, 72)
     assert capture.cameras.focal_px[0].tolist() == pytest.approx(
@@ -201,17 +201,17 @@ def test_names_that_leave_the_folder_are_refused(tmp_path: Path) -> None:
 def test_files_that_are_missing_are_named(tmp_path: Path) -> None:
     write_hypernerf(tmp_path, count=2)
     (tmp_path / "rgb" / "2x" / "left1_000001.png").unlink()
-    with pytest.raises(FileFormatError, match=r"the picture .*left1_000001\.png, got no such file"):
+    with pytest.raises(FileFormatError, match=r"the image .*left1_000001\.png, got no such file"):
         read_capture(tmp_path)
     (tmp_path / "camera" / "left1_000001.json").unlink()
     with pytest.raises(FileFormatError, match=r"left1_000001\.json: expected a JSON file, got no"):
         read_capture(tmp_path)
 
 
-def test_two_pictures_of_one_camera_at_one_time_are_refused(tmp_path: Path) -> None:
+def test_two_images_of_one_camera_at_one_time_are_refused(tmp_path: Path) -> None:
     write_hypernerf(tmp_path, count=3)
     change_json(tmp_path / "metadata.json", lambda root: root["left1_000001"].update(warp_id=0))
-    with pytest.raises(InputError, match="one picture per camera and time, got two of camera 0"):
+    with pytest.raises(InputError, match="one image per camera and time, got two of camera 0"):
         read_capture(tmp_path)
 
 

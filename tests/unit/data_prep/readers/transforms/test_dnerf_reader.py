@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from capture_checks import assert_pose, assert_sees
-from capture_folders import change_json, dnerf_cameras, seer, write_dnerf, write_json, write_picture
+from capture_folders import change_json, dnerf_cameras, seer, write_dnerf, write_image, write_json
 
 from diff4splat.data.capture.split import report_split
 from diff4splat.data_prep.readers.options import ReadOptions
@@ -45,12 +45,12 @@ def test_transparency_lies_over_white_or_what_was_asked_for(folder: Path) -> Non
 
 def test_half_transparent_pixels_are_mixed(folder: Path) -> None:
     rgba = np.full((24, 36, 4), 102, np.uint8)
-    write_picture(folder / "train" / "r_000.png", rgba)
+    write_image(folder / "train" / "r_000.png", rgba)
     level = float(read_capture(folder).frames.read(0).rgb[5, 5, 1])
     assert level == pytest.approx(0.4 * 0.4 + 0.6)
 
 
-def test_pictures_without_transparency_have_no_known_background(tmp_path: Path) -> None:
+def test_images_without_transparency_have_no_known_background(tmp_path: Path) -> None:
     assert read_capture(write_dnerf(tmp_path, alpha=False)).background is None
 
 
@@ -65,7 +65,7 @@ def test_val_can_be_held_out_in_place_of_test(folder: Path) -> None:
         read_capture(folder, ReadOptions(hold_out=(0,)))
 
 
-def test_without_test_pictures_val_or_else_every_eighth_time_is_held_out(tmp_path: Path) -> None:
+def test_without_test_images_val_or_else_every_eighth_time_is_held_out(tmp_path: Path) -> None:
     with_val = read_capture(write_dnerf(tmp_path / "a", ("train", "val")))
     assert "transforms_val.json" in with_val.split_reason
     alone = write_dnerf(tmp_path / "b", ("train",))
@@ -136,15 +136,15 @@ def test_files_that_make_no_sense_are_refused(folder: Path) -> None:
         read_capture(folder)
 
 
-def test_pictures_of_different_sizes_are_named(folder: Path) -> None:
-    write_picture(folder / "train" / "r_002.png", np.zeros((20, 36, 4), np.uint8))
+def test_images_of_different_sizes_are_named(folder: Path) -> None:
+    write_image(folder / "train" / "r_002.png", np.zeros((20, 36, 4), np.uint8))
     with pytest.raises(
         FileFormatError, match=r"r_002\.png: .*36 x 24, got 36 x 20: images of diff"
     ):
         read_capture(folder)
 
 
-def test_two_pictures_of_one_time_are_of_two_cameras(folder: Path) -> None:
+def test_two_images_of_one_time_are_of_two_cameras(folder: Path) -> None:
     change_json(
         folder / "transforms_train.json",
         lambda root: [frame.update(time=(i // 2) / 2) for i, frame in enumerate(root["frames"])],
@@ -156,7 +156,7 @@ def test_cameras_that_stand_are_told_by_their_poses(tmp_path: Path) -> None:
     frames = []
     for index in range(8):
         camera = seer(0.4 * (index % 2), focal_px=(30.0, 30.0), center_px=(18.0, 12.0))
-        write_picture(tmp_path / f"{index}.png", np.zeros((24, 36, 3), np.uint8))
+        write_image(tmp_path / f"{index}.png", np.zeros((24, 36, 3), np.uint8))
         frames.append(
             {"file_path": str(index), "time": index // 2, "transform_matrix": camera.opengl()}
         )
@@ -171,8 +171,8 @@ def test_one_standing_camera_is_refused(tmp_path: Path) -> None:
     pose = seer(0.1).opengl()
     frames = []
     for index in range(4):
-        write_picture(tmp_path / f"{index}.png", np.zeros((24, 36, 3), np.uint8))
+        write_image(tmp_path / f"{index}.png", np.zeros((24, 36, 3), np.uint8))
         frames.append({"file_path": str(index), "time": index / 3, "transform_matrix": pose})
     write_json(tmp_path / "transforms_train.json", {"camera_angle_x": 1.0, "frames": frames})
-    with pytest.raises(InputError, match="pictures from at least two places, got one standing"):
+    with pytest.raises(InputError, match="images from at least two places, got one standing"):
         read_capture(tmp_path)

@@ -8,13 +8,13 @@ import pytest
 import torch
 from capture_checks import assert_pose, assert_sees, middle_of_light, projected
 from capture_folders import (
-    blob_picture,
+    blob_image,
     change_json,
     point_at,
     rig_cameras,
     side_point_at,
+    write_image,
     write_json,
-    write_picture,
     write_transforms,
 )
 
@@ -55,7 +55,7 @@ def test_a_rig_misses_a_whole_camera(tmp_path: Path) -> None:
     for time in range(4):
         for number, camera in enumerate(rig_cameras(3)):
             name = f"{number}/{time}.png"
-            write_picture(tmp_path / name, np.zeros((24, 36, 3), np.uint8))
+            write_image(tmp_path / name, np.zeros((24, 36, 3), np.uint8))
             frame = {"file_path": name, "time": time / 4, "transform_matrix": camera.opengl()}
             frames.append(frame)
     write_json(tmp_path / "transforms.json", {"fl_x": 30, "frames": frames})
@@ -104,7 +104,7 @@ def test_missing_times_are_named_unless_a_rate_is_given(tmp_path: Path) -> None:
         read_capture(tmp_path, ReadOptions(fps=4.0))
 
 
-def test_two_pictures_of_one_place_and_time_are_two_cameras_in_vain(tmp_path: Path) -> None:
+def test_two_images_of_one_place_and_time_are_two_cameras_in_vain(tmp_path: Path) -> None:
     write_transforms(tmp_path)
     change_json(
         tmp_path / "transforms.json",
@@ -114,9 +114,9 @@ def test_two_pictures_of_one_place_and_time_are_two_cameras_in_vain(tmp_path: Pa
         report_split(read_capture(tmp_path, ReadOptions(hold_out=(1,))))
 
 
-def test_bent_pictures_are_straightened(tmp_path: Path) -> None:
+def test_bent_images_are_straightened(tmp_path: Path) -> None:
     lens = {"radial": (-0.2, 0.1, 0.0), "tangential": (0.02, 0.01)}
-    cameras = write_transforms(tmp_path, count=4, draw=blob_picture, **lens)
+    cameras = write_transforms(tmp_path, count=4, draw=blob_image, **lens)
     capture = read_capture(tmp_path)
     for index, camera in enumerate(cameras):
         at = projected(capture, index, index / 10, side_point_at)
@@ -159,7 +159,7 @@ def test_points_of_the_file_are_read(tmp_path: Path) -> None:
         ({"frames": []}, "expected 1 to 100000 camera poses, got none"),
         ({"frames": None}, "expected a list under 'frames', got nothing"),
         ({"depth_unit_scale_factor": "mm"}, "'depth_unit_scale_factor': expected a number"),
-        ({"h": 30}, "expected a picture shaped as its camera, 36 x 30, got 36 x 24"),
+        ({"h": 30}, "expected an image shaped as its camera, 36 x 30, got 36 x 24"),
         ({"fl_x": float("inf")}, "'fl_x': expected a finite number, got inf"),
         ({"fl_x": -1}, "expected focal lengths above 0"),
     ],
@@ -171,24 +171,22 @@ def test_files_that_make_no_sense_are_refused(tmp_path: Path, change: dict, mess
         read_capture(tmp_path)
 
 
-def test_damaged_pictures_are_named(tmp_path: Path) -> None:
+def test_damaged_images_are_named(tmp_path: Path) -> None:
     write_transforms(tmp_path, count=3)
     file = tmp_path / "images" / "frame_00002.png"
     whole = file.read_bytes()
     file.write_bytes(whole[:-30])
     capture = read_capture(tmp_path)
-    with pytest.raises(FileFormatError, match=r"frame_00002\.png: expected a whole picture"):
+    with pytest.raises(FileFormatError, match=r"frame_00002\.png: expected a whole image"):
         capture.frames.read(1)
     file.write_bytes(b"")
-    with pytest.raises(
-        FileFormatError, match=r"frame_00002\.png: expected a picture, got an empty"
-    ):
+    with pytest.raises(FileFormatError, match=r"frame_00002\.png: expected an image, got an empty"):
         read_capture(tmp_path)
-    write_picture(file, np.zeros((24, 36, 3), np.uint8))
+    write_image(file, np.zeros((24, 36, 3), np.uint8))
     cv2.imwrite(str(file), np.zeros((24, 36, 3), np.uint16))
     with pytest.raises(FileFormatError, match="expected 8 bits per channel, got more"):
         read_capture(tmp_path).frames.read(1)
-    write_picture(file, np.zeros((12, 18, 3), np.uint8))
+    write_image(file, np.zeros((12, 18, 3), np.uint8))
     with pytest.raises(FileFormatError, match=r"frame_00002\.png: .*images of different sizes"):
         read_capture(tmp_path)
 

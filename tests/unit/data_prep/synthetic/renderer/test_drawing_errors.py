@@ -62,7 +62,7 @@ def test_cameras_must_fit_the_times_and_each_other() -> None:
     with pytest.raises(ConfigError, match="expected cameras for 2 > 0 frames"):
         draw_clip(world, SETTINGS)
     sizes = [oracle.straight(2, (6, 8)), oracle.straight(2, (8, 6))]
-    with pytest.raises(ConfigError, match="expected one picture size"):
+    with pytest.raises(ConfigError, match="expected one image size"):
         draw_clip(replace(world, views=tuple(sizes)), SETTINGS)
     with pytest.raises(ConfigError, match="expected at least one camera"):
         draw_clip(replace(world, views=()), SETTINGS)

@@ -1,4 +1,4 @@
-"""Light on its way to the picture: haze, bytes, and what hides a point from the camera."""
+"""Light on its way to the image: haze, bytes, and what hides a point from the camera."""
 
 from dataclasses import replace
 

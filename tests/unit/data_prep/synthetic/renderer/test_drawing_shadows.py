@@ -15,7 +15,7 @@ GRAY = {"colors": np.full((2, 3), 0.4)}
 
 
 def from_above(objects, toward, softness: float = 0.0, sun: float = 1.0, **changes) -> np.ndarray:
-    """Brightness of a picture from 8 m above the origin that shows 8 m × 8 m of the ground."""
+    """Brightness of an image from 8 m above the origin that shows 8 m × 8 m of the ground."""
     camera = oracle.straight(1, SIZE)
     camera.world_from_camera[0, :3, :3] = oracle.looking_down()
     camera.world_from_camera[0, :3, 3] = oracle.torch.tensor([0.0, -8.0, 0.0])

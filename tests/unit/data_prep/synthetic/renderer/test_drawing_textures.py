@@ -72,12 +72,12 @@ def test_far_away_a_texture_is_nearly_its_mean(family: str) -> None:
     assert np.abs(far[:, :3].mean(0) - near[:, :3].mean(0)).max() < 0.25
 
 
-def test_noise_has_the_spectrum_of_natural_pictures() -> None:
+def test_noise_has_the_spectrum_of_natural_images() -> None:
     slopes = []
     for seed in range(6):
-        picture = values_of("noise", plane(128, 1 / 12), 1 / 24, seed)[:, 0].reshape(128, 128)
+        image = values_of("noise", plane(128, 1 / 12), 1 / 24, seed)[:, 0].reshape(128, 128)
         window = np.hanning(128)
-        spectrum = np.abs(np.fft.fft2((picture - picture.mean()) * np.outer(window, window)))
+        spectrum = np.abs(np.fft.fft2((image - image.mean()) * np.outer(window, window)))
         f = np.fft.fftfreq(128) * 128
         radius = np.hypot(f[:, None], f[None])
         bands = [(low, low * 1.5) for low in (4, 6, 9, 13, 20)]

@@ -32,7 +32,7 @@ SHAPE_COLUMNS = 6
 @dataclass
 class Drawn:
     plan: object
-    found: forward.Footprints
+    footprints: forward.Footprints
     filled: forward.Filled
     values: np.ndarray
     image: PaddedImage
@@ -58,8 +58,8 @@ def draw(own: RenderSettings, channels: int, spread_px: float = 5.0, opacity: fl
 
 def exact(drawn: Drawn, own: RenderSettings) -> tuple[Tensor, ...]:
     """(shape, values, planes, light behind each, unsure), differentiable in the first two."""
-    order = drawn.found.order
-    shape = torch.from_numpy(drawn.found.prints[order][:, :SHAPE_COLUMNS]).requires_grad_()
+    order = drawn.footprints.order
+    shape = torch.from_numpy(drawn.footprints.prints[order][:, :SHAPE_COLUMNS]).requires_grad_()
     values = torch.from_numpy(drawn.values[order]).double().requires_grad_()
     weight, light, unsure = weights(responses(shape, CAMERA.size_px), own)
     return shape, values, blend(weight, values), light, unsure
@@ -79,7 +79,7 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 @pytest.mark.parametrize("channels", [3, 4, 7])
-def test_pictures_and_gradients(case: tuple, channels: int) -> None:
+def test_images_and_gradients(case: tuple, channels: int) -> None:
     changes, spread_px, opacity = case
     own = RenderSettings(**changes)
     drawn = draw(own, channels, spread_px, opacity)
@@ -96,7 +96,7 @@ def test_pictures_and_gradients(case: tuple, channels: int) -> None:
     loss = (incoming[..., :-1] * want).sum() + (incoming[..., -1] * light[-1]).sum()
     to_shape, to_values = torch.autograd.grad(loss, (shape, values))
     moments, got_values = backward(drawn, incoming)
-    order = drawn.found.order
+    order = drawn.footprints.order
     got_shape = shape_gradient(shape.detach(), moments[order].double())
     for column in range(SHAPE_COLUMNS):
         assert_gradients_agree(got_shape[:, column], to_shape[:, column], f"column {column}", 3e-5)
@@ -113,14 +113,14 @@ def backward(drawn: Drawn, incoming: Tensor) -> tuple[Tensor, Tensor]:
     slots = np.full((len(lists.members), MOMENTS + drawn.values.shape[1]), np.nan, np.float32)
     tiles = np.arange(grid.rows * grid.columns)
     blend_backward(
-        tiles, grid, lists, drawn.found.prints, drawn.values, drawn.plan.rules,
+        tiles, grid, lists, drawn.footprints.prints, drawn.values, drawn.plan.rules,
         drawn.image.light, drawn.image.stops, padded.reshape(-1), slots,
     )  # fmt: skip
     # Every slot is written, those of Gaussians that nobody looked at with zeros.
     assert np.isfinite(slots).all()
     moments = np.zeros((COUNT, MOMENTS), np.float32)
     values = np.zeros(drawn.values.shape, np.float32)
-    order = drawn.found.order
+    order = drawn.footprints.order
     sum_slots(0, len(order), order, drawn.filled.first_slots, slots, moments, values)
     unseen = np.setdiff1d(np.arange(COUNT), order)
     assert not moments[unseen].any() and not values[unseen].any()
@@ -134,7 +134,7 @@ def test_pixels_stop_where_the_light_runs_out(cutoff: float) -> None:
     _, _, _, light, unsure = exact(drawn, own)
     dark = (light < cutoff).numpy()
     # The list of the only tile holds the Gaussians that reach it, nearest first.
-    rank = {index: position for position, index in enumerate(drawn.found.order.tolist())}
+    rank = {index: position for position, index in enumerate(drawn.footprints.order.tolist())}
     ranks = np.array([rank[index] for index in drawn.filled.lists.members.tolist()])
     positions = np.searchsorted(ranks, dark.argmax(0)) + 1
     stops = drawn.image.cropped(drawn.image.stops)[0].numpy()
@@ -151,7 +151,7 @@ def test_medians_are_indices_of_gaussians() -> None:
     _, _, _, light, unsure = exact(drawn, own)
     near_half = ((light.detach() - 0.5).abs() < 1e-4).any(0)
     half = (light <= 0.5).numpy()
-    want = np.where(half.any(0), drawn.found.order[half.argmax(0)], -1)
+    want = np.where(half.any(0), drawn.footprints.order[half.argmax(0)], -1)
     got = drawn.image.cropped(drawn.image.medians)[0].numpy()
     sure = ~(unsure | near_half).numpy()
     np.testing.assert_array_equal(got[sure], want[sure])

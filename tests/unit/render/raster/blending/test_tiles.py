@@ -129,7 +129,7 @@ def test_lists_hold_little_else(tile_px: int, spread_px: float) -> None:
         if not meets_rectangle(exact[index], box, own.alpha_cutoff)
     ]
     assert len(useless) <= 0.02 * len(pairs)
-    # Inside the picture, lists are made for whole pixels: nobody is a pixel off.
+    # Inside the image, lists are made for whole pixels: nobody is a pixel off.
     for index, (x0, y0, x1, y1) in useless:
         x, y, *_, extent_x, extent_y = found.prints[index]
         if abs(x - 45.5) + extent_x < 45.5 and abs(y - 33.5) + extent_y < 33.5:

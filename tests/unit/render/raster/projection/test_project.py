@@ -57,7 +57,7 @@ def project(
 
 
 def scattered(count: int = 60, seed: int = 0) -> Gaussians:
-    """On the picture, beyond it, and beyond the guard band."""
+    """On the image, beyond it, and beyond the guard band."""
     gaussians = cloud(count, seed, spread_px=12.0)
     return replace(gaussians, means=gaussians.means * torch.tensor([2.5, 2.5, 1.0]))
 

@@ -8,9 +8,9 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles_trace import as_array, bundle, covariance, motion, picture, scene
+from oracles_trace import as_array, bundle, covariance, image, motion, scene
 
-from diff4splat.render.trace.bvh.boxes import Boxes, boxes_between, united
+from diff4splat.render.trace.bvh.boxes import Boxes, swept_boxes, united
 from diff4splat.render.trace.bvh.radix_sort import hilbert, sorted_order
 from diff4splat.render.trace.bvh.tree import build_tree
 from diff4splat.render.trace.forward import make_inputs, make_rules, make_scene, shade_rays
@@ -67,7 +67,7 @@ def test_boxes_touch_the_ellipsoids_where_alpha_is_the_cutoff(degree: int) -> No
         sigma = covariance(as_array(cloud.quats)[i], as_array(cloud.scales)[i])
         half = np.sqrt(squared * np.diag(sigma))
         reach = np.array([math.sqrt(squared)])
-        made = boxes_between(world.primitives[i : i + 1], reach, 0.0, 0.0)
+        made = swept_boxes(world.primitives[i : i + 1], reach, 0.0, 0.0)
         np.testing.assert_allclose(made.upper[0], as_array(cloud.means)[i] + half, rtol=1e-6)
         np.testing.assert_allclose(made.lower[0], as_array(cloud.means)[i] - half, rtol=1e-6)
 
@@ -76,8 +76,8 @@ def test_swept_boxes_hold_every_time_between_and_no_more() -> None:
     cloud, moving = scene(20, dtype=torch.float32), motion(20, dtype=torch.float32)
     world = scene_of(cloud, rules_of(), moving, np.array([0.0, 1.0], np.float32))
     reach = np.full(20, 2.0)
-    swept = boxes_between(world.primitives, reach, -0.5, 2.0)
-    frozen = [boxes_between(world.primitives, reach, t, t) for t in np.linspace(-0.5, 2.0, 7)]
+    swept = swept_boxes(world.primitives, reach, -0.5, 2.0)
+    frozen = [swept_boxes(world.primitives, reach, t, t) for t in np.linspace(-0.5, 2.0, 7)]
     around = united(frozen)
     np.testing.assert_allclose(around.lower, swept.lower)
     np.testing.assert_allclose(around.upper, swept.upper)
@@ -187,7 +187,7 @@ def test_the_tree_finds_all_hits(name: str) -> None:
     )
     cloud = replace(cloud, scales=0.3 * cloud.scales)
     if name in ("pinhole", "lens"):
-        rays = picture((20, 25), 15.0, torch.float32, 0.05 * (name == "lens"))
+        rays = image((20, 25), 15.0, torch.float32, 0.05 * (name == "lens"))
     if name == "moving":
         rays, moving = (
             bundle(300, dtype=torch.float32, times=True),

@@ -27,7 +27,7 @@ def turn(seed: int) -> np.ndarray:
 
 
 def looks(side: int, samples: int) -> np.ndarray:
-    """Unit directions through a square picture, ``samples`` of each."""
+    """Unit directions through a square image, ``samples`` of each."""
     edge = (np.arange(side) + 0.5) / side - 0.5
     x, y = (part.reshape(-1, 1).repeat(samples, 1).ravel() for part in np.meshgrid(edge, edge))
     ways = np.stack([x, y, np.ones_like(x)], 1)

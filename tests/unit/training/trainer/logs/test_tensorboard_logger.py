@@ -38,7 +38,7 @@ def test_a_full_disk_ends_the_curves_with_one_note(monkeypatch: pytest.MonkeyPat
     curves.scalars(0, {"a": 1.0, "b": None, "c": 2.0})
     assert notes == []
     curves.scalars(1, {"a": 1.0, "c": 2.0})
-    curves.picture(1, torch.zeros(2, 2, 3))
+    curves.image(1, torch.zeros(2, 2, 3))
     curves.close()
     said = "tensorboard: no more curves (No space left on device); the numbers are in log.jsonl"
     assert notes == [said]

@@ -1,4 +1,4 @@
-"""Pictures of the CPU kernels against float64: two nested loops, and a dense table."""
+"""Images of the CPU kernels against float64: two nested loops, and a dense table."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def exact(gaussians: Gaussians, camera: Camera, own: RenderSettings) -> Dense:
 
 
 def assert_right(made: RenderOutput, want: Dense, least_db: float = 120.0) -> None:
-    """Every picture that was made, pixel by pixel and in the mean."""
+    """Every image that was made, pixel by pixel and in the mean."""
     assert want.unsure_share < 0.03
     for name in OUTPUTS:
         got = getattr(made, name)
@@ -96,7 +96,7 @@ def test_the_table_agrees_with_the_loops() -> None:
 
 @pytest.mark.parametrize("spread_px", [1.0, 9.0])
 @pytest.mark.parametrize("changes", ALL.values(), ids=ALL)
-def test_every_picture_is_right(changes: dict, spread_px: float) -> None:
+def test_every_image_is_right(changes: dict, spread_px: float) -> None:
     gaussians = cloud(150, bands=16, spread_px=spread_px)
     own = RenderSettings(flow_camera=LATER, features=torch.rand(150, 2), **changes)
     made = render(gaussians, CAMERA, outputs=OUTPUTS, settings=own, backend="raster")
@@ -131,7 +131,7 @@ def test_features_alone(channels: int) -> None:
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
-def test_a_picture_has_the_same_bits_alone_and_in_company(name: str) -> None:
+def test_an_image_has_the_same_bits_alone_and_in_company(name: str) -> None:
     gaussians = cloud(100, bands=4)
     own = {"flow_camera": LATER, "features": torch.randn(100, 3)}
     alone = render_raster(gaussians, CAMERA, name, **own)
@@ -151,7 +151,7 @@ def test_no_light_is_made_or_lost() -> None:
 
 
 @pytest.mark.parametrize("tile_px", TILE_SIZES_PX)
-def test_tile_sizes_do_not_change_the_picture(tile_px: int) -> None:
+def test_tile_sizes_do_not_change_the_image(tile_px: int) -> None:
     gaussians = cloud(400, spread_px=3.0)
     plain = render_raster(gaussians, CAMERA, "rgb", "depth")
     other = render_raster(gaussians, CAMERA, "rgb", "depth", tile_px=tile_px)

@@ -32,7 +32,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CaptureDraft:
+class UndecodedCapture:
     """A capture with undecoded images."""
 
     name: str
