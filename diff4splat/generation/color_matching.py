@@ -7,7 +7,7 @@ what that pixel shows most of. So iteration on the render itself undoes the blur
     colour_i += step_i,    step = ρ step + σ (image − render)
 
 The factors are those of the Chebyshev iteration for eigenvalues of the blur in [SMALLEST_SHARE, 1]
-(Saad 2003, §12.3.2). Five of its steps give what twelve plain ones do (σ = 1, ρ = 0). Colours stay
+(Saad 2003, §12.3.2). Seven of its steps give what twelve plain ones do (σ = 1, ρ = 0). Colours stay
 in [0, 1]: what sharpens the input view must not ring in other views.
 """
 

@@ -64,7 +64,7 @@ class GenerationSettings:
     min_opacity: float = MIN_OPACITY
     static_threshold_px: float = 0.05
     """Gaussians that never move by more than this many pixels of the input view are static."""
-    color_matching_steps: int = 5
+    color_matching_steps: int = 7
     """Corrections of the image's colours against the rendered input view; 0 switches off."""
 
     def __post_init__(self) -> None:
