@@ -1,4 +1,4 @@
-"""Rooms, table tops and courtyards: floors, walls with skirting, windows, doors, images, rugs.
+"""Rooms, table tops and courtyards: floors, walls with skirting, windows, doors, pictures, rugs.
 
 A room has no wall behind the cameras and no ceiling, so that one light from outside reaches it and
 every view looks in. The walls keep a distance from all cameras.
@@ -102,13 +102,13 @@ def wall_object(family: str, shape: Shape, walls: Walls, size_m: float = 1.0) ->
 
 
 def decoration(walls: Walls, rng: Rng) -> list[PlacedObject]:
-    """Windows, images and a door on the back and side walls, where they do not overlap."""
+    """Windows, pictures and a door on the back and side walls, where they do not overlap."""
     found = []
     for side in ("back", "left", "right"):
         low, high = _span(walls, side)
         place = low + rng.uniform(0.3, 0.9)
         while place < high - 0.5:
-            make = rng.weighted_choice((_image, _window, _door, None), (2.0, 1.2, 0.6, 1.2))
+            make = rng.weighted_choice((_picture, _window, _door, None), (2.0, 1.2, 0.6, 1.2))
             width = rng.uniform(0.5, 1.1)
             if make is not None and place + width < high - 0.2:
                 shape = make(width, walls, rng)
@@ -141,7 +141,7 @@ def _frame(width: float, height: float, low: float, bar: float, cross: bool):
     return boxes([*rails, *posts, *middle], 0.004)
 
 
-def _image(width: float, walls: Walls, rng: Rng) -> Shape:
+def _picture(width: float, walls: Walls, rng: Rng) -> Shape:
     height, low = width * rng.uniform(0.65, 1.35), rng.uniform(0.95, 1.25)
     canvas = box((width - 0.04, height - 0.04, 0.012), 0.002).at(0.0, -low - 0.02, -0.006)
     return several(picture=canvas, wood=_frame(width, height, low, 0.035, False))
