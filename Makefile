@@ -7,7 +7,10 @@ BIN := $(VENV)/bin
 PARALLEL := OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 PROMPT ?= in a meadow, a turquoise rounded block slides to the left
 
-.PHONY: demo test test-all lint clean
+COUNT ?= 10000
+SEED ?= 0
+
+.PHONY: demo test test-all test-browser fuzz lint clean
 
 $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -18,10 +21,10 @@ $(VENV)/ready: pyproject.toml setup.py constraints.txt
 demo: $(VENV)/ready  ## a drawn world's first picture to a scene that moves; PHOTO=mine.jpg takes yours too
 	$(BIN)/python examples/make_world_picture.py demo/picture.jpg
 	$(BIN)/diff4splat generate demo/picture.jpg --camera arc:0.2 --prompt "$(PROMPT)" --out demo/scene
-	@echo "look at demo/scene/preview.png and demo/scene/video.mp4"
+	@echo "look at demo/scene/preview.png and the video beside it"
 ifdef PHOTO
 	$(BIN)/diff4splat generate $(PHOTO) --camera arc:0.2 --out demo/photo-scene
-	@echo "look at demo/photo-scene/preview.png and demo/photo-scene/video.mp4"
+	@echo "look at demo/photo-scene/preview.png and the video beside it"
 endif
 
 test: $(VENV)/ready  ## in less than ten minutes on two cores: all that needs no GPU and is not marked slow
@@ -29,6 +32,14 @@ test: $(VENV)/ready  ## in less than ten minutes on two cores: all that needs no
 
 test-all: $(VENV)/ready  ## the same and the slow tests
 	$(PARALLEL) $(BIN)/pytest -q -n auto --dist loadfile
+
+test-browser: $(VENV)/ready  ## the viewer's page in Chromium, which must be installed
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[browser]'
+	$(PARALLEL) $(BIN)/pytest -q tests/browser
+
+fuzz: $(VENV)/ready  ## damaged files for every reader; READER=ply COUNT=500 SEED=3 narrow it down
+	PYTHONPATH=tests:tests/support OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m fuzz \
+		--count $(COUNT) --seed $(SEED) $(if $(READER),--reader "$(READER)")
 
 lint: $(VENV)/ready
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""What pictures lose in the autoencoder: held-out clips and photographs, to latents and back.
+"""What images lose in the autoencoder: held-out clips and photographs, to latents and back.
 
 Run ``python benchmarks/autoencoder.py --clips 16 --out FILE.md``; prints Markdown. Clips are the
 first ones of ``held_out_v2``, every second frame, at the model's own size and at twice that; a

@@ -1,10 +1,10 @@
 """How good could a scene be? True depth and true colours of the nearest given frame, as Gaussians.
 
 Run ``python benchmarks/bounds.py --items 16 --out FILE.md``: every pixel of the given frame nearest
-in time stands at its true depth; where the judged camera looks past all of them it sees the best
+in time stands at its true depth; where the evaluated camera looks past all of them it sees the best
 plane. No network takes part, nothing has to be guessed but what the frame does not show. The rest
 is resampling, hidden places and motion between two frames. With ``--task generation`` the first
-picture is all that is given, and nothing moves.
+image is all that is given, and nothing moves.
 
 Axes: ``h w`` pixels.
 """
@@ -41,7 +41,7 @@ ROWS = ("best plane (oracle)", "true depth and colours, plane behind")
 def true_picture(
     case: EvalSample, pair: Pair, behind: Float[Tensor, "h w 3"]
 ) -> Float[Tensor, "h w 3"]:
-    """The judged camera's view of the nearest given frame at its true depth."""
+    """The evaluated camera's view of the nearest given frame at its true depth."""
     frame = case.nearest_input(pair[1])
     cameras = case.input_view.cameras[slice(frame, frame + 1)].to(torch.float32)
     depth = case.input_view.depth[frame].float()
@@ -84,7 +84,7 @@ def main() -> None:
 
 
 def both(case: EvalSample, plane: Prediction) -> dict[str, tuple[float, float]]:
-    """Mean PSNR over the judged pictures: whole, and where the input shows something."""
+    """Mean PSNR over the evaluated images: whole, and where the input shows something."""
     scores: dict[str, list[tuple[float, float]]] = {row: [] for row in ROWS}
     masks = covisible_masks(case)
     for pair, mask in zip(case.targets.pairs, masks, strict=True):
@@ -100,7 +100,7 @@ def both(case: EvalSample, plane: Prediction) -> dict[str, tuple[float, float]]:
 def scored(
     picture: Float[Tensor, "h w 3"], truth: Float[Tensor, "h w 3"], mask: Tensor
 ) -> tuple[float, float]:
-    """PSNR of the picture, and of its masked pixels."""
+    """PSNR of the image, and of its masked pixels."""
     return float(psnr(picture, truth)), float(psnr(picture[mask][None], truth[mask][None]))
 
 

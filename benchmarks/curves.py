@@ -43,11 +43,11 @@ def draw(axes, stage: str, rows: list[dict]) -> None:
             axes.plot([row["step"] for row in shown], values, label=term, linewidth=1.2)
     axes.set_yscale("log")
     axes.set_xlabel("step")
-    judged = [row for row in rows if row["event"] == "evaluation"]
+    evaluations = [row for row in rows if row["event"] == "evaluation"]
     said = [
-        f"{title} {judged[-1][key]:.3g}"
+        f"{title} {evaluations[-1][key]:.3g}"
         for key, title in MEASURES.items()
-        if judged and key in judged[-1]
+        if evaluations and key in evaluations[-1]
     ]
     axes.set_title("\n".join([stage, ", ".join(said[:2]), *said[2:]]), fontsize=9)
     axes.legend(fontsize=7)

@@ -8,7 +8,7 @@ with ``--pictures FOLDER`` writes a strip of each as it came out. Every photogra
     orbit          least share of a frame that shows something, 15 degrees to both sides, and
                    whether every number is finite
     geometry       median error of the measured optical flow (OpenCV DIS, textured half of the
-                   picture) against the flow of the predicted depth, after a step to the left
+                   image) against the flow of the predicted depth, after a step to the left
     file, PLY      PSNR of a frame rendered from the re-read file against the one in memory
     same bits      whether a second run with the same seed gives an equal scene file
 """

@@ -1,8 +1,8 @@
-"""What frames of a video cost beside pictures made one by one.
+"""What frames of a video cost beside images made one by one.
 
 Run ``python benchmarks/videos.py``. The scene is a cloud of 100,000 Gaussians at 512² of which a
-share moves by nine cubic key frames: those nearest to the middle of the picture. The camera stands
-or slides sideways. Videos and single pictures alternate, and the best of the rounds counts.
+share moves by nine cubic key frames: those nearest to the middle of the image. The camera stands
+or slides sideways. Videos and single images alternate, and the best of the rounds counts.
 """
 
 import os
@@ -79,7 +79,7 @@ def best_ms(work: Callable[[], object], best: float) -> float:
 
 @torch.no_grad()
 def measure(scene: Scene) -> tuple[float, float]:
-    """Milliseconds per frame of a video, and of pictures one by one."""
+    """Milliseconds per frame of a video, and of images one by one."""
     times_s = scene.path.times_s.tolist()
 
     def together() -> None:

@@ -9,6 +9,7 @@ from diff4splat.configs.paper import paper_recipe
 from diff4splat.configs.small import small_recipe
 from diff4splat.configs.test import test_recipe
 from diff4splat.errors import ConfigError
+from diff4splat.io.require_file import read_text
 from diff4splat.training.recipe.data import DataSettings, SourceSettings
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.recipe_json import recipe_from_json
@@ -38,14 +39,7 @@ def find_recipe(name_or_file: str) -> Recipe:
     if not name_or_file.endswith(".json"):
         return recipe_by_name(name_or_file)
     try:
-        text = Path(name_or_file).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"--config {name_or_file}: expected a recipe in JSON, got a file that cannot be read; "
-            "check the path"
-        ) from error
-    try:
-        return recipe_from_json(text)
+        return recipe_from_json(read_text(Path(name_or_file), "a recipe in JSON", ConfigError))
     except ConfigError as error:
         raise ConfigError(f"--config {name_or_file}: {error}") from error
 

@@ -1,9 +1,8 @@
 """Agreement of every clip of a folder with itself, as one table."""
 
-from dataclasses import fields, replace
+import statistics
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-
-import torch
 
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
@@ -13,6 +12,8 @@ from diff4splat.data.consistency_check import (
     MEASURED,
     Consistency,
     Tolerances,
+    checked_value,
+    consistency_limits,
     require_consistency,
 )
 from diff4splat.errors import ConfigError, InputError
@@ -22,8 +23,16 @@ USUAL_SIDE_PX, THIN_SHARE = 128, 0.05
 """At this image side, as many points may lie on leaves and posts thinner than a pixel."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Checked:
+    """One clip's figures, and what they may be."""
+
+    figures: Consistency
+    tolerances: Tolerances
+
+
 def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
-    """The worst figure of each kind over the clips; ``most`` of them, spread evenly.
+    """A table of each figure beside its limit, and a verdict; ``most`` clips, spread evenly.
 
     Raises:
         ConfigError: ``most`` is below 1.
@@ -40,7 +49,9 @@ def check_folder(folder: Path, most: int | None, phases: Phases) -> str:
     with phases.phase("check clips", len(places)) as advance:
         for place in places:
             clip = clips.clip(place)
-            found.append(require_consistency(clip, tolerances_for(clip)))
+            tolerances = tolerances_for(clip)
+            figures = require_consistency(clip, tolerances)
+            found.append(_Checked(figures=figures, tolerances=tolerances))
             advance()
     return _table(found)
 
@@ -57,22 +68,31 @@ def tolerances_for(clip: Clip) -> Tolerances:
     return replace(EXACT, visible_share=1 - THIN_SHARE * coarser)
 
 
-def _table(found: list[Consistency]) -> str:
-    lines = ["| compared | worst of all clips | median clip | comparisons |", "|---|---|---|---|"]
-    lines += [
-        _row(field.name, [figure for one in found if (figure := getattr(one, field.name))])
-        for field in fields(Consistency)
+def _table(found: list[_Checked]) -> str:
+    header = "| compared | worst clip | limit | median clip | comparisons |"
+    names = [field.name for field in fields(Consistency)]
+    rows = [_row(name, [one for one in found if getattr(one.figures, name)]) for name in names]
+    count = "1 clip holds" if len(found) == 1 else f"all {len(found):,} clips hold"
+    return "\n".join(
+        [header, "|---|---|---|---|---|", *rows, "", f"consistent: {count} every limit"]
+    )
+
+
+def _row(name: str, clips: list[_Checked]) -> str:
+    if not clips:
+        return f"| {name} | – | – | – | 0 |"
+    values = [checked_value(one.figures, name, one.tolerances) for one in clips]
+    limits = [
+        limit
+        for one in clips
+        for check, limit, _ in consistency_limits(one.tolerances)
+        if check == name
     ]
-    return "\n".join(lines)
-
-
-def _row(name: str, figures: list) -> str:
-    if not figures:
-        return f"| {name} | – | – | 0 |"
-    count = sum(figure.count for figure in figures)
+    figures = [getattr(one.figures, name) for one in clips]
+    count, median = sum(figure.count for figure in figures), statistics.median(values)
     if isinstance(figures[0], TrueFraction):
-        shares = torch.tensor([figure.share for figure in figures])
-        return f"| {name} | {shares.min():.4f} agree | {shares.median():.4f} agree | {count:,} |"
-    worst = torch.tensor([figure.max for figure in figures])
-    middle = torch.tensor([figure.median for figure in figures])
-    return f"| {name} | {worst.max():.2e} | {middle.median():.2e} | {count:,} |"
+        return (
+            f"| {name} | {min(values):.4f} agree | at least {min(limits):.3g} "
+            f"| {median:.4f} agree | {count:,} |"
+        )
+    return f"| {name} | {max(values):.2e} | at most {max(limits):.3g} | {median:.2e} | {count:,} |"

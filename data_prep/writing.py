@@ -8,6 +8,7 @@ import multiprocessing
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from diff4splat.data_prep.synthetic.renderer.jit import GROUP as DRAWING
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.errors import ConfigError
+from diff4splat.progress.interrupts import uninterrupted
 from diff4splat.progress.phases import Phases
 from diff4splat.progress.precompile import ensure_precompiled
 
@@ -60,7 +62,8 @@ def write_worlds(job: WorldJob, phases: Phases, append: bool = False) -> int:
         KeyboardInterrupt: after what was drawn until then has been written.
     """
     stopped = None
-    with ShardWriter(job.folder, ShardOptions(generator=SOURCE), append) as writer:
+    shard = ShardWriter(job.folder, ShardOptions(generator=SOURCE), append)
+    with ExitStack() as last_shard, shard as writer:
         if writer.identifiers:
             _require_alike(job)
         names = {index: world_identifier(job.recipe, index) for index in job.indices}
@@ -74,6 +77,7 @@ def write_worlds(job: WorldJob, phases: Phases, append: bool = False) -> int:
                     advance()
         except KeyboardInterrupt as interrupt:
             # Leaving the writer in peace names the open shard: hours of drawing may lie in it.
+            last_shard.enter_context(uninterrupted())
             stopped = interrupt
     if stopped:
         raise stopped

@@ -4,12 +4,14 @@ Every part starts from a separate random stream. Its weights depend on the confi
 and the part alone: not on the caller's random state, nor on which other parts are built.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
+from typing import Any
 
 import torch
 from torch import nn
+from torch.overrides import TorchFunctionMode
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.deformation.network import DeformationNetwork
@@ -99,10 +101,29 @@ def _deformation(config: ModelConfig) -> DeformationNetwork | RefinedDeformation
 
 
 def _build(part: str, make: Callable[[], nn.Module], target: torch.device, seed: int) -> nn.Module:
-    draw_on = target if target.type == "meta" else torch.device("cpu")
-    with torch.random.fork_rng(devices=[]), draw_on:
+    if target.type == "meta":
+        with target, _NoInitialValues():
+            return make()
+    with torch.random.fork_rng(devices=[]), torch.device("cpu"):
         torch.manual_seed(seed * len(PARTS) + PARTS.index(part))
         return make().to(target)
+
+
+class _NoInitialValues(TorchFunctionMode):
+    """Skips ``torch.nn.init``: meta tensors have no values, and drawing some loads a compiler."""
+
+    def __torch_function__(
+        self,
+        func: Callable[..., Any],
+        types: Sequence[type],
+        args: tuple[Any, ...] = (),
+        kwargs: dict[str, Any] | None = None,
+    ) -> Any:
+        del types
+        kwargs = kwargs or {}
+        if getattr(func, "__module__", None) == "torch.nn.init":
+            return args[0] if args else kwargs["tensor"]
+        return func(*args, **kwargs)
 
 
 def parameter_counts(config: ModelConfig) -> Mapping[str, int]:

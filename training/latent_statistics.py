@@ -13,6 +13,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.io.scene_files.tensor_checks import take_floats
 from diff4splat.io.scene_files.tensor_file import TensorFile, read_tensors, write_tensors
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.progress.phases import Advance
@@ -77,8 +78,9 @@ def read_statistics(folder: Path) -> Statistics:
         )
     try:
         stored = read_tensors(file)
-        return stored["mean"], stored["std"]
-    except (FileFormatError, KeyError) as error:
+        mean = take_floats(stored, "mean", (None,))
+        return mean, take_floats(stored, "std", tuple(mean.shape))
+    except FileFormatError as error:
         raise FileFormatError(
             f"{file}: expected mean and deviation of the latents, got a damaged file; "
             "run the autoencoder's stage again, which writes it anew"

@@ -1,1 +1,1 @@
-"""Variants of the reconstruction, trained at equal compute and judged on the same clips."""
+"""Variants of the reconstruction, trained at equal compute and evaluated on the same clips."""

@@ -1,4 +1,4 @@
-"""Variants of the reconstruction at equal compute: tables with intervals, and a picture.
+"""Variants of the reconstruction at equal compute: tables with intervals, and an image.
 
 Run ``PYTHONPATH=benchmarks python -m ablations --run RUN --clips CLIPS --out OUT``, where RUN is a
 training run whose autoencoder is over. ``--help`` lists the rest.
@@ -14,7 +14,7 @@ import tyro
 
 from ablations.course import Lab, require_autoencoder, train_variant
 from ablations.drawing import draw_differences
-from ablations.judging import HeldOut, held_out, judge
+from ablations.evaluation import HeldOut, evaluate, held_out
 from ablations.options import Options
 from ablations.results import Row, store, stored_rows
 from ablations.tables import to_json, to_markdown
@@ -43,43 +43,43 @@ def main() -> int:
 
 
 def run(options: Options) -> None:
-    """Check everything cheap, then train and judge one variant after the other."""
+    """Check everything cheap, then train and evaluate one variant after the other."""
     require_matplotlib()
     variants = chosen_variants(options.only)
     base = reduced(options.recipe(), options.steps)
     for variant in variants:
         recipe_of(variant, base)
-    judged = held_out(base.stage(STATIC).data.size_px, options.items)
+    test_clips = held_out(base.stage(STATIC).data.size_px, options.items)
     autoencoder = require_autoencoder(options.run)
     phases = ConsolePhases()
     precompile_renderer(single_gaussian("cpu"), phases)
     drawn = [source for stage in base.stages for source in stage.data.sources]
-    precompile_sources([judged.protocol.source, *drawn], phases)
+    precompile_sources([test_clips.protocol.source, *drawn], phases)
     lab = Lab(base=base, autoencoder=autoencoder, out=options.out, note=note)
     for variant in variants:
-        train_and_judge(variant, lab, judged)
-        write(lab, judged)
-    print(write(lab, judged))
+        train_and_evaluate(variant, lab, test_clips)
+        write(lab, test_clips)
+    print(write(lab, test_clips))
 
 
-def train_and_judge(variant: Variant, lab: Lab, judged: HeldOut) -> None:
+def train_and_evaluate(variant: Variant, lab: Lab, test_clips: HeldOut) -> None:
     """One row of the table, kept in a file."""
     costs, folder = train_variant(variant, lab), lab.out / variant.name
-    note(f"{variant.name}: judging")
-    found = judge(variant, folder, judged, ConsolePhases())
+    note(f"{variant.name}: evaluating")
+    found = evaluate(variant, folder, test_clips, ConsolePhases())
     for failure in found.failures:
         note(f"{variant.name}: item {failure.item} ({failure.clip}) failed: {failure.why}")
     row = Row(title=variant.title, items=found.items, name=variant.name, costs=costs)
-    store(row, folder, judged)
+    store(row, folder, test_clips)
 
 
-def write(lab: Lab, judged: HeldOut) -> str:
-    """Tables and picture of all that is judged so far; returns the Markdown."""
-    rows = stored_rows(lab.out, judged)
-    markdown = to_markdown(rows, lab.base, judged.protocol)
+def write(lab: Lab, test_clips: HeldOut) -> str:
+    """Tables and image of all that is evaluated so far; returns the Markdown."""
+    rows = stored_rows(lab.out, test_clips)
+    markdown = to_markdown(rows, lab.base, test_clips.protocol)
     write_text(lab.out / "ablations.md", markdown)
-    write_text(lab.out / "ablations.json", to_json(rows, lab.base, judged.protocol))
-    draw_differences(rows, judged.protocol, lab.out / "ablations.png")
+    write_text(lab.out / "ablations.json", to_json(rows, lab.base, test_clips.protocol))
+    draw_differences(rows, test_clips.protocol, lab.out / "ablations.png")
     return markdown
 
 

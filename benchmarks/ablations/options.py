@@ -15,9 +15,9 @@ from diff4splat.training.recipe.recipe import Recipe
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """Train variants of the reconstruction at equal compute and judge them on the same clips.
+    """Train variants of the reconstruction at equal compute and evaluate them on the same clips.
 
-    The same command goes on after any stop; what is trained or judged is not done again.
+    The same command goes on after any stop; what is trained or evaluated is not done again.
     """
 
     run: Path
@@ -37,9 +37,9 @@ class Options:
     dynamic_steps: int = 300
     """Of dynamic in the full variant, at the size of static-low."""
     items: int = 24
-    """Held-out clips to judge on: the first so many of the protocol."""
+    """Held-out clips to evaluate on: the first so many of the protocol."""
     only: tuple[str, ...] = ()
-    """Names of variants to train and judge now; the full one always is."""
+    """Names of variants to train and evaluate now; the full one always is."""
 
     def recipe(self) -> Recipe:
         """The recipe that variants change.

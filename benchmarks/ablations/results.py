@@ -1,4 +1,4 @@
-"""What is known of a variant once it is judged: a file per variant, and rows of the table.
+"""What is known of a variant once it is evaluated: a file per variant, and rows of the table.
 
 OUT/<variant>/ablation.json     {"protocol": digest, "costs": […], "items": […]}
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ablations.course import StageCost
-from ablations.judging import HeldOut
+from ablations.evaluation import HeldOut
 from ablations.variants import VARIANTS
 from diff4splat.evaluation.columns import SYSTEM, Column, column_of
 from diff4splat.evaluation.protocols.protocol import Protocol
@@ -71,7 +71,7 @@ def store(row: Row, folder: Path, held_out: HeldOut) -> None:
 
 
 def stored_rows(out: Path, held_out: HeldOut) -> list[Row]:
-    """Variants judged on all these clips so far, in the order of the table, then baselines."""
+    """Variants evaluated on all these clips so far, in the order of the table, then baselines."""
     rows = []
     for variant in VARIANTS:
         record = _read(out / variant.name / FILE)

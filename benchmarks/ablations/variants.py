@@ -34,7 +34,7 @@ class Variant:
     deforms: bool = True
     """False: the dynamic stage has no deformation network."""
     use_ground_truth_frames: bool = False
-    """Judged with the given pictures as they are, not as the autoencoder decodes them."""
+    """Evaluated with the given images as they are, not as the autoencoder decodes them."""
 
 
 def _each(stages: tuple[str, ...], change: str) -> tuple[str, ...]:

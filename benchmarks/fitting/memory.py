@@ -2,7 +2,7 @@
 
     python -m benchmarks.fitting.memory
 
-Every fit runs in a process of its own, with pictures that are drawn when they are read and 32 MB of
+Every fit runs in a process of its own, with images that are drawn when they are read and 32 MB of
 them kept. What is compared is the peak of the process over that of one that only imports.
 """
 

@@ -1,8 +1,8 @@
 """The worlds of ``fit_v1``: 20 cameras to learn from, 2 held out between them, 24 times, 200 px.
 
 Worlds stand in a room, as capture rigs do, and are the first of their recipes that standing still
-cannot explain: the mean over time of each camera's pictures is worse than 29 dB. Two outdoor worlds
-are the hard case: grass as fine as a pixel covers half of each picture.
+cannot explain: the mean over time of each camera's images is worse than 29 dB. Two outdoor worlds
+are the hard case: grass as fine as a pixel covers half of each image.
 """
 
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ def draw(scene: FitScene, folder: Path, phases: Phases) -> Path:
 
 
 def mean_picture_db(folder: Path) -> float:
-    """How well each camera's mean picture explains its frames; what decides who takes part."""
+    """How well each camera's mean image explains its frames; what decides who takes part."""
     import torch
 
     clip = ClipFolder(folder).clip(0)

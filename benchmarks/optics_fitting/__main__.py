@@ -1,4 +1,4 @@
-"""Runs the experiments and writes a table: recovered numbers and pictures against baselines.
+"""Runs the experiments and writes a table: recovered numbers and images against baselines.
 
     python -m benchmarks.optics_fitting --out optics
     python -m benchmarks.optics_fitting --out optics --only lens focus

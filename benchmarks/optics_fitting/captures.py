@@ -1,6 +1,6 @@
 """Captures of a world: every camera at every time, through optics that may be told wrongly.
 
-Pictures are photographs with many samples, rounded to eight bits. Points to start from are the
+Images are photographs with many samples, rounded to eight bits. Points to start from are the
 places of the things, up to 8 cm off, with colours half of the way to grey.
 """
 
@@ -71,7 +71,7 @@ def points(world: World) -> PointCloud:
 
 
 def told(capture: Capture, optics: Optics | None) -> Capture:
-    """The same pictures with something else said of the cameras."""
+    """The same images with something else said of the cameras."""
     return replace(capture, optics=optics)
 
 
@@ -79,7 +79,7 @@ def told(capture: Capture, optics: Optics | None) -> Capture:
 def seen_db(
     truth: Scene, scene: Scene, cameras: Sequence[Camera], times_s: Sequence[float]
 ) -> float:
-    """PSNR of pinhole pictures of a fit against those of the truth, the mean over pictures."""
+    """PSNR of pinhole images of a fit against those of the truth, the mean over images."""
     found: list[Tensor] = []
     for camera in cameras:
         for time_s in times_s:

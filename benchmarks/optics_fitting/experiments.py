@@ -48,7 +48,7 @@ STEPS = {"fisheye": 2000, "rolling": 2000, "lens": 2000, "focus": 600, "readout"
 
 
 def fisheye() -> list[Row]:
-    """Held out through the fisheye, and through pinholes that nobody took pictures with."""
+    """Held out through the fisheye, and through pinholes that nobody took images with."""
     room, (cameras, optics) = world(1, moving=False), _fisheye(FOV_DEG["fisheye"])
     capture = taken(room, views(16, cameras, 1), (0.0,), optics, 8)
     step = radians_per_pixel(cameras, optics)
@@ -74,7 +74,7 @@ def rolling() -> list[Row]:
 
 
 def lens() -> list[Row]:
-    """Largest displacement over the picture between the lens and the true one."""
+    """Largest displacement over the image between the lens and the true one."""
     room, (cameras, optics) = world(2, moving=False), _fisheye(FOV_DEG["lens"])
     capture = taken(room, views(16, cameras, 2), (0.0,), optics, 8)
     off = optics.lens.coefficients + torch.tensor([0.05, 0.0, 0.0, 0.0]).double()
@@ -184,7 +184,7 @@ def _pinhole() -> Camera:
 
 
 def _flattened(capture: Capture, step: float) -> Capture:
-    """As if the lens were a pinhole as fine in the middle of the picture."""
+    """As if the lens were a pinhole as fine in the middle of the image."""
     focal_px = torch.full_like(capture.cameras.focal_px, 1 / step)
     return replace(capture, optics=None, cameras=replace(capture.cameras, focal_px=focal_px))
 

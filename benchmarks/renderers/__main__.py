@@ -1,4 +1,4 @@
-"""Renderers side by side on the CPU: milliseconds, ratios and memory, each picture checked.
+"""Renderers side by side on the CPU: milliseconds, ratios and memory, each image checked.
 
 Run ``python benchmarks/renderers --help``. Nothing else should compute meanwhile.
 """
@@ -11,7 +11,7 @@ import sys
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import tyro
-from comparing import compare, find_slope, list_all
+from commands import compare, find_slope, list_all
 from options import Options
 
 from diff4splat.errors import Diff4SplatError

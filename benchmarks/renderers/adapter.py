@@ -3,7 +3,7 @@
 An adapter file imports its renderer inside functions only, so that asking what is installed loads
 nothing. Three more names are optional: ``refuses(scene) -> str | None``, one line why a scene
 cannot be done; ``NOTE: str``, what differs from our definition (its largest alpha, its order, what
-was not timed); ``JUDGED: bool``, False for one whose picture is another by design.
+was not timed); ``JUDGED: bool``, False for one whose image is another by design.
 """
 
 from typing import Protocol, runtime_checkable
@@ -59,5 +59,5 @@ def note(adapter: Adapter) -> str:
 
 
 def judged(adapter: Adapter) -> bool:
-    """Whether its picture should equal ours; the optional ``JUDGED``."""
+    """Whether its image should equal ours; the optional ``JUDGED``."""
     return getattr(adapter, "JUDGED", True)

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-import memory
 import tyro
-from rounds import Effort
+from timing.interleaved import Effort
+from workers import memory
 
 from diff4splat.errors import ConfigError
 
@@ -17,7 +17,7 @@ _MEMORY_SHARE = 0.6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """Render the same scenes with every installed renderer, check the pictures, and compare."""
+    """Render the same scenes with every installed renderer, check the images, and compare."""
 
     scenes: tuple[str, ...] = QUICK
     """Names or patterns of scenes ("cloud-*"); "*" is all of them."""

@@ -1,7 +1,7 @@
 """What is measured, as plain values that travel between processes and into JSON.
 
-Seconds and bytes. ``forward`` is one picture without gradients; ``both`` is one picture with
-gradients recorded and the way back.
+Seconds and bytes. ``forward`` is one image without gradients; ``both`` is one image with
+gradients recorded and the backward pass.
 """
 
 import math
@@ -41,10 +41,10 @@ def timing(windows_s: Sequence[float], first_s: float, peak_bytes: int) -> Timin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageError:
-    """A picture against the truth at the sampled pixels."""
+    """An image against the truth at the sampled pixels."""
 
     psnr_db: float
-    """Peak 1, over the sample; infinite for equal pictures."""
+    """Peak 1, over the sample; infinite for equal images."""
     max_error: float
     wrong: int
     """Pixels with a channel off by more than half a level of 255."""

@@ -1,7 +1,7 @@
 """The scenes that every renderer draws: seeded, described once, built where they are needed.
 
 Axes: ``n`` Gaussians. The camera stands at the origin, looks along z, and its focal length is the
-width of the picture, so that x / z spans -0.5 to 0.5. A footprint's radius is 3 det(C)^(1/4) with C
+width of the image, so that x / z spans -0.5 to 0.5. A footprint's radius is 3 det(C)^(1/4) with C
 its covariance in pixels, the dilation of 0.3 px² included: three standard deviations of the circle
 of equal area. Degree-0 colour is uniform in [0, 1]; higher bands are small.
 """
@@ -90,7 +90,7 @@ def aligned(camera: Camera, count: int, generator: torch.Generator) -> Gaussians
 
 
 def huge(camera: Camera, count: int, generator: torch.Generator) -> Gaussians:
-    """Gaussians that each cover the whole picture: a standard deviation of its width."""
+    """Gaussians that each cover the whole image: a standard deviation of its width."""
     depth = 2.0
     return Gaussians(
         means=torch.tensor([0.1, -0.1, depth]).repeat(count, 1),

@@ -1,4 +1,4 @@
-"""What sampling settings cost and give: solver error, pictures, and whether the text is followed.
+"""What sampling settings cost and give: solver error, images, and whether the text is followed.
 
 Run ``python -m benchmarks.sampling --model small --out sampling.md``. Clips are worlds
 of the training split that nobody trained on: defaults are chosen here, and held-out worlds stay
@@ -8,7 +8,7 @@ unseen.
     error          RMS distance from what 64 steps make of the same noise, in standard deviations
                    of latents, or in units of motion
     error / still  squared error of told motion, over that of standing still
-    PSNR           decoded video against the true one, or pictures of the scene along the path
+    PSNR           decoded video against the true one, or images of the scene along the path
     direction      cases in which the named object goes to the asked side; both counts as one each
     still          Gaussians that stand when nothing is asked to move
 """

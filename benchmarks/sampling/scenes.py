@@ -1,4 +1,4 @@
-"""What guidance does to whole scenes: is the text followed, are pictures along the path right?"""
+"""What guidance does to whole scenes: is the text followed, are images along the path right?"""
 
 import statistics
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ def _row(subject: Generator, protocol: Protocol) -> str:
 
 
 def _along_the_path(subject: Generator, case: EvalSample) -> float:
-    """Mean PSNR over the judged pictures, with the clip's own caption."""
+    """Mean PSNR over the evaluated images, with the clip's own caption."""
     scene = subject.predict(case, seed=0)
     found = []
     for pair in case.targets.pairs:

@@ -1,6 +1,6 @@
 """Solver error of video latents, and how near the decoded video is to the true one.
 
-Axes: ``b c t h w`` latents, ``f h w`` pictures.
+Axes: ``b c t h w`` latents, ``f h w`` images.
 """
 
 import statistics

@@ -1,4 +1,4 @@
-"""Our tracer against Mitsuba 3: seconds per picture and how alike the pictures are.
+"""Our tracer against Mitsuba 3: seconds per image and how alike the images are.
 
     pip install mitsuba==3.7.1                                # and a libLLVM that it finds
     python -m benchmarks.tracing --out tracing                # all cores
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.renderers.machine import Disturbance, this_machine
+from benchmarks.renderers.timing.machine import Disturbance, this_machine
 from benchmarks.tracing import mitsuba_tracer
 from benchmarks.tracing.measuring import measure
 from benchmarks.tracing.scenes import SCENES

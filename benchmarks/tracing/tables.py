@@ -13,7 +13,7 @@ _HEAD = (
 
 
 def markdown(rows: Sequence[Row], machine: str) -> str:
-    """Two tables: seconds, and how alike the pictures are."""
+    """Two tables: seconds, and how alike the images are."""
     text = f"{machine}\n\n{_HEAD}" + "".join(map(_seconds, rows))
     text += (
         "\n| scene | rays within 1e-5 | rays within 1e-2 | mean difference "

@@ -17,7 +17,7 @@ from diff4splat.data_prep.synthetic.motions.context import MotionContext, PartPo
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS, Motion
 from diff4splat.data_prep.synthetic.object_sampler import ObjectSampler
 from diff4splat.data_prep.synthetic.rng import Rng
-from diff4splat.data_prep.synthetic.shapes.surface import about_y
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
 from diff4splat.geometry.camera import Camera, project
 
 Direction = str

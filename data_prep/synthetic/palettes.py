@@ -1,7 +1,7 @@
 """Hand-chosen palettes: what the paints, woods, stones and leaves of one world look like together.
 
 Written in sRGB as people mix them, turned into linear light. Every world draws all its colours from
-one palette, which is what makes it look like one place. ``paint`` are the colours of made things;
+one palette, which is what makes it look like one place. ``paint`` are the colours of artefacts;
 every other list is a material.
 """
 

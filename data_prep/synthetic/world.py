@@ -57,7 +57,7 @@ class WorldObject:
     mesh: Mesh
     texture: Texture
     positions: Float64[np.ndarray, "s v 3"]
-    """World positions per frame; ``s`` is 1 for what stands still, else t."""
+    """World positions per frame; ``s`` is 1 for static objects, else t."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from diff4splat.cli.options.constraints import Number, OutFolder
+from diff4splat.cli.options.models import FeatureFiles, ModelName
 
 if TYPE_CHECKING:
     from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
@@ -17,29 +20,35 @@ if TYPE_CHECKING:
 class Evaluate:
     """Measure a model on the test split, with trivial baselines in the same table."""
 
-    model: str = "small"
+    model: Annotated[str, ModelName()] = "small"
     """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
     protocol: str = "held_out_v2"
     """Name of a bundled protocol, or a protocol JSON file."""
-    size: int | None = None
+    size: Annotated[int | None, Number(least=1)] = None
     """Image side in pixels. Default: as in the protocol."""
     task: Literal["generation", "reconstruction", "text"] = "generation"
     """Generate from one image, reconstruct the input video, or test the effect of the text."""
-    out: Path = Path("evaluation")
+    out: OutFolder = Path("evaluation")
     """Folder for the results."""
-    items: int | None = None
+    items: Annotated[int | None, Number(least=1)] = None
     """Measure only the first N clips; the table is then marked as a subset."""
-    features: str | None = None
+    features: Annotated[str | None, FeatureFiles()] = None
     """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
-    steps: int | None = None
+    steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
     fill: Literal["none", "video"] | None = None
     """What fills hidden regions, as in `generate`. Default: that of the model."""
     fresh: bool = False
     """Ignore the results of an earlier run in the same folder."""
 
+    def check(self) -> None:
+        """Require a protocol that can be read."""
+        from diff4splat.evaluation.protocols.protocol_json import load_protocol
+
+        load_protocol(self.protocol)
+
     def run(self) -> None:
-        """Check everything cheap first, then measure, write, and print the table."""
+        """Measure, write, and print the table."""
         from dataclasses import replace
 
         from diff4splat.cli.common.console import ConsolePhases, note

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
-from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,13 +26,13 @@ class CaptureOptions:
 
     format: str = "auto"
     """dnerf, neu3d, hypernerf, colmap, transforms, clips or cameras; auto detects it."""
-    hold_out: tuple[int, ...] | None = None
+    hold_out: Annotated[tuple[int, ...] | None, Number(least=0)] = None
     """Cameras to hold out, from 0. Default: the rule of the format."""
-    downscale: int = 1
+    downscale: Annotated[int, Number(least=1)] = 1
     """Downscale images by this factor."""
-    frame_step: int = 1
+    frame_step: Annotated[int, Number(least=1)] = 1
     """Use every n-th time only."""
-    fps: float | None = None
+    fps: Annotated[float | None, Number(above=0)] = None
     """Frames per second, for formats that only count frames."""
     clip: str | None = None
     """Which clip of a folder of shards, or which effect of data sets of cameras."""
@@ -42,22 +42,22 @@ class CaptureOptions:
 class Fit:
     """Fit a scene to multi-view or moving-camera video; the same command resumes a stopped fit."""
 
-    data: Annotated[Path, tyro.conf.Positional]
+    data: Annotated[Path, tyro.conf.Positional, InputPath(what="images with poses")]
     """Folder or file with images, poses and times."""
-    out: Path = Path("fit")
+    out: OutFolder = Path("fit")
     """Folder for the scene, its card, a video, a comparison and the checkpoint."""
     motion: Literal["hexplane", "spacetime", "static"] = "hexplane"
     """A field that deforms Gaussians, native 4D Gaussians, or none."""
     options: Annotated[CaptureOptions, tyro.conf.arg(name="")] = field(
         default_factory=CaptureOptions
     )
-    init: Path | None = None
+    init: Annotated[Path | None, InputPath(what="a scene file", folder=False)] = None
     """Start from this scene file, such as a generated one, in place of points."""
-    budget: int = 40_000
+    budget: Annotated[int, Number(least=1)] = 40_000
     """Largest number of Gaussians."""
-    steps: int | None = None
+    steps: Annotated[int | None, Number(least=1)] = None
     """Steps of the fine stage; default: 2500."""
-    minutes: float | None = None
+    minutes: Annotated[float | None, Number(above=0)] = None
     """Time limit of this call in minutes; the fit is saved and can be resumed."""
     no_depth: bool = False
     """Ignore depth in the data."""
@@ -66,7 +66,7 @@ class Fit:
     learn: tuple[Literal["lens", "focus", "aperture", "readout", "focal"], ...] = ()
     """Camera parameters to optimise together with the scene, from an initial guess in the data:
     lens coefficients, focus distance, aperture radius, read-out time, focal length."""
-    seed: int = 0
+    seed: Annotated[int, Number(least=0)] = 0
     """Seed of points, frame order and splits."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Override settings, such as weights.ssim=0.2 or rates.means.first=1e-3; repeatable."""
@@ -74,20 +74,29 @@ class Fit:
     """Start again instead of resuming from the folder."""
 
     def run(self) -> None:
-        """Check, read, fit, write."""
-        from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.common.installation import single_gaussian
-        from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
-        from diff4splat.fitting.checkpoint import CHECKPOINT_FILE
-        from diff4splat.fitting.fit import fit_scene
-        from diff4splat.fitting.fit_types import FitRequest
-        from diff4splat.fitting.frames.frame_renderer import FrameRenderer
-        from diff4splat.fitting.results import RESULT_FILES, FitReport, write_results
-        from diff4splat.progress.run_log import RunLog
+        """Check, then fit as the only writer of the folder."""
+        from diff4splat.fitting.checkpoints.checkpoint import CHECKPOINT_FILE
+        from diff4splat.fitting.results import RESULT_FILES
+        from diff4splat.io.locks import sole_writer
 
         settings = self.settings()
         outputs = [self.out / name for name in (*RESULT_FILES, CHECKPOINT_FILE)]
         require_inputs_not_overwritten([self.data, *([self.init] if self.init else [])], outputs)
+        with sole_writer(self.out):
+            self._fit(settings)
+
+    def _fit(self, settings: "FitSettings") -> None:
+        """Read, fit, write."""
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
+        from diff4splat.fitting.checkpoints.checkpoint import CHECKPOINT_FILE
+        from diff4splat.fitting.fit import fit_scene
+        from diff4splat.fitting.fit_types import FitRequest
+        from diff4splat.fitting.frames.frame_renderer import FrameRenderer
+        from diff4splat.fitting.results import FitReport, write_results
+        from diff4splat.progress.run_log import RunLog
+
         log = RunLog(phases=ConsolePhases())
         capture, initial = self.capture(), self.initial_scene()
         for line in capture.notes:
@@ -129,8 +138,6 @@ class Fit:
         from diff4splat.fitting.settings import FitSettings
         from diff4splat.fitting.settings_json import apply_changes
 
-        if self.minutes is not None and not self.minutes > 0:
-            raise ConfigError(f"--minutes: expected more than 0, got {self.minutes:g}")
         start = FitSettings(motion=self.motion, seed=self.seed, use_depth=not self.no_depth)
         start = replace(
             start,

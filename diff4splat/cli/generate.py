@@ -1,7 +1,7 @@
 """``diff4splat generate``: one photograph, a camera path and optional text to a scene folder.
 
 photograph ─ load_image ───┐
---camera ── choose_path ───┼─ Diff4SplatPipeline ─ Scene ─ render_frames ─ write_scene_folder
+--camera ── choose_path ───┼─ Diff4SplatPipeline ─ Scene ─ render_into ─ write_scene_folder
 --prompt ── require_prompt ┘
 """
 
@@ -12,94 +12,210 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.options.camera import CameraOptions, choose_path
+from diff4splat.cli.options.camera import CameraOptions, choose_path, require_camera
+from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
+from diff4splat.cli.options.models import ModelName, require_prompt_for
 
 if TYPE_CHECKING:
     from diff4splat.generation.inputs.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
+    from diff4splat.outputs.card import Result
+    from diff4splat.paths.camera_path import CameraPath
+    from diff4splat.progress.run_log import RunLog
+    from diff4splat.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
 class Generate:
     """Generate a 4D scene from one photo: scene file, video, depth, contact sheet and metadata."""
 
-    image: Annotated[Path, tyro.conf.Positional]
-    """The photograph: an 8-bit RGB JPEG, PNG, WebP, AVIF, TIFF or BMP."""
+    images: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """The photo: an 8-bit RGB JPEG, PNG, WebP, AVIF, TIFF or BMP. Several photos, or a folder of
+    them, each get a folder in --out."""
     camera: str = "spiral"
     """Camera presets joined by `+`, such as `spiral` or `orbit:0.25+up`, or a path file."""
     prompt: str | None = None
-    """Text that describes the motion. Default: none; the text encoder is then not run."""
-    out: Path = Path("out")
+    """Text that names what moves, and how: `diff4splat inspect words` lists the words. Default:
+    none, and nothing moves."""
+    out: OutFolder = Path("out")
     """Folder for the results."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
-    seed: int = 0
+    seed: Annotated[int, Number(least=0, most=2**63 - 1)] = 0
     """Random seed. The same seed gives the same scene, bit for bit, on one machine."""
-    model: str = "small"
+    model: Annotated[str, ModelName()] = "small"
     """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
-    resolution: int | None = None
-    """Image size: the side of a square with the same area, in pixels. Default: the model's."""
-    fov: float | None = None
+    resolution: Annotated[int | None, Number(least=1, most=1024)] = None
+    """Image size: the side of a square with the same area, in pixels, up to 1024. Default: 512, or
+    the photo's if that is smaller."""
+    fit: Literal["crop", "pad"] = "crop"
+    """How the photo comes to a shape that networks take: crop loses borders, pad keeps every
+    pixel."""
+    fov: Annotated[float | None, Number(least=1, most=170)] = None
     """Horizontal field of view in degrees. Default: from EXIF, else a 30 mm lens."""
     fill: Literal["none", "video"] | None = None
     """What shows where the image hides: extended layers (none), or what the video model generates
     (video). Default: the model decides; small: none."""
     still: bool = False
     """Nothing moves, with or without a prompt."""
-    steps: int | None = None
+    steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Steps of the sampler. Default: 1 for motion, 8 for video."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
     """ODE solver of the flow. `diff4splat report error-time` compares the solvers."""
-    shift: float | None = None
+    shift: Annotated[float | None, Number(above=0)] = None
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
-    guidance: float | None = None
+    guidance: Annotated[float | None, Number(least=0)] = None
     """Classifier-free guidance weight, 1 is off. Default: 1 for motion, 5 for video."""
-    min_opacity: float = 0.005
+    min_opacity: Annotated[float, Number(least=0, most=1)] = 0.005
     """Gaussians of lower opacity are removed."""
+    video: Literal["mp4", "webm", "gif", "webp"] | None = None
+    """Format of the video. Default: mp4 with H.264 where ffmpeg is installed, else webm."""
+    ply: bool = False
+    """Also write scene.ply: the Gaussians at the first time, for other viewers."""
+    device: str = "cpu"
+    """Where networks run: cpu, cuda or mps. Frames are rendered on the CPU."""
     skip_depth: bool = False
     """Do not render and write depth."""
     convert: bool = False
     """Convert images that are grey, CMYK, 16-bit or animated, or have alpha or a palette."""
 
-    def run(self) -> None:
-        """Check everything cheap first, then generate, render and write."""
-        from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.common.precompile import precompile_renderer
-        from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
-        from diff4splat.generation.inputs.input_cameras import path_frame, reconcile_intrinsics
-        from diff4splat.generation.pipeline import Diff4SplatPipeline
-        from diff4splat.io.atomic import atomic_folder
-        from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-        from diff4splat.outputs.card import Result, describe, write_card
-        from diff4splat.outputs.scene_folder import OUTPUT_FILES, render_frames, write_scene_folder
-        from diff4splat.paths.summary import summarize
-        from diff4splat.progress.run_log import RunLog
+    @property
+    def image(self) -> Path:
+        """The one photo."""
+        return self.images[0]
+
+    def check(self) -> None:
+        """Check the camera path, the prompt and, if there is only one, the photo's header."""
+        from diff4splat.cli.common.several_inputs import photo_files
+
+        require_camera(self.camera, self.options)
+        if self.prompt is not None:
+            require_prompt_for(self.model, self.prompt)
+        if photo_files(self.images) == list(self.images[:1]):
+            self.check_photo()
+
+    def check_photo(self) -> None:
+        """Check the photo's header, and that nothing of it is overwritten."""
+        from diff4splat.io.photos.photo_header import open_photo
+        from diff4splat.outputs.file_names import OUTPUT_FILES
 
         outputs = [self.out / name for name in OUTPUT_FILES]
         require_inputs_not_overwritten((self.image, Path(self.camera)), outputs)
+        with open_photo(self.image, self.convert):
+            pass
+
+    def run(self) -> None:
+        """Generate from one photo into --out, or from several into folders of their own."""
+        from diff4splat.cli.common.several_inputs import folder_names, photo_files, run_each
+
+        photos = photo_files(self.images)
+        if photos == list(self.images[:1]):
+            self.run_one()
+            return
+        jobs = [
+            (photo, replace(self, images=(photo,), out=self.out / name).run_checked)
+            for photo, name in folder_names(photos).items()
+        ]
+        run_each(jobs)
+
+    def run_checked(self) -> None:
+        """One of several photos: its own check, then its scene."""
+        self.check_photo()
+        self.run_one()
+
+    def run_one(self) -> None:
+        """Generate, render and write."""
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.options.device import require_device
+        from diff4splat.generation.pipeline import Diff4SplatPipeline
+        from diff4splat.io.atomic import atomic_folder
+        from diff4splat.outputs.card import write_card
+        from diff4splat.outputs.file_names import OUTPUT_FILES
+        from diff4splat.progress.run_log import RunLog
+
         settings, log = self.settings(), RunLog(phases=ConsolePhases())
-        input_image = self.read_image()
-        asked = choose_path(self.camera, path_frame(input_image.camera), self.options)
-        input_image, path = reconcile_intrinsics(input_image, asked)
-        note("; ".join((f"focal length: {input_image.focal_source}", *input_image.notes)))
-        for warning in summarize(path, PLANE_DEPTH).warnings:
-            note(f"camera path: {warning}")
+        device = require_device(self.device)
+        input_image, path = self.read_inputs()
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
-            pipeline = Diff4SplatPipeline.from_pretrained(self.model)
+            pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device)
             scene = pipeline(
                 input_image, path, self.prompt, seed=self.seed, settings=settings, log=log
             )
-            precompile_renderer(scene.gaussians, log.phases)
-            if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
-                note(skipped)
-            frames = render_frames(scene, scene.path, log, with_depth=not self.skip_depth)
-            result = Result.of(scene, input_image.rgb, frames.rgb[0])
-            facts = describe(result, self.camera, input_image.focal_source)
-            write_scene_folder(folder, result, frames, facts, log.phases)
+            result, lines = self.write_results(folder, scene, input_image, log)
             inputs = self.inputs(input_image, settings, pipeline.model.config.fingerprint())
             write_card(folder / "card.json", result, inputs, log)
-        for line in (*(f"{name}: {value}" for name, value in facts), f"wrote {self.out}"):
+        for line in (*lines, f"wrote {self.out}"):
             note(line)
+
+    def write_results(
+        self, folder: Path, scene: "Scene", input_image: "InputImage", log: "RunLog"
+    ) -> tuple["Result", list[str]]:
+        """Render the scene and write every file but the card; returns lines about the result."""
+        from diff4splat.cli.common.console import note
+        from diff4splat.cli.common.precompile import precompile_renderer
+        from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
+        from diff4splat.io.movies.background_movie import BackgroundMovie
+        from diff4splat.outputs.card import Result, describe
+        from diff4splat.outputs.filming import FilmRecord, empty_note
+        from diff4splat.outputs.scene_folder import (
+            frames_per_second,
+            render_into,
+            write_first_ply,
+            write_scene_folder,
+        )
+
+        precompile_renderer(scene.gaussians, log.phases)
+        if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
+            note(skipped)
+        record = FilmRecord(path=scene.path, with_depth=not self.skip_depth)
+        with BackgroundMovie(folder / self.video_name(), frames_per_second(scene.path)) as movie:
+            render_into(movie, scene, record, log)
+            result = Result.of(scene, input_image.rgb, record.first_rgb)
+            facts = describe(result, self.camera, input_image.focal_source)
+            write_scene_folder(folder, result, record, facts, log.phases)
+            if self.ply:
+                write_first_ply(scene, folder)
+            with log.phases.phase("write video"):
+                notes = movie.finish()
+        lines = [*notes, *(f"{name}: {value}" for name, value in facts)]
+        return result, [line for line in (*lines, empty_note(scene, record)) if line]
+
+    def read_inputs(self) -> tuple["InputImage", "CameraPath"]:
+        """The photo at the model's size and the camera path, announced."""
+        from diff4splat.generation.inputs.input_cameras import path_frame, reconcile_intrinsics
+
+        input_image = self.read_image()
+        asked = choose_path(self.camera, path_frame(input_image.camera), self.options)
+        input_image, path = reconcile_intrinsics(input_image, asked)
+        self.announce(input_image, path)
+        return input_image, path
+
+    def announce(self, input_image: "InputImage", path: "CameraPath") -> None:
+        """Say what is known before the work; refuse what cannot fit.
+
+        Raises:
+            ConfigError: more memory or disk is needed than is free.
+        """
+        from diff4splat.cli.common.console import note
+        from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+        from diff4splat.outputs.run_estimate import estimate_generation, require_fits
+        from diff4splat.paths.summary import summarize
+
+        note("; ".join((f"focal length: {input_image.focal_source}", *input_image.notes)))
+        for line in self.prompt_notes():
+            note(line)
+        for warning in summarize(path, PLANE_DEPTH).warnings:
+            note(f"camera path: {warning}")
+        size_px, depth = input_image.camera.size_px, not self.skip_depth
+        needed = estimate_generation(len(path), size_px, depth, self.video == "gif")
+        if line := require_fits(needed, self.out, "fewer --frames, --skip-depth or a smaller size"):
+            note(line)
+
+    def video_name(self) -> str:
+        """The name of the video, which says its format."""
+        from diff4splat.io.movies.movie import default_suffix
+
+        return f"video.{self.video}" if self.video else f"video{default_suffix()}"
 
     def settings(self) -> "GenerationSettings":
         """Seed, prompt, sampling, guidance and pruning, checked before anything is loaded."""
@@ -128,19 +244,34 @@ class Generate:
             **given,
         )
 
+    def prompt_notes(self) -> list[str]:
+        """What a trained motion prior does not know of the prompt."""
+        from diff4splat.captions.known_words import read_prompt, why_static
+        from diff4splat.models.hub.folders import find_provenance
+
+        if self.prompt is None or "motion_unet" not in find_provenance(self.model).trained:
+            return []
+        if reason := why_static(self.prompt):
+            return [f"nothing moves: {reason}; diff4splat inspect words lists what it knows"]
+        unknown = ", ".join(read_prompt(self.prompt).unknown)
+        return [f"words of the prompt that the model does not know: {unknown}"] if unknown else []
+
     def read_image(self) -> "InputImage":
         """The photograph at the model's size."""
         from diff4splat.generation.inputs.image_size import find_image_size
         from diff4splat.generation.inputs.input_image import load_image
+        from diff4splat.io.photos.images import photo_size
 
-        side_px, multiple_px = find_image_size(self.model, self.resolution, self.fill)
-        return load_image(self.image, side_px, self.fov, self.convert, multiple_px)
+        photo_px = photo_size(self.image)
+        side_px, multiple_px = find_image_size(self.model, self.resolution, self.fill, photo_px)
+        return load_image(self.image, side_px, self.fov, self.convert, multiple_px, self.fit)
 
     def inputs(
         self, input_image: "InputImage", settings: "GenerationSettings", model_fingerprint: str
     ) -> dict[str, object]:
         """Every setting as it was used, for the card."""
         given = {name: value for name, value in asdict(self).items() if name != "options"}
+        given = {"image": self.image} | {name: given[name] for name in given if name != "images"}
         given |= asdict(self.options) | {"generation": asdict(settings)}
         given |= {"focal_source": input_image.focal_source, "notes": input_image.notes}
         given |= {"image_sha256": file_sha256(self.image), "model_fingerprint": model_fingerprint}

@@ -2,35 +2,75 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.options.constraints import InputPath
+from diff4splat.cli.options.models import ModelName
 from diff4splat.errors import ConfigError
+
+WORDS = "words"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneOrWords:
+    """A scene file, or the word for the list of words."""
+
+    def check(self, option: str, value: Path) -> None:
+        """Refuse what is neither."""
+        if not is_words(value):
+            InputPath(what="a scene file", folder=False).check(option, value)
+
+
+def is_words(given: Path | None) -> bool:
+    """Whether the list of words is asked for, and no file of that name."""
+    return given == Path(WORDS) and not given.exists()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Inspect:
-    """Show a scene file, the parameter counts of a network size, or which parts are trained."""
+    """Show a scene file, the words of prompts, a network size, or the parts of a model."""
 
-    scene: Annotated[Path | None, tyro.conf.Positional] = None
-    """A scene file."""
+    scene: Annotated[Path | None, tyro.conf.Positional, SceneOrWords()] = None
+    """A scene file, or `words`: the words that prompts may have."""
     config: str | None = None
     """Network size: test, small or paper. No memory is allocated."""
-    model: str | None = None
+    model: Annotated[str | None, ModelName()] = None
     """Model folder or size: trained parts, hash, licence and origin."""
+
+    def check(self) -> None:
+        """Require exactly one thing to show, and a size that there is."""
+        from diff4splat.models.config.sizes import size_by_name
+
+        count = 3 - (self.scene, self.config, self.model).count(None)
+        if count != 1:
+            raise ConfigError(
+                "inspect: expected one of a scene file, --config NAME and --model NAME, "
+                f"got {count}"
+            )
+        if self.config is not None:
+            size_by_name(self.config)
 
     def run(self) -> None:
         """Print a table to standard output."""
-        asked = ((self.scene, scene_lines), (self.config, size_lines), (self.model, model_lines))
-        given = [(value, lines) for value, lines in asked if value is not None]
-        if len(given) != 1:
-            raise ConfigError(
-                "inspect: expected one of a scene file, --config NAME and --model NAME, "
-                f"got {len(given)}"
-            )
-        ((value, lines),) = given
-        print("\n".join(lines(value)))
+        from diff4splat.progress.plain_text import plain_text
+
+        lines_of = word_lines if is_words(self.scene) else scene_lines
+        asked = ((self.scene, lines_of), (self.config, size_lines), (self.model, model_lines))
+        ((value, lines),) = [(value, lines) for value, lines in asked if value is not None]
+        print("\n".join(map(plain_text, lines(value))))
+
+
+def word_lines(_: Path) -> list[str]:
+    """What the motion prior knows, by kind."""
+    from diff4splat.captions.known_words import known_words
+
+    lists = (f"{kind:<12}{', '.join(words)}" for kind, words in known_words().items())
+    lines = [part for line in lists for part in wrap(line, 100, subsequent_indent=12 * " ")]
+    example = "the red car moves to the left"
+    return [*lines, f"A prompt names an object or a colour, and a motion or a direction: {example}"]
 
 
 def size_lines(name: str) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.options.constraints import OutFolder
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError
 
@@ -18,7 +19,7 @@ class Pack:
 
     model: Annotated[Path, tyro.conf.Positional]
     """Model folder, such as run/model."""
-    out: Path
+    out: OutFolder
     """Folder for the exported model; an existing CARD.md is kept."""
     parts: tuple[str, ...] = ()
     """Parts to export, such as vae ldrm. Default: all parts whose training is complete."""
@@ -33,7 +34,6 @@ class Pack:
         from diff4splat.models.hub.export import export_model
         from diff4splat.models.hub.model import load_model
 
-        self._require_usable()
         packed = export_model(
             load_model(self.model),
             self.out,
@@ -47,7 +47,7 @@ class Pack:
         print(f"{'weights_sha256':<16}{packed.weights_sha256}")
         note(f"wrote {self.out}")
 
-    def _require_usable(self) -> None:
+    def check(self) -> None:
         """Reject bad arguments before anything is read.
 
         Raises:

@@ -2,47 +2,57 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
+from diff4splat.cli.options.models import ModelName
+
+DEFAULT_STATIC_SHARE = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareSynthetic:
     """Render procedural clips into a folder of shards. --append continues after an interruption."""
 
-    out: Path
+    out: OutFolder
     """Folder for the shards, the manifest and a contact sheet."""
-    clips: int
+    clips: Annotated[int, Number(least=1)]
     """Number of clips."""
-    seed: int = 0
+    seed: Annotated[int, Number(least=0)] = 0
     """Random seed of the worlds."""
-    first: int = 0
+    first: Annotated[int, Number(least=0)] = 0
     """Index of the first world, to continue a series in another folder."""
     split: Literal["training", "held_out"] = "training"
     """Split whose object families, textures and motions are used."""
-    still_share: float = 0.25
-    """Fraction of clips in which only the camera moves."""
-    against_share: float = 0.0
+    still_share: Annotated[float | None, Number(least=0, most=1)] = None
+    """Fraction of clips in which only the camera moves. Default: 0.25, and 0 with --rig."""
+    against_share: Annotated[float, Number(least=0, most=1)] = 0.0
     """Fraction of objects whose motion contradicts their pose: only the text determines it."""
-    frozen_share: float = 0.0
+    frozen_share: Annotated[float, Number(least=0, most=1)] = 0.0
     """Fraction of the other clips whose movable objects are static."""
-    size: int = 128
+    size: Annotated[int, Number(least=8, most=4096)] = 128
     """Image side in pixels."""
-    frames: int = 17
+    frames: Annotated[int, Number(least=2, most=1000)] = 17
     """Frames per clip, 1 + 4 k for training."""
-    fps: float = 8.0
+    fps: Annotated[float, Number(least=0.1, most=1000)] = 8.0
     """Frames per second; the motion network is trained on 3 frames at 1 fps."""
-    views: int = 3
+    views: Annotated[int, Number(least=1, most=64)] = 3
     """Cameras per clip; the first is the input."""
     rig: bool = False
     """Place cameras all around the scene, for per-scene fitting; hold out the last two."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
-    tracks: int = 512
+    tracks: Annotated[int, Number(least=0)] = 512
     """Points followed through every clip."""
-    workers: int = 1
+    workers: Annotated[int, Number(least=1)] = 1
     """Number of rendering processes."""
     append: bool = False
     """Add to an existing folder; existing clips are kept."""
+
+    def check(self) -> None:
+        """Check the number of cameras, which --rig decides about."""
+        views = Number(least=4, most=64) if self.rig else Number(least=1, most=8)
+        views.check("--views", self.views)
 
     def run(self) -> None:
         """Render the clips, write them, and write a contact sheet."""
@@ -55,7 +65,7 @@ class PrepareSynthetic:
         recipe = WorldRecipe(
             seed=self.seed,
             split=self.split,
-            still_share=self.still_share,
+            still_share=self.static_world_share(),
             against_share=self.against_share,
             frozen_share=self.frozen_share,
             frames=self.frames,
@@ -79,21 +89,33 @@ class PrepareSynthetic:
         seconds = phases.seconds["draw clips"]
         note(f"wrote {drawn} clips to {self.out} in {seconds:.0f} s; look at clips.png there")
 
+    def static_world_share(self) -> float:
+        """Static cameras around a static world would show one moment only."""
+        if self.still_share is not None:
+            return self.still_share
+        return 0.0 if self.rig else DEFAULT_STATIC_SHARE
+
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareLatents:
     """Encode clips and their render conditions once, so that training reads no images."""
 
-    clips: Path
+    clips: Annotated[Path, InputPath(what="a folder of shards", file=False)]
     """Folder of shards."""
-    out: Path
+    out: OutFolder
     """Folder for the latents; existing files are kept."""
-    model: str = "small"
+    model: Annotated[str, ModelName()] = "small"
     """Model folder or name of the encoder."""
     config: str = "small"
     """Recipe whose video_diffusion stage sets the frames and their size."""
     mirror: bool = True
     """Leave out the second version of each clip, mirrored left to right with its caption."""
+
+    def check(self) -> None:
+        """Require a recipe that there is."""
+        from diff4splat.configs.recipes import find_recipe
+
+        find_recipe(self.config).stage_of_kind("video_diffusion")
 
     def run(self) -> None:
         """Encode and write."""
@@ -120,9 +142,9 @@ class PrepareLatents:
 class PrepareCheck:
     """Check that depth, cameras, flow and tracks of every clip are consistent."""
 
-    folder: Path
+    folder: Annotated[Path, InputPath(what="a folder of shards", file=False)]
     """Folder of shards."""
-    most: int | None = None
+    most: Annotated[int | None, Number(least=1)] = None
     """Check N evenly spread clips. Default: all clips."""
 
     def run(self) -> None:

@@ -2,17 +2,20 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from diff4splat.cli.options.constraints import Number, OutFolder
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorTime:
     """Sweep approximations: a table, a plot with the Pareto front and JSON for each."""
 
-    out: Path = Path("error-time")
+    out: OutFolder = Path("error-time")
     """Folder for the results."""
     knob: tuple[str, ...] = ()
     """Approximation settings to sweep, as listed by `diff4splat report knobs`. Default: all."""
-    repeats: int = 3
+    repeats: Annotated[int, Number(least=1)] = 3
     """Timed runs per setting; the fastest is reported."""
 
     def run(self) -> None:

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from diff4splat.errors import ConfigError
+from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
+from diff4splat.cli.options.models import FeatureFiles, ModelName
 
 if TYPE_CHECKING:
     from diff4splat.models.hub.model import Model
+    from diff4splat.training.recipe.recipe import Recipe
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,45 +22,42 @@ class Train:
     """Recipe: test, small or paper; or a JSON file such as the recipe.json of a run."""
     stage: str
     """Name of the stage, as in the recipe: vae, static-low, dynamic, video_diffusion, joint."""
-    out: Path = Path("training-run")
+    out: OutFolder = Path("training-run")
     """Folder of the run, with one subfolder per stage."""
-    clips: Path | None = None
+    clips: Annotated[Path | None, InputPath(what="a folder of shards", file=False)] = None
     """Folder of shards to train on. Default: the procedural worlds of the recipe."""
-    latents: tuple[Path, ...] = ()
+    latents: Annotated[
+        tuple[Path, ...], InputPath(what="a folder of encoded clips", file=False)
+    ] = ()
     """Folders of encoded clips (prepare latents) for a video_diffusion stage, instead of
     clips."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Recipe overrides such as stages.vae.steps=2000 or trainer.parallel=ddp; repeatable."""
-    from_model: str | None = None
+    from_model: Annotated[str | None, ModelName()] = None
     """Model folder or name that initialises the parts not trained by earlier stages."""
-    features: str | None = None
+    features: Annotated[str | None, FeatureFiles()] = None
     """LPIPS weights: vgg:FILE or alex:FILE. Default: a distance without weights."""
-    steps: int | None = None
+    steps: Annotated[int | None, Number(above=0)] = None
     """Save and stop after this many steps."""
-    minutes: float | None = None
+    minutes: Annotated[float | None, Number(above=0)] = None
     """Save and stop after this many minutes."""
     device: str | None = None
     """Device, such as cpu. Default: a GPU if available."""
     ignore_gates: bool = False
     """Start even if earlier stages are unfinished or below their quality thresholds."""
 
+    def check(self) -> None:
+        """Require a recipe with this stage, and overrides that fit it."""
+        self.recipe()
+
     def run(self) -> None:
         """Train, then print step and metrics."""
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer, precompile_sources
-        from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
-        from diff4splat.training.recipe.overrides import override
         from diff4splat.training.train_stage import StageRequest, is_main_process, train_stage
 
-        self._require_some_work()
-        recipe = override(find_recipe(self.config), [one for given in self.set for one in given])
-        if self.clips is not None:
-            recipe = with_clips(recipe, self.clips)
-        if self.latents:
-            recipe = with_latents(recipe, self.stage, self.latents)
-        recipe.stage(self.stage)
-        phases = ConsolePhases()
+        recipe, phases = self.recipe(), ConsolePhases()
         precompile_renderer(single_gaussian("cpu"), phases)
         precompile_sources(recipe.stage(self.stage).data.sources, phases)
         request = StageRequest(
@@ -84,6 +83,23 @@ class Train:
             f"{self.stage}: step {result.step} of {total} ({measures or 'not evaluated yet'}){more}"
         )
 
+    def recipe(self) -> "Recipe":
+        """The recipe with its overrides and data.
+
+        Raises:
+            ConfigError: no such recipe, stage or setting.
+        """
+        from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
+        from diff4splat.training.recipe.overrides import override
+
+        recipe = override(find_recipe(self.config), [one for given in self.set for one in given])
+        if self.clips is not None:
+            recipe = with_clips(recipe, self.clips)
+        if self.latents:
+            recipe = with_latents(recipe, self.stage, self.latents)
+        recipe.stage(self.stage)
+        return recipe
+
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""
         from diff4splat.models.hub.model import load_model
@@ -91,15 +107,3 @@ class Train:
         if self.from_model is None:
             return None
         return load_model(self.from_model)
-
-    def _require_some_work(self) -> None:
-        """Reject limits below one step, before anything is loaded.
-
-        Raises:
-            ConfigError: a limit is not above 0.
-        """
-        for name, limit in (("--steps", self.steps), ("--minutes", self.minutes)):
-            if limit is not None and not limit > 0:
-                raise ConfigError(
-                    f"{name}: expected more than 0, got {limit}; leave it out to finish"
-                )

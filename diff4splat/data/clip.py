@@ -66,7 +66,7 @@ class ObjectNote:
     """Family, such as ``torus``."""
     color: str
     motion: str
-    """Such as ``rolls to the left``; ``""`` stands still."""
+    """Such as ``rolls to the left``; ``""`` is static."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

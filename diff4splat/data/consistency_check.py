@@ -96,13 +96,11 @@ def require_consistency(clip: Clip, tolerances: Tolerances = EXACT) -> Consisten
         InputError: one fails; with the value, the limit and the usual cause.
     """
     figures = measure_consistency(clip)
-    for name, limit, hint in _checks(tolerances):
+    for name, limit, hint in consistency_limits(tolerances):
         figure = getattr(figures, name)
         if figure is None:
             continue
-        always = {"rotation": "max", "reprojection": "median"}.get(name, tolerances.statistic)
-        low = isinstance(figure, TrueFraction)
-        value = figure.share if low else getattr(figure, always)
+        low, value = isinstance(figure, TrueFraction), checked_value(figures, name, tolerances)
         if value < limit if low else value > limit:
             raise InputError(
                 f"clip '{clip.note.identifier}': {name}: expected at "
@@ -112,8 +110,17 @@ def require_consistency(clip: Clip, tolerances: Tolerances = EXACT) -> Consisten
     return figures
 
 
-def _checks(tolerances: Tolerances) -> tuple[tuple[str, float, str], ...]:
-    """Checks ordered from causes to consequences."""
+def checked_value(figures: Consistency, name: str, tolerances: Tolerances) -> float:
+    """The statistic of a comparison that its limit is for."""
+    figure = getattr(figures, name)
+    if isinstance(figure, TrueFraction):
+        return figure.share
+    always = {"rotation": "max", "reprojection": "median"}
+    return getattr(figure, always.get(name, tolerances.statistic))
+
+
+def consistency_limits(tolerances: Tolerances) -> tuple[tuple[str, float, str], ...]:
+    """Name, limit and usual cause of each check, ordered from causes to consequences."""
     cameras = "look for a mirrored axis, a transposed rotation or camera_from_world"
     pixels = "look for pixel centres half a pixel away or a frame too early or late"
     return (

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_bytes
+from diff4splat.paths.formats.json_text import decode_json
 
 VERSION = 1
 """Of manifest, index and clip note alike; it changes when an old reader would go wrong."""
@@ -21,6 +22,8 @@ _KIND_NAMES = {
     bool: "true or false",
     int: "a whole number",
 }
+_LARGEST_FILE = 1 << 30
+"""Bytes of a manifest or an index; a million clips need a quarter."""
 _FARTHEST = 1 << 48
 """Bytes; keeps sums of offsets and sizes far from any limit."""
 
@@ -36,21 +39,16 @@ def load_file(file: Path, kind: str) -> dict[str, Any]:
     Raises:
         FileFormatError: missing, not JSON, another format or a newer version.
     """
-    require_file(file, f"a {kind} file")
+    content = read_bytes(file, f"a {kind} file", max_bytes=_LARGEST_FILE)
     try:
-        return loads(file.read_bytes(), kind)
-    except OSError as error:
-        raise FileFormatError(f"{file}: expected to read it, got '{error.strerror}'") from error
+        return loads(content, kind)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error
 
 
 def loads(content: bytes, kind: str) -> dict[str, Any]:
     """As ``load_file``, of bytes."""
-    try:
-        root = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise FileFormatError("expected JSON, got damaged text; copy it again") from error
+    root = decode_json(content)
     if not isinstance(root, dict) or root.get("format") != kind:
         raise FileFormatError(f"expected a {kind}, got JSON of another kind; check the path")
     version = take(root, "version", int)

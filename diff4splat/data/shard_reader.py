@@ -2,12 +2,15 @@
 
 import os
 import zlib
-from collections.abc import Iterable
+from collections.abc import Collection
 from pathlib import Path
 
 from diff4splat.data.manifest import ShardEntry
 from diff4splat.data.shard_index import ShardIndex, Slot, read_index
 from diff4splat.errors import FileFormatError
+
+_SPARE_BYTES, _PER_PIXEL, _PER_POINT = 16 << 20, 16, 32
+"""Bytes of a member: flow takes 8 per pixel, tracks 12 per point, before they are packed."""
 
 
 class ShardReader:
@@ -45,14 +48,20 @@ class ShardReader:
         return self._index.clips[identifier]
 
     def read(
-        self, identifier: str, suffixes: Iterable[str], verify: bool = True
+        self, identifier: str, suffixes: Collection[str], verify: bool = True
     ) -> dict[str, bytes]:
         """The contents of some members of a clip; ``verify`` compares their checksums.
 
         Raises:
             FileFormatError: the shard cannot be read, is cut off or damaged.
         """
-        slots = self.slots(identifier)
+        slots, most = self.slots(identifier), self._most_bytes(identifier)
+        for suffix in suffixes:
+            if slots[suffix].size > most:
+                raise FileFormatError(
+                    f"{self.file}: clip '{identifier}', '{suffix}': expected up to {most} bytes "
+                    f"for its frames, got {slots[suffix].size}; the index is damaged, copy it again"
+                )
         try:
             with self.file.open("rb") as stream:
                 contents = {}
@@ -74,6 +83,13 @@ class ShardReader:
                     f"{zlib.crc32(content):08x}; the shard is damaged, copy it again"
                 )
         return contents
+
+    def _most_bytes(self, identifier: str) -> int:
+        """More than any member of a clip can take: an index could claim the whole disk."""
+        clip = next(clip for clip in self._entry.clips if clip.identifier == identifier)
+        pixels = clip.frames * clip.size_px[0] * clip.size_px[1]
+        tracked = clip.frames * clip.tracks * (clip.views + 1)
+        return _SPARE_BYTES + _PER_PIXEL * pixels + _PER_POINT * tracked
 
     def _read_index(self) -> ShardIndex:
         index = read_index(self.file, self._entry.size)

@@ -6,9 +6,8 @@ whole shards; clips of the shard that was open are written again by whoever resu
 """
 
 import hashlib
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
@@ -28,9 +27,10 @@ from diff4splat.data.shard_file import ShardFile
 from diff4splat.data.shard_index import index_file, write_index
 from diff4splat.errors import ConfigError, InputError, OutputError
 from diff4splat.io.atomic import output_error
+from diff4splat.io.locks import sole_writer
+from diff4splat.io.partials import Partial, remove_abandoned
 
-_NUMBERS = count()
-"""Tells apart writers of one process."""
+OPEN_SHARD = "shard.tar"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +72,9 @@ class ShardWriter:
         self._sources: set[str] = set()
         self._entries: list[ClipEntry] = []
         self._shard: ShardFile | None = None
+        self._partial: Partial | None = None
         self._stopped = False
+        self._lock = ExitStack()
 
     @property
     def identifiers(self) -> frozenset[str]:
@@ -80,6 +82,14 @@ class ShardWriter:
         return frozenset(self._identifiers)
 
     def __enter__(self) -> "ShardWriter":
+        """Keep other processes from writing there.
+
+        Raises:
+            OutputError: another process writes there, or the folder cannot be made.
+        """
+        with self._stopping():
+            self._lock.enter_context(sole_writer(self._folder))
+            remove_abandoned(self._folder)
         return self
 
     def __exit__(
@@ -124,9 +134,8 @@ class ShardWriter:
 
     def _append(self, clip: EncodedClip) -> None:
         if self._shard is None:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            name = f".partial-{os.getpid()}-{next(_NUMBERS)}.tar"
-            self._shard = ShardFile(self._folder / name)
+            self._partial = self._partial or Partial(self._folder)
+            self._shard = ShardFile(self._partial.folder / OPEN_SHARD)
         self._shard.write(clip)
         self._entries.append(clip.entry)
         self._sources.add(clip.source)
@@ -154,7 +163,7 @@ class ShardWriter:
         self._shard, self._entries, self._digest = None, [], _digest(self._folder)
 
     def _list(self, target: Path, shard: ShardFile) -> Manifest:
-        """The manifest, as it now stands on the disk."""
+        """The manifest, as it is on the disk now."""
         index, size = shard.finish(target)
         write_index(index, target)
         entry = ShardEntry(name=target.name, size=size, clips=tuple(self._entries))
@@ -176,11 +185,14 @@ class ShardWriter:
     def _stop(self) -> None:
         if self._shard is not None:
             self._shard.discard()
-        self._shard, self._stopped = None, True
+        if self._partial is not None:
+            self._partial.discard()
+        self._shard, self._partial, self._stopped = None, None, True
+        self._lock.close()
 
 
 def _digest(folder: Path) -> str | None:
-    """Of the manifest as it stands; None when there is none."""
+    """Of the present manifest; None when there is none."""
     try:
         return hashlib.sha256((folder / MANIFEST).read_bytes()).hexdigest()
     except FileNotFoundError:

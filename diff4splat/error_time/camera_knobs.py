@@ -90,7 +90,7 @@ def aperture_knob() -> ApproximationSetting:
 
 
 def exposure_knob() -> ApproximationSetting:
-    """How many moments of the exposure a pixel sees."""
+    """How many times within the exposure a pixel is sampled at."""
     return _samples_knob(
         "exposure-samples", "averaging a few moments", EXPOSURE_SAMPLES, exposed_image
     )

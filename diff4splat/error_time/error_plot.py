@@ -12,7 +12,7 @@ from diff4splat.error_time.sweep import Measurement, SweepResult
 from diff4splat.io.figures.plots import label_log_axis, new_figure, save_figure
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito: told apart with any colour vision, and in grey with the markers."""
+"""Okabe and Ito: distinct with any colour vision, and in grey with the markers."""
 MARKERS = "osD^vPX"
 
 

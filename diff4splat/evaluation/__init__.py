@@ -1,1 +1,1 @@
-"""Judging models on a fixed, versioned set of clips, with trivial baselines in the same table."""
+"""Evaluation of models on a fixed, versioned set of clips, with trivial baselines beside them."""

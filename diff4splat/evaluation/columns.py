@@ -48,6 +48,18 @@ COLUMNS = (
         meaning="fraction of such pixels in the target images; depends on the clips alone",
     ),
     Column(
+        key="hidden_psnr",
+        title="PSNR hidden [dB]",
+        better="higher",
+        meaning="PSNR over the other pixels that have a true depth: what the input hides",
+    ),
+    Column(
+        key="hidden_perceptual",
+        title="perceptual hidden",
+        better="lower",
+        meaning="perceptual distance where only the hidden pixels differ from the true image",
+    ),
+    Column(
         key="ssim",
         title="SSIM",
         better="higher",

@@ -80,8 +80,23 @@ def read_item(record: object, where: str) -> ItemResult:
     try:
         scores = tuple(Score(**{**s, "parts": tuple(s["parts"])}) for s in record["scores"])
         skips = tuple(Skip(**skip) for skip in record["skips"])
-        return ItemResult(**{**record, "scores": scores, "skips": skips})
+        result = ItemResult(**{**record, "scores": scores, "skips": skips})
+        if not _is_plain(result):
+            raise TypeError("values of other types")
+        return result
     except (KeyError, TypeError) as error:
         raise FileFormatError(
             f"{where}: expected results of an evaluation, got something else; run with --fresh"
         ) from error
+
+
+def _is_plain(result: ItemResult) -> bool:
+    """Whether every field has its type; dataclasses do not look."""
+    texts = [result.clip, result.clip_sha256]
+    texts += [text for score in result.scores for text in (score.row, score.key)]
+    texts += [text for skip in result.skips for text in (skip.row, skip.key, skip.why)]
+    numbers = [score.value for score in result.scores]
+    numbers += [part for score in result.scores for part in score.parts if part is not None]
+    whole = type(result.item) is int and result.item >= 0
+    finite = all(type(number) in (int, float) and abs(number) < math.inf for number in numbers)
+    return whole and finite and all(isinstance(text, str) for text in texts)

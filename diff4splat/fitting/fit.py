@@ -8,7 +8,7 @@ with the same folder resumes the fit.
 import torch
 
 from diff4splat.errors import DivergenceError
-from diff4splat.fitting.checkpoint import load_checkpoint
+from diff4splat.fitting.checkpoints.checkpoint import load_checkpoint
 from diff4splat.fitting.evaluator import FrameQuality
 from diff4splat.fitting.fit_types import FitRequest, FitResult
 from diff4splat.fitting.model.prune_static import prune_static, skipped_static_motion
@@ -16,6 +16,7 @@ from diff4splat.fitting.optics.camera_model import CameraModel
 from diff4splat.fitting.session import FitSession
 from diff4splat.fitting.stage_loop import StageLoop
 from diff4splat.fitting.stages import COARSE, coarse_stage, fine_stage
+from diff4splat.progress.interrupts import uninterrupted
 from diff4splat.scene.scene import Scene
 
 TRAINING_FRAMES = 24
@@ -78,7 +79,8 @@ def _run(session: FitSession, loop: StageLoop, until: int) -> bool:
         session.save(loop)
         raise
     except KeyboardInterrupt:
-        session.save(loop)
+        with uninterrupted():
+            session.save(loop)
         raise
     if not finished:
         session.save(loop)

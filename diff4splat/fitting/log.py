@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from diff4splat.io.require_file import require_writable
+
 LOG_FILE = "log.jsonl"
 
 
@@ -38,8 +40,13 @@ class FitLogger:
     note: Callable[[str], None]
 
     def record(self, entry: LogEntry) -> None:
-        """Write one entry."""
+        """Write one entry.
+
+        Raises:
+            OutputError: a pipe or a device stands in the place of the log.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
+        require_writable(self.folder / LOG_FILE)
         with (self.folder / LOG_FILE).open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(asdict(entry)) + "\n")
         self.note(str(entry))

@@ -6,9 +6,10 @@ from torch import Tensor
 
 from diff4splat.data.capture.checks import require_valid_capture
 from diff4splat.data.capture.split import report_split
-from diff4splat.fitting.checkpoint import FitState, save_checkpoint
+from diff4splat.fitting.checkpoints.checkpoint import FitState, save_checkpoint
+from diff4splat.fitting.checkpoints.checkpoint_tensors import require_tensors
+from diff4splat.fitting.checkpoints.fingerprint import fingerprint
 from diff4splat.fitting.evaluator import Evaluator
-from diff4splat.fitting.fingerprint import fingerprint
 from diff4splat.fitting.fit_types import FitRequest
 from diff4splat.fitting.frames.frame_renderer import FrameRenderer
 from diff4splat.fitting.frames.frame_schedule import FrameSchedule
@@ -100,7 +101,12 @@ class FitSession:
         save_checkpoint(state, self.request.folder)
 
     def restored_model(self, state: FitState, motion: LearnedMotion) -> SceneModel:
-        """The model of a checkpoint."""
+        """The model of a checkpoint.
+
+        Raises:
+            CheckpointError: a tensor is missing, or of another shape or dtype.
+        """
+        require_tensors(state, motion, self.optics, self.settings.harmonics)
         rows = {name: state.tensors[name] for name in state.tensors if "/" not in name}
         shared = {*motion.shared(), *self.optics.names}
         columns = {name: value for name, value in rows.items() if name not in shared}

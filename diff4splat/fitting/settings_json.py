@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from diff4splat.errors import ConfigError
+from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.fitting.settings import FitSettings
+from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.training.config_codec import TypedReader
 
 
@@ -39,6 +40,6 @@ def _group(parent: dict[str, Any], name: str, key: str) -> dict[str, Any]:
 
 def _parsed(text: str) -> Any:
     try:
-        return json.loads(text)
-    except json.JSONDecodeError:
+        return decode_json(text)
+    except FileFormatError:
         return text

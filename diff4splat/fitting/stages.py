@@ -9,7 +9,8 @@ from dataclasses import fields
 from jaxtyping import Bool
 from torch import Tensor
 
-from diff4splat.fitting.checkpoint import FitState
+from diff4splat.fitting.checkpoints.checkpoint import FitState
+from diff4splat.fitting.checkpoints.checkpoint_tensors import stored_bounds
 from diff4splat.fitting.model.fine_stage_init import InitContext, init_fine_stage
 from diff4splat.fitting.model.model_init import (
     create_motion,
@@ -47,7 +48,7 @@ def fine_stage(session: FitSession, state: FitState | None, coarse: SceneModel |
     """The fine stage, from the ``coarse`` model or from a checkpoint ``state``."""
     settings = session.settings
     if state is not None:
-        bounds = state.fixed["bounds"]
+        bounds = stored_bounds(state)
         motion = create_motion(session.capture, settings, bounds)
         model = session.restored_model(state, motion)
     else:

@@ -45,9 +45,9 @@ class Guidance:
 
 
 UNGUIDED = Guidance(weight=1.0)
-"""The condition as it stands."""
+"""The condition unchanged."""
 DEFAULT_GUIDANCE = Guidance(weight=5.0, low=0.2, high=1.0)
-"""What a prompted generation uses unless told otherwise."""
+"""What a prompted generation uses by default."""
 
 
 @dataclass(slots=True, kw_only=True)

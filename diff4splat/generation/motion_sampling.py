@@ -47,6 +47,8 @@ class MotionSample:
 
     field: Float[Tensor, "3 t hc wc"]
     """Relative displacement until the last time of each latent frame (``motion_field``)."""
+    mean_field: Float[Tensor, "3 t hc wc"]
+    """The mean over all samples, which decides with the image and text what moves at all."""
     probability: Float[Tensor, "hh ww"]
     """That a pixel moves."""
     calls: CallCount
@@ -92,12 +94,18 @@ def sample_motion(
     )
     # Which pixels move is not sampled: image and text decide.
     level = noise.new_ones(1)
-    logits = network.predict_motion_and_mask(rgb, noise, level, request.text)[1]
+    mean, logits = network.predict_motion_and_mask(rgb, noise, level, request.text)
     return MotionSample(
-        field=torch.cat([torch.zeros_like(field[0, :, :1]), field[0]], 1),
+        field=_from_first(field),
+        mean_field=_from_first(mean),
         probability=bilateral_smooth(logits.sigmoid(), rgb)[0],
         calls=calls,
     )
+
+
+def _from_first(field: Float[Tensor, "1 3 t hc wc"]) -> Float[Tensor, "3 t2 hc wc"]:
+    """With the first latent frame, at which nothing has moved."""
+    return torch.cat([torch.zeros_like(field[0, :, :1]), field[0]], 1)
 
 
 def bilateral_smooth(

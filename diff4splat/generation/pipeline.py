@@ -23,7 +23,7 @@ from diff4splat.generation.inputs.request import Request, UserInput, prepare_req
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.motion_sampling import MotionRequest
-from diff4splat.generation.plan import GenerationPlan
+from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
 from diff4splat.generation.priors import image_maps
 from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
@@ -143,6 +143,9 @@ class Diff4SplatPipeline:
         if not request.plan.shows_image:
             return fill.gaussians
         image, visible_count = self._image_gaussians(request, maps, log)
+        if fill is None:
+            log.record_unused(FILL_PARTS, "the image shows all that the path sees")
+            return image
         return combine(image, visible_count, fill)
 
     def _image_gaussians(
@@ -165,6 +168,7 @@ class Diff4SplatPipeline:
             image=request.small,
             layered=build_layered_image(request.small, request.small, maps, border_cells),
             path=request.small_path,
+            key_times_s=request.small_path.times_s,
             text=text,
             seed=request.seed,
             settings=request.settings,

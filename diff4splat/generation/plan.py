@@ -1,7 +1,8 @@
 """Which networks one request needs, decided before any of them is loaded.
 
     depth prior          if the model has one; else the image lies on a plane
-    motion prior         if the model has one and a prompt asks for motion; else the image is static
+    motion prior         if the model has one and a prompt asks for motion in words that it knows;
+                         else the image is static
     text encoder         if a prompt is given and something takes it
     VAE, DiT, LDRM       only where hidden regions are filled by the video model
     deformation          only where such a fill may move
@@ -10,7 +11,7 @@ What the plan leaves out is neither loaded nor run, and the card says why.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import Fill, ModelConfig
@@ -37,6 +38,8 @@ class RequestFacts:
     """Nothing may move."""
     frames: int = 2
     """Frames of the camera path as the networks see it."""
+    static_prompt: str = ""
+    """Why a trained motion prior finds no motion in the prompt; empty where it may."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,13 +100,13 @@ def plan_generation(
     reasons = {
         "monocular_depth": _untrained("monocular_depth", trained),
         "motion_unet": _untrained("motion_unet", trained)
-        or _motion_reason(facts)
+        or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
     fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys(FILL_PARTS, fill)
     if not fill:
-        reasons["deformation"] = _deformation_reason(config, facts)
+        reasons["deformation"] = _deformation_reason(config, trained, facts)
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
     unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
     asked = unread or _untrained("text_encoder", trained)
@@ -123,19 +126,22 @@ def _untrained(part: str, trained: Collection[str]) -> str:
     return "it is not trained" if trained and part not in trained else ""
 
 
-def _motion_reason(facts: RequestFacts) -> str:
+def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:
     if facts.still:
         return "nothing may move"
     if facts.frames < 2:
         return "the camera path has one frame"
-    return "" if facts.prompt else NO_MOTION
+    if not facts.prompt:
+        return NO_MOTION
+    return facts.static_prompt if "motion_unet" in trained else ""
 
 
-def _deformation_reason(config: ModelConfig, facts: RequestFacts) -> str:
+def _deformation_reason(config: ModelConfig, trained: Collection[str], facts: RequestFacts) -> str:
     """Without a motion prior, motion is the video model's alone, prompted or not."""
     if facts.still:
         return "nothing may move"
-    return NO_MOTION if config.motion_unet.used and not facts.prompt else ""
+    one_frame = replace(facts, frames=max(facts.frames, 2))
+    return _motion_reason(trained, one_frame) if config.motion_unet.used else ""
 
 
 def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFacts) -> str:

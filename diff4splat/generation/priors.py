@@ -29,7 +29,8 @@ def image_maps(
         return ImageMaps(depth=depth, displacement=None)
     motion = _sample_motion(model, image, frames, request, log)
     mask = motion.mask(request.settings.motion.threshold)
-    displacement = rigid_component_offsets(motion.field, mask, depth)
+    mean = motion.field if request.settings.motion.steps == 1 else motion.mean_field
+    displacement = rigid_component_offsets(motion.field, mask, depth, mean)
     return ImageMaps(depth=depth, displacement=displacement if displacement.any() else None)
 
 

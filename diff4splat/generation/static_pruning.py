@@ -34,7 +34,8 @@ def prune_static_tracks(
     if static == 0:
         return motion
     why = f"they move by at most {threshold_px:g} px"
-    log.record_skipped("key times of static Gaussians", why, f"{static:,} tracks", threshold_px)
+    saved = f"{static:,} tracks"
+    log.record_skipped("key times of static Gaussians", why, saved, threshold_px, "px")
     return keep_moving(motion, moves)
 
 

@@ -167,8 +167,3 @@ def focal_from_fov(fov_deg: float, width_px: int) -> float:
 def focal_from_35mm(focal_35mm: float, size_px: tuple[int, int]) -> float:
     """Focal length in pixels of a 35 mm equivalent, by the diagonal (EXIF 2.3, tag 0xA405)."""
     return focal_35mm * math.hypot(*size_px) / FULL_FRAME_DIAGONAL_MM
-
-
-def fov_from_focal(focal_px: float, width_px: int) -> float:
-    """Horizontal field of view in degrees."""
-    return math.degrees(2 * math.atan(0.5 * width_px / focal_px))

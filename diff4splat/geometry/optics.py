@@ -62,7 +62,7 @@ class Shutter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Optics:
-    """Everything that tells a physical camera from a pinhole; the default is a pinhole.
+    """Everything that distinguishes a physical camera from a pinhole; the default is a pinhole.
 
     Raises:
         InputError: an exposure below 0.

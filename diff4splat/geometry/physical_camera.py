@@ -26,7 +26,7 @@ class PhysicalCamera:
     """Focal lengths are pixels per unit of the lens's image plane."""
     optics: Optics = field(default_factory=Optics)
     track: PoseTrack | None = None
-    """Where the camera is at any time, in place of the pose; None is a camera that stands still."""
+    """Where the camera is at any time, in place of the pose; None is a static camera."""
 
     def __post_init__(self) -> None:
         if self.camera.batch_shape != ():

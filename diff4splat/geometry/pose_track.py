@@ -2,7 +2,7 @@
 
 Axes: ``k`` known poses, ``r`` requested times. Positions go in a line and rotations the shorter way
 round at constant speed (slerp) from pose to pose; before the first and after the last the camera
-stands still.
+is static.
 """
 
 from dataclasses import dataclass

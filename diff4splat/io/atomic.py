@@ -1,62 +1,68 @@
 """Outputs appear whole or not at all: write under a temporary name, then rename."""
 
 import errno
+import hashlib
 import os
-import shutil
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager, suppress
-from itertools import count
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from diff4splat.errors import OutputError
-
-_NUMBERS = count()
-"""Tells apart writers of one process that aim at one target."""
-_ADVICE = {
-    errno.ENOSPC: "the disk is full; free some space or choose another folder",
-    errno.EDQUOT: "the disk quota is used up; free some space or choose another folder",
-    errno.EFBIG: "the file would be larger than this system allows; choose another folder",
-    errno.EACCES: "no permission to write there; choose another folder",
-    errno.EPERM: "no permission to write there; choose another folder",
-    errno.EROFS: "the file system is read-only; choose another folder",
-    errno.ENOTDIR: "a file stands where a folder is needed; choose another folder",
-    errno.EEXIST: "a file stands where a folder is needed; choose another folder",
-    errno.EISDIR: "a folder stands where the file should go; remove it or choose another name",
-    errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
-}
-
-
-def output_error(target: Path, error: OSError) -> OutputError:
-    """The same failure in words that say what to do."""
-    advice = _ADVICE.get(error.errno or 0, error.strerror or str(error))
-    return OutputError(f"{target}: expected to write here, but {advice}")
+from diff4splat.io.locks import sole_writer
+from diff4splat.io.output_error import output_error
+from diff4splat.io.partials import PREFIX, Partial, remove_abandoned
+from diff4splat.progress.interrupts import raise_if_stopped, uninterrupted
 
 
 @contextmanager
 def atomic_path(target: Path) -> Iterator[Path]:
-    """Yield a temporary name beside ``target`` and rename it when the block succeeds.
+    """Yield a temporary name near ``target`` and rename it when the block succeeds.
 
-    The suffix is kept, because some writers choose the format by it. On any failure, an interrupt
-    included, the temporary file is removed and an existing ``target`` stays as it was.
+    The file name is kept, because some writers choose the format by its suffix. On any failure, an
+    interrupt included, the temporary file is removed and an existing ``target`` stays as it was.
 
     Raises:
-        OutputError: the folder cannot be made or written.
+        OutputError: the folder cannot be made or written, or another process writes this file.
     """
-    temporary = target.parent / f".partial-{os.getpid()}-{next(_NUMBERS)}{target.suffix}"
-    try:
+    with ExitStack() as stack, _in_words(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
+        remove_abandoned(target.parent)
+        stack.enter_context(sole_writer(_claim(target), target))
+        temporary = _own_folder(target.parent, stack) / target.name
         yield temporary
-        os.replace(temporary, target)
+        raise_if_stopped()
+        with uninterrupted():
+            os.replace(temporary, target)
+
+
+def _claim(target: Path) -> Path:
+    """The folder whose lock says that ``target`` is being written."""
+    digest = hashlib.sha256(os.fsencode(target.name)).hexdigest()
+    return target.parent / f"{PREFIX}{digest[:16]}"
+
+
+def _own_folder(beside: Path, stack: ExitStack) -> Path:
+    partial = Partial(beside)
+    stack.callback(_discard, partial)
+    return partial.folder
+
+
+def _discard(partial: Partial) -> None:
+    with uninterrupted():
+        partial.discard()
+
+
+@contextmanager
+def _in_words(target: Path) -> Iterator[None]:
+    """Errors of the system as ours."""
+    try:
+        yield
     except OutputError:
         raise
     except OSError as error:
         raise output_error(target, error) from error
-    finally:
-        # A failing clean-up must not hide why the write failed.
-        with suppress(OSError):
-            temporary.unlink()
 
 
 def write_text(target: Path, text: str) -> None:
@@ -77,28 +83,29 @@ def atomic_folder(target: Path, owned: Collection[str] = ()) -> Iterator[Path]:
     block already proves that the folder can be written.
 
     Raises:
-        OutputError: the folder cannot be made or written.
+        OutputError: the folder cannot be made or written, or another process writes there.
     """
-    existed, staging = True, target / f".partial-{os.getpid()}-{next(_NUMBERS)}"
-    try:
-        existed = target.exists()
-        staging.mkdir(parents=True, exist_ok=True)
-        yield staging
-        staged = {file.name: file for file in sorted(staging.iterdir())}
-        _require_no_folder(target / name for name in {*staged, *owned})
-        for name, file in staged.items():
-            os.replace(file, target / name)
-        for name in set(owned) - set(staged):
-            (target / name).unlink(missing_ok=True)
-    except OutputError as error:
-        # People know the folder they named, not the one it was staged in.
-        raise OutputError(str(error).replace(str(staging), str(target))) from error
-    except OSError as error:
-        raise output_error(target, error) from error
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-        if not existed and target.is_dir() and not any(target.iterdir()):
-            target.rmdir()
+    with ExitStack() as stack, _in_words(target):
+        stack.enter_context(sole_writer(target))
+        remove_abandoned(target)
+        staging = _own_folder(target, stack)
+        try:
+            yield staging
+        except OutputError as error:
+            # People know the folder they named, not the one it was staged in.
+            raise OutputError(str(error).replace(str(staging), str(target))) from error
+        raise_if_stopped()
+        with uninterrupted():
+            _move(staging, target, owned)
+
+
+def _move(staging: Path, target: Path, owned: Collection[str]) -> None:
+    staged = {file.name: file for file in sorted(staging.iterdir())}
+    _require_no_folder(target / name for name in {*staged, *owned})
+    for name, file in staged.items():
+        os.replace(file, target / name)
+    for name in set(owned) - set(staged):
+        (target / name).unlink(missing_ok=True)
 
 
 def _require_no_folder(files: Iterable[Path]) -> None:

@@ -24,6 +24,7 @@ from torch import Tensor
 from diff4splat.errors import FileFormatError, InputError, OutputError, ShapeError
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.atomic import atomic_path
+from diff4splat.io.exr_header import exr_sizes
 from diff4splat.io.require_file import require_file
 from diff4splat.io.silence_stderr import silence_native_stderr
 from diff4splat.paths.camera_path import CameraPath, require_valid_path
@@ -149,13 +150,15 @@ def _silent() -> Iterator[io.StringIO]:
 
 def _read(file: Path, channel: str) -> tuple[list[dict[str, Any]], Float32[np.ndarray, "t h w"]]:
     """Headers and depth of every part."""
+    with _silent():
+        exr_sizes(file)
     try:
         with _silent() as said, OpenEXR.File(str(file), separate_channels=True) as opened:
             headers = [dict(part.header) for part in opened.parts]
             found = [part.channels for part in opened.parts]
             frames = [channels[channel].pixels for channels in found if channel in channels]
             others = {name for channels in found for name in channels} - {channel}
-    except (RuntimeError, ValueError, TypeError, MemoryError) as error:
+    except Exception as error:  # damaged data makes the library raise almost anything
         raise FileFormatError("expected an OpenEXR file, got a damaged or other one") from error
     # A frame that cannot be decoded is left out by the library; only the others still tell.
     counts = [header.get("frame_count") for header in headers]

@@ -20,6 +20,7 @@ import numba
 from numba import config, njit
 from numba.core import event
 from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
 
 EXACT = {"nogil": True, "error_model": "numpy"}
 """Options of ``numba.njit``: every operation rounds."""
@@ -72,7 +73,13 @@ def cached_njit(function: Callable[..., Any], options: dict[str, Any], *sources:
 
 
 class _DiskCache(FunctionCache):
-    """Numba's cache, but a full disk does not stop the run."""
+    """Numba's cache, but loading skips what only compiling needs, and a full disk stops nothing."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load a compiled kernel; the registries of the compiler are loaded when it compiles."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a compiled kernel if there is room for it."""

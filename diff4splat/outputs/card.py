@@ -17,6 +17,7 @@ from diff4splat.io.atomic import write_text
 from diff4splat.metrics.image import psnr
 from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.progress.run_log import RunLog
+from diff4splat.scene.extent import depth_range
 from diff4splat.scene.scene import Scene
 
 LIBRARIES = ("torch", "numpy", "safetensors", "opencv-contrib-python-headless", "OpenEXR", "pillow")
@@ -31,6 +32,9 @@ class Result:
     scene: Scene
     photo: Float[Tensor, "h w 3"]
     first_view_psnr_db: float
+    """How well the photograph is copied; a flat copy has the most."""
+    relief: float
+    """Far over near depth, what a copy does not give: 1 is a flat picture."""
 
     @classmethod
     def of(
@@ -38,7 +42,13 @@ class Result:
     ) -> "Result":
         """Compare the first frame of the path with the photograph."""
         measured = min(float(psnr(first_view, photo)), BEST_PSNR_DB)
-        return cls(scene=scene, photo=photo, first_view_psnr_db=round(measured, 2))
+        depths = depth_range(scene)
+        return cls(
+            scene=scene,
+            photo=photo,
+            first_view_psnr_db=round(measured, 2),
+            relief=round(depths.far / depths.near, 3),
+        )
 
 
 def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str, str], ...]:
@@ -54,7 +64,11 @@ def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str,
         ("Lens", focal_source),
         ("Image", f"{width} by {height} px"),
         ("Gaussians", f"{len(scene.gaussians):,}, {moving:,} of them moving"),
-        ("First view", f"{result.first_view_psnr_db:.1f} dB against the photograph"),
+        (
+            "First view",
+            f"{result.first_view_psnr_db:.1f} dB to the photograph; a flat copy has more",
+        ),
+        ("Relief", f"{result.relief:.2f} times as deep at the far as at the near end; flat is 1"),
     )
 
 
@@ -68,6 +82,7 @@ def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: Ru
         "provenance": asdict(result.scene.provenance),
         "scene": scene_facts(result.scene),
         "first_view_psnr_db": result.first_view_psnr_db,
+        "relief": result.relief,
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
         "seconds_total": round(math.fsum(seconds.values()), 3),
         "peak_memory_bytes": peak_memory_bytes(),

@@ -19,7 +19,7 @@ from diff4splat.paths.camera_path import CameraPath, require_valid_path
 MAX_DRAWN_CAMERAS = 7
 """Frustums drawn along the path."""
 SMALLEST_EXTENT = 1e-6
-"""Below this the cameras stand in one place and frustums get unit length."""
+"""Below this the cameras are in one place and frustums get unit length."""
 VIEWS = (("top view", 0, 2), ("side view", 2, 1), ("front view (as the camera looks)", 0, 1))
 """(title, world axis to the right, world axis along the page)."""
 AXIS_LABELS = ("x (right)", "y (down)", "z (forward)")

@@ -33,6 +33,8 @@ class CaptureStats:
     dropped: int = 0
     backends: list[str] = field(default_factory=list)
     skipped_effects: list[str] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
+    """About the format of the file."""
     valid: Bool[Tensor, "h w"] | None = None
     """Pixels inside the field of view of the lens in every frame."""
 
@@ -70,7 +72,7 @@ class CaptureStats:
         lines = [facts, *(f"left out: {what}" for what in self.skipped_effects)]
         if self.dropped:
             lines.append(f"left out: {self.dropped:,} Gaussians that are not finite or too large")
-        return lines
+        return [*lines, *self.notes]
 
 
 def render_photographs(

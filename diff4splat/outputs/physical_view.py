@@ -1,4 +1,4 @@
-"""One file that shows a scene through a physical camera: .mp4, .png or .exr.
+"""One file that shows a scene through a physical camera: a video, .png or .exr.
 
 Axes: ``t`` frames, ``h w`` pixels.
 """
@@ -8,13 +8,13 @@ from pathlib import Path
 
 import torch
 
-from diff4splat.errors import ConfigError
 from diff4splat.io.cameras.optics_json import optics_json
 from diff4splat.io.exr import write_depth_exr
+from diff4splat.io.movies.movie import write_movie
+from diff4splat.io.movies.suffixes import is_movie
 from diff4splat.io.photos.images import write_png
-from diff4splat.io.video import write_video
 from diff4splat.outputs.photo_sequence import CaptureStats, geometry_kind, render_photographs
-from diff4splat.outputs.scene_folder import VIEW_SUFFIXES, frames_per_second
+from diff4splat.outputs.scene_folder import frames_per_second, require_view_suffix
 from diff4splat.paths.physical_path import PhysicalPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.physical.settings import PhotoSettings
@@ -35,10 +35,9 @@ def write_physical_view(
     wanted = (kind,) if suffix == ".exr" else ("rgb",)
     with log.phases.phase("render", len(physical_path)) as advance:
         frames = render_photographs(scene, physical_path, wanted, settings, advance, taken)
-        if suffix == ".mp4":
-            write_video(
-                (frame.rgb for frame in frames), file, frames_per_second(physical_path.path)
-            )
+        if is_movie(file):
+            rgb = (frame.rgb for frame in frames)
+            taken.notes += write_movie(rgb, file, frames_per_second(physical_path.path))
         elif suffix == ".png":
             write_png(next(frames).rgb, file)
         else:
@@ -46,17 +45,3 @@ def write_physical_view(
             optics = json.dumps(optics_json(physical_path.optics))
             write_depth_exr(values, physical_path.path, file, quantity=kind, optics=optics)
     return taken
-
-
-def require_view_suffix(file: Path) -> str:
-    """The suffix of ``file`` when something can be written under it.
-
-    Raises:
-        ConfigError: it is another.
-    """
-    suffix = file.suffix.lower()
-    if suffix not in VIEW_SUFFIXES:
-        raise ConfigError(
-            f"--out: expected a name ending in {', '.join(VIEW_SUFFIXES)}, got {file}"
-        )
-    return suffix

@@ -10,11 +10,10 @@ from dataclasses import replace
 
 import torch
 
-from diff4splat.errors import InputError
 from diff4splat.geometry import rigid
 from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.easing import ease
-from diff4splat.paths.language import Segment, parse_path
+from diff4splat.paths.language import Segment, parse_path, require_short_of_near
 from diff4splat.paths.moves import Move, fixed_lens
 from diff4splat.paths.settings import PathFrame, PathSettings
 
@@ -26,26 +25,13 @@ def build_path(text: str, view: PathFrame, settings: PathSettings) -> CameraPath
         InputError: ``text`` is not understood, or the path would run into the nearest content.
     """
     segments = parse_path(text, settings.amplitude)
-    _require_short_of_near(segments)
+    require_short_of_near(segments)
     move = _chain(segments, view, settings)
     like = view.camera.world_from_camera
     cameras = view.camera.with_pose(move.world_from_camera.to(like))
     cameras = replace(cameras, focal_px=cameras.focal_px * move.focal_factor.to(like)[:, None])
     times_s = torch.arange(settings.frames, dtype=torch.float64) / settings.fps
     return require_valid_path(CameraPath(cameras=cameras, times_s=times_s.to(like)), "camera path")
-
-
-def _require_short_of_near(segments: Sequence[Segment]) -> None:
-    """The camera may come close to the nearest content, but neither reach nor pass it."""
-    travelled = 0.0
-    for segment in segments:
-        travelled += segment.preset.approach * segment.amplitude
-        if travelled >= 1:
-            raise InputError(
-                f"camera path '{segment.name}:{segment.amplitude:g}': expected less than 1 near "
-                f"depth of travel towards the content, got {travelled:g} in all; "
-                "choose a smaller amplitude"
-            )
 
 
 def _chain(segments: Sequence[Segment], view: PathFrame, settings: PathSettings) -> Move:
@@ -77,7 +63,7 @@ def _after(start: Move, moved: Move) -> Move:
 
 
 def _depth_from_end(moved: Move, focus_depth: float) -> float:
-    """Depth of the focus point once the move is over; above 0, see ``_require_short_of_near``."""
+    """Depth of the focus point once the move is over; above 0, see ``require_short_of_near``."""
     focus = moved.world_from_camera.new_tensor([[0.0, 0.0, focus_depth]])
     end_from_start = rigid.invert(moved.world_from_camera[-1])
     return float(rigid.transform_points(end_from_start, focus)[0, 2])

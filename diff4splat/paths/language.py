@@ -1,11 +1,12 @@
 """The path language: ``name[:amplitude]`` chained with ``+``, as in ``orbit:0.25+up:0.1``."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from diff4splat.errors import InputError
+from diff4splat.paths.limits import require_amplitude
 from diff4splat.paths.messages import quoted, unknown_name
 from diff4splat.paths.presets import ALIASES, AMBIGUOUS, PRESETS, Preset
-from diff4splat.paths.settings import require_amplitude
 
 MAX_SEGMENTS = 100
 
@@ -35,6 +36,23 @@ def parse_path(text: str, amplitude: float | None = None) -> tuple[Segment, ...]
             f"camera path: expected at most {MAX_SEGMENTS} segments, got {len(words)}; use a file"
         )
     return tuple(_segment(word.strip(), amplitude) for word in words)
+
+
+def require_short_of_near(segments: Sequence[Segment]) -> None:
+    """The camera may come close to the nearest content, but neither reach nor pass it.
+
+    Raises:
+        InputError: the segments travel too far towards it.
+    """
+    travelled = 0.0
+    for segment in segments:
+        travelled += segment.preset.approach * segment.amplitude
+        if travelled >= 1:
+            raise InputError(
+                f"camera path '{segment.name}:{segment.amplitude:g}': expected less than 1 near "
+                f"depth of travel towards the content, got {travelled:g} in all; "
+                "choose a smaller amplitude"
+            )
 
 
 def _segment(word: str, shared_amplitude: float | None) -> Segment:

@@ -22,7 +22,7 @@ class PhysicalPath:
     """Focal lengths are pixels per unit of the lens's image plane."""
     optics: Optics = field(default_factory=Optics)
     track: PoseTrack | None = None
-    """None is a camera that jumps from frame to frame and stands meanwhile."""
+    """None is a camera that jumps from frame to frame and is static meanwhile."""
 
     def __len__(self) -> int:
         return len(self.path)

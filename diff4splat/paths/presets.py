@@ -8,14 +8,10 @@ the move the other way.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from jaxtyping import Float
-from torch import Tensor
-
-from diff4splat.paths import moves
-from diff4splat.paths.moves import Move
+if TYPE_CHECKING:
+    from diff4splat.paths.moves import Move
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +19,7 @@ class Preset:
     """One named move."""
 
     summary: str
-    move: Callable[[Float[Tensor, " t"], float, float], Move]
+    move: "Callable[[Any, float, float], Move]"
     """(progress, extent, focus_depth) to poses."""
     unit: Literal["near depth", "turn", "none"] = "near depth"
     default_amplitude: float = 0.15
@@ -35,61 +31,73 @@ class Preset:
         return amplitude * (2 * math.pi if self.unit == "turn" else near_depth)
 
 
+def _move(name: str, **fixed: object) -> "Callable[[Any, float, float], Move]":
+    """A function of ``moves``, imported when it is called: names are checked without torch."""
+
+    def move(progress: Any, extent: float, focus_depth: float) -> "Move":
+        from diff4splat.paths import moves
+
+        return getattr(moves, name)(progress, extent, focus_depth, **fixed)
+
+    return move
+
+
 PRESETS: dict[str, Preset] = {
     "static": Preset(
         summary="stays where it is",
-        move=partial(moves.straight, direction=(0.0, 0.0, 0.0)),
+        move=_move("straight", direction=(0.0, 0.0, 0.0)),
         unit="none",
         default_amplitude=0.0,
     ),
     "orbit": Preset(
-        summary="circles the focus point, starting to the right; one turn ends where it began",
-        move=moves.orbit,
+        summary="circles the focus point, starting to the right; orbit:1 is a whole turn",
+        move=_move("orbit"),
         unit="turn",
-        default_amplitude=1.0,
+        default_amplitude=0.03,
     ),
     "arc": Preset(
         summary="swings right, left and back around the focus point, which stays centred",
-        move=moves.arc,
+        move=_move("arc"),
         default_amplitude=0.2,
     ),
     "spiral": Preset(
-        summary="circles twice with a growing radius, looking at the focus point", move=moves.spiral
+        summary="circles twice with a growing radius, looking at the focus point",
+        move=_move("spiral"),
     ),
     "forward": Preset(
         summary="moves straight ahead",
-        move=partial(moves.straight, direction=(0.0, 0.0, 1.0)),
+        move=_move("straight", direction=(0.0, 0.0, 1.0)),
         default_amplitude=0.25,
         approach=1,
     ),
     "backward": Preset(
         summary="moves straight back",
-        move=partial(moves.straight, direction=(0.0, 0.0, -1.0)),
+        move=_move("straight", direction=(0.0, 0.0, -1.0)),
         default_amplitude=0.25,
         approach=-1,
     ),
-    "up": Preset(summary="rises", move=partial(moves.straight, direction=(0.0, -1.0, 0.0))),
-    "down": Preset(summary="sinks", move=partial(moves.straight, direction=(0.0, 1.0, 0.0))),
+    "up": Preset(summary="rises", move=_move("straight", direction=(0.0, -1.0, 0.0))),
+    "down": Preset(summary="sinks", move=_move("straight", direction=(0.0, 1.0, 0.0))),
     "left": Preset(
-        summary="slides to the left", move=partial(moves.straight, direction=(-1.0, 0.0, 0.0))
+        summary="slides to the left", move=_move("straight", direction=(-1.0, 0.0, 0.0))
     ),
     "right": Preset(
-        summary="slides to the right", move=partial(moves.straight, direction=(1.0, 0.0, 0.0))
+        summary="slides to the right", move=_move("straight", direction=(1.0, 0.0, 0.0))
     ),
     "roll": Preset(
         summary="turns clockwise about the viewing axis",
-        move=moves.roll,
+        move=_move("roll"),
         unit="turn",
         default_amplitude=0.1,
     ),
     "dolly-zoom": Preset(
-        summary="moves ahead while the lens widens; what stands at the focus depth keeps its size",
-        move=moves.dolly_zoom,
+        summary="moves ahead while the lens widens; what lies at the focus depth keeps its size",
+        move=_move("dolly_zoom"),
         default_amplitude=0.25,
         approach=1,
     ),
     "figure8": Preset(
-        summary="draws a lying eight, looking at the focus point", move=moves.figure8
+        summary="draws a lying eight, looking at the focus point", move=_move("figure8")
     ),
 }
 
@@ -117,4 +125,4 @@ AMBIGUOUS: dict[str, str] = {
     "pan": "write left or right to slide, arc to swing around the subject",
     "zoom": "write forward or backward to travel, dolly-zoom to change the lens as well",
 }
-"""First words that mean different things in different programs, and what to write instead."""
+"""First words with different meanings in different programs, and what to write instead."""

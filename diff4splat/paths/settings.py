@@ -6,12 +6,7 @@ from dataclasses import dataclass
 from diff4splat.errors import InputError, ShapeError
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.easing import Easing, require_easing
-
-MAX_POSES = 100_000
-"""More cameras than this are a mistake, not a film."""
-
-MAX_AMPLITUDE = 100.0
-"""Near depths or turns; beyond it sines lose their digits."""
+from diff4splat.paths.limits import require_amplitude, require_frames
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,28 +47,3 @@ class PathSettings:
         require_easing(self.easing)
         if self.amplitude is not None:
             require_amplitude(self.amplitude, "amplitude")
-
-
-def require_frames(frames: int, fps: float) -> None:
-    """Refuse frame counts and rates that no film has.
-
-    Raises:
-        InputError: no frame, too many, or a rate that is not a finite number above 0.
-    """
-    if not 1 <= frames <= MAX_POSES:
-        raise InputError(f"frames: expected 1 to {MAX_POSES}, got {frames}; choose another count")
-    if not (math.isfinite(fps) and fps > 0):
-        raise InputError(f"fps: expected a finite rate above 0, got {fps:g}; choose another rate")
-
-
-def require_amplitude(amplitude: float, what: str) -> None:
-    """Refuse amplitudes that are not finite or absurdly large.
-
-    Raises:
-        InputError: with the allowed range.
-    """
-    if not abs(amplitude) <= MAX_AMPLITUDE:
-        raise InputError(
-            f"{what}: expected an amplitude from -{MAX_AMPLITUDE:g} to {MAX_AMPLITUDE:g}, "
-            f"got {amplitude:g}; choose a smaller one"
-        )

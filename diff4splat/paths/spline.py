@@ -18,7 +18,7 @@ from torch import Tensor
 from diff4splat.errors import InputError
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.paths.camera_path import CameraPath, require_valid_path
-from diff4splat.paths.settings import require_frames
+from diff4splat.paths.limits import require_frames
 
 _SWEEPS = 60
 """Each Jacobi sweep halves the error whatever the spacing, because the diagonal is twice the sum of
@@ -37,7 +37,7 @@ class _Bracket:
 
 
 def interpolate_keyframes(path: CameraPath, times_s: Float[Tensor, " n"]) -> CameraPath:
-    """The cameras of ``path`` at other times; beyond the first and last key they stand still.
+    """The cameras of ``path`` at other times; beyond the first and last key they are static.
 
     Raises:
         InputError: the key frames are not usable, or a requested time is not finite.

@@ -36,11 +36,13 @@ class PathSummary:
     largest_turn_deg: float
     """Between two frames."""
     focal_range_px: tuple[float, float]
+    size_px: tuple[int, int]
+    """(height, width) of the image that the focal lengths are for."""
     warnings: tuple[str, ...]
 
 
 def summarize(path: CameraPath, near_depth: float | None = None) -> PathSummary:
-    """Measure ``path``; with ``near_depth``, also judge its size."""
+    """Measure ``path``; with ``near_depth``, also rate its size."""
     require_valid_path(path, "camera path")
     position = path.cameras.position.double()
     steps = (position[1:] - position[:-1]).norm(dim=-1)
@@ -55,6 +57,7 @@ def summarize(path: CameraPath, near_depth: float | None = None) -> PathSummary:
         turn_deg=float(turns.sum()),
         largest_turn_deg=_largest(turns),
         focal_range_px=(float(path.cameras.focal_px.min()), float(path.cameras.focal_px.max())),
+        size_px=path.cameras.size_px,
         warnings=(
             *_turn_warning(turns),
             *_jump_warning(steps),
@@ -86,7 +89,7 @@ def _turn_warning(turns_deg: Float[Tensor, " s"]) -> list[str]:
 def _jump_warning(steps: Float[Tensor, " s"]) -> list[str]:
     if len(steps) < 5:
         return []
-    # Two steps on either side, because a move that turns round stands still for one.
+    # Two steps on either side, because a move that turns round has no speed in one.
     windows = torch.nn.functional.pad(steps, (2, 2)).unfold(0, 5, 1)
     nearby = windows[:, [0, 1, 3, 4]].amax(-1)
     jumps = (steps > _JUMP * nearby) & (steps > 1e-6 * steps.sum())

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from diff4splat.progress.interrupts import raise_if_stopped
+
 Advance = Callable[[], None]
 
 
@@ -28,10 +30,21 @@ class Phases:
 
     @contextmanager
     def phase(self, name: str, steps: int = 1) -> Iterator[Advance]:
-        """Time a phase; call the yielded function after each of its ``steps`` steps."""
+        """Time a phase; call the yielded function after each of its ``steps`` steps.
+
+        Raises:
+            KeyboardInterrupt: a stop was requested before a step or the end.
+        """
+        raise_if_stopped()
         start = time.perf_counter()
         with self.bar(name, steps) as advance:
-            yield advance
+
+            def finish_step() -> None:
+                advance()
+                raise_if_stopped()
+
+            yield finish_step
+            raise_if_stopped()
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
     @contextmanager

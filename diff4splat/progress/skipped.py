@@ -20,6 +20,8 @@ class SkippedWork:
     """Text with a unit: ``1,234 parameters``, ``12 network calls``."""
     error: float | None = 0.0
     """Resulting error; 0 if the result is identical, None if it was not measured."""
+    error_unit: str = ""
+    """Unit of an error above 0, such as ``px``."""
 
     def __post_init__(self) -> None:
         if not (self.what and self.why and self.saved):
@@ -28,9 +30,14 @@ class SkippedWork:
             )
         if self.error is not None and not (math.isfinite(self.error) and self.error >= 0):
             raise ConfigError(f"SkippedWork.error: expected 0 or above, got {self.error}")
+        if self.error and not self.error_unit:
+            raise ConfigError(
+                f"SkippedWork.error_unit: expected a unit of {self.error:g}, got none"
+            )
 
     def __str__(self) -> str:
-        error = "not measured" if self.error is None else f"{self.error:.3g}"
+        value = "not measured" if self.error is None else f"{self.error:.3g}"
+        error = f"{value} {self.error_unit}".strip()
         return f"{self.what}: {self.why}; saved {self.saved}; error {error}"
 
 

@@ -14,6 +14,14 @@ from diff4splat.errors import ConfigError, InputError, ShapeError
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.backends import choose
+from diff4splat.render.resolution import (
+    averaged,
+    averaging_factor,
+    enlarged,
+    enlarged_path,
+    enlarged_settings,
+    scene_dilation_px2,
+)
 from diff4splat.render.settings import (
     RenderJob,
     RenderOutput,
@@ -56,7 +64,8 @@ def render(
         InputError: a camera with NaN, infinity or a focal length of 0 or less, or such features.
     """
     wanted = _require_sources(require_outputs(outputs), settings)
-    settings = with_default_dilation(scene_or_gaussians, settings)
+    if settings.dilation_px2 is None and isinstance(scene_or_gaussians, Scene):
+        return _render_scene(scene_or_gaussians, camera, time_s, wanted, settings, backend)
     if camera.batch_shape == () and not isinstance(time_s, Tensor):
         job = _job(scene_or_gaussians, camera, time_s, wanted, settings)
         return choose(backend, job).render(job)
@@ -69,6 +78,24 @@ def render(
         for one, at in zip(cameras, times_s, strict=True)
     ]
     return stack_outputs(frames)
+
+
+def _render_scene(
+    scene: Scene,
+    camera: Camera,
+    time_s: float | Float[Tensor, " b"],
+    wanted: frozenset[str],
+    settings: RenderSettings,
+    backend: str,
+) -> RenderOutput:
+    """As the scene asks for in an image of this resolution."""
+    factor, outputs = averaging_factor(scene, camera), wanted
+    if factor > 1:
+        camera, settings = enlarged(camera, factor), enlarged_settings(settings, factor)
+        outputs = wanted | {"alpha"}
+    settings = with_default_dilation(scene, camera, settings)
+    image = render(scene, camera, time_s, outputs=outputs, settings=settings, backend=backend)
+    return image if factor == 1 else averaged(image, factor, wanted)
 
 
 def _job(
@@ -129,10 +156,17 @@ def render_video(
     Raises:
         ConfigError: an unknown output.
     """
-    wanted, settings = require_outputs(outputs), with_default_dilation(scene, settings)
+    wanted = require_outputs(outputs)
     if "flow" not in wanted:
         _require_sources(wanted, settings)
-    return _frames(scene, path, wanted, settings, backend, advance)
+    factor = averaging_factor(scene, path.cameras) if settings.dilation_px2 is None else 1
+    if factor > 1:
+        path, settings = enlarged_path(path, factor), enlarged_settings(settings, factor)
+    settings = with_default_dilation(scene, path.cameras, settings)
+    if factor == 1:
+        return _frames(scene, path, wanted, settings, backend, advance)
+    frames = _frames(scene, path, wanted | {"alpha"}, settings, backend, advance)
+    return (averaged(frame, factor, wanted) for frame in frames)
 
 
 def _frames(
@@ -145,7 +179,7 @@ def _frames(
 ) -> Iterator[RenderOutput]:
     times_s, last = path.times_s.tolist(), len(path) - 1
     to_next = "flow" in outputs and settings.flow_camera is None and settings.flow_time_s is None
-    # A scene that stands still needs no state per frame.
+    # A static scene needs no state per frame.
     subject = scene.gaussians if isinstance(scene.motion, StaticMotion) else scene
     shared = None
     if last > 0 and "flow" not in outputs:
@@ -168,11 +202,11 @@ def _frames(
         yield image
 
 
-def with_default_dilation(subject: Scene | Gaussians, settings: RenderSettings) -> RenderSettings:
-    """The settings with what the subject itself asks for, where they leave it open."""
-    if settings.dilation_px2 is not None or not isinstance(subject, Scene):
+def with_default_dilation(scene: Scene, camera: Camera, settings: RenderSettings) -> RenderSettings:
+    """The settings with what the scene itself asks for, where they leave it open."""
+    if settings.dilation_px2 is not None:
         return settings
-    return replace(settings, dilation_px2=subject.dilation_px2)
+    return replace(settings, dilation_px2=scene_dilation_px2(scene, camera))
 
 
 def _require_sources(outputs: frozenset[str], settings: RenderSettings) -> frozenset[str]:

@@ -8,7 +8,7 @@ distance:
 
 and the image is Σ w_i v_i for every channel v. Lists are worked off in pieces that carry the
 light still left, so memory does not grow with their length; with gradients each piece is computed
-again on the way back (torch.utils.checkpoint).
+again on the backward pass (torch.utils.checkpoint).
 """
 
 from collections.abc import Callable
@@ -103,7 +103,7 @@ def composite(
         medians=medians,
     )
     parts = regions(plan.boxes, plan.grid, settings.memory_bytes // _BYTES_PER_PAIR)
-    # What one region keeps for the way back fits in memory; what several keep need not.
+    # What one region keeps for the backward pass fits in memory; what several keep need not.
     blend = _blend_region if len(parts) == 1 else _forgetful(_blend_region, plan)
     image = _assemble(plan, [blend(plan, part) for part in parts])
     image = image[: size_px[0], : size_px[1]]
@@ -111,7 +111,7 @@ def composite(
 
 
 def _forgetful(function: Callable[..., Any], plan: _Plan) -> Callable[..., Any]:
-    """``function``, keeping only its arguments for the way back."""
+    """``function``, keeping only its arguments for the backward pass."""
     if not (torch.is_grad_enabled() and plan.table.requires_grad):
         return function
     return lambda *args: checkpoint(function, *args, use_reentrant=False, preserve_rng_state=False)

@@ -126,7 +126,7 @@ def simplify_motion(
     log_scale: float = 0.0,
     opacity: float = 0.0,
 ) -> Scene:
-    """Let Gaussians stand that never leave their canonical state by more than a tolerance.
+    """Make Gaussians static that never leave their canonical state by more than a tolerance.
 
     ``offset`` is in scene units. The state at every key, or at any time of a native 4D motion,
     changes by no more than the tolerances; with all of them 0 nothing changes. When nothing moves,

@@ -28,7 +28,7 @@ class Provenance:
     prompt: str | None = None
     license: str = "unknown"
     untrained: bool = False
-    """True while the weights are random: the scene shows the photograph standing in space."""
+    """True while the weights are random: the scene shows the photograph on a plane."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class Scene:
     """The suggested camera path; looking along another one is always possible."""
     provenance: Provenance
     dilation_px2: float = DILATION_PX2
-    """Variance, in square pixels, that renderers add to footprints unless they are told another;
+    """Variance, in square pixels, that renderers add to footprints unless settings name another;
     0 for one that is sharp as it is. It is the scene's, as sizes and opacities were made for it."""
 
     def __post_init__(self) -> None:
@@ -52,7 +52,7 @@ class Scene:
             )
 
     def state_at(self, time_s: float) -> Gaussians:
-        """The Gaussians as they stand at ``time_s`` seconds."""
+        """The Gaussians at ``time_s`` seconds."""
         return self.motion.state_at(self.gaussians, time_s)
 
     def select(self, keep: Bool[Tensor, " n"]) -> "Scene":

@@ -4,6 +4,11 @@ from typing import Protocol, runtime_checkable
 
 from diff4splat.errors import ConfigError
 
+MAX_COUNT, MAX_BLOCKS = 1 << 20, 1000
+"""More is damage; networks would be built for hours before the memory is counted."""
+MAX_QUOTED = 200
+"""Characters of a refused value."""
+
 
 @runtime_checkable
 class HasHeads(Protocol):
@@ -16,18 +21,18 @@ class HasHeads(Protocol):
 def require(holds: bool, what: str, expected: str, got: object) -> None:
     """Raise a ConfigError unless ``holds``."""
     if not holds:
-        raise ConfigError(f"{what}: expected {expected}, got {got!r}")
+        raise ConfigError(f"{what}: expected {expected}, got {repr(got)[:MAX_QUOTED]}")
 
 
 def require_counts(config: object, *names: str) -> None:
-    """Every named field must be a whole number of at least 1."""
+    """Every named field must be a whole number from 1 to a limit of its kind."""
     for name in names:
-        value = getattr(config, name)
+        value, most = getattr(config, name), MAX_BLOCKS if name == "blocks" else MAX_COUNT
         whole = isinstance(value, int) and not isinstance(value, bool)
         require(
-            whole and value >= 1,
+            whole and 1 <= value <= most,
             f"{type(config).__name__}.{name}",
-            "a whole number of at least 1",
+            f"a whole number of at least 1 and at most {most}",
             value,
         )
 
@@ -45,5 +50,5 @@ def require_heads(config: HasHeads, smallest: int) -> None:
 def require_optional_width(config: object, name: str) -> None:
     """The named field must be a whole number; 0 leaves the network out."""
     value = getattr(config, name)
-    whole = isinstance(value, int) and not isinstance(value, bool) and value >= 0
+    whole = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MAX_COUNT
     require(whole, f"{type(config).__name__}.{name}", "a whole number of at least 0", value)

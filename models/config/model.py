@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields, is_dataclass
 from typing import Any, Literal, TypeVar
 
-from diff4splat.errors import ConfigError, InputError
+from diff4splat.errors import ConfigError, FileFormatError, InputError
 from diff4splat.models.config.checks import require, require_counts
 from diff4splat.models.config.legacy import upgrade_config
 from diff4splat.models.config.networks import (
@@ -25,6 +25,7 @@ from diff4splat.models.config.networks import (
     VaeConfig,
 )
 from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
+from diff4splat.paths.formats.json_text import decode_json
 
 Config = TypeVar("Config")
 Fill = Literal["none", "video"]
@@ -135,9 +136,9 @@ class ModelConfig:
             ConfigError: no JSON, an unknown or missing key, or a value out of range.
         """
         try:
-            data = json.loads(text)
-        except (json.JSONDecodeError, RecursionError) as error:
-            raise ConfigError(f"model configuration: expected JSON, got {error}") from error
+            data = decode_json(text)
+        except FileFormatError as error:
+            raise ConfigError(f"model configuration: {error}") from error
         return _build(cls, _current(data), "model configuration")
 
     def fingerprint(self) -> str:

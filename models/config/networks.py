@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from diff4splat.models.config.checks import (
+    MAX_COUNT,
     require,
     require_counts,
     require_heads,
@@ -17,6 +18,8 @@ from diff4splat.models.config.checks import (
 
 TIME_STRIDE = 4
 """Video frames per latent frame after the first (paper); fixed, files depend on it."""
+MAX_WIDTHS = 12
+"""Resolutions of an autoencoder; each halves the image."""
 TOKEN_PATCH = 2
 """Latent pixels per token side, in the video model and in LDRM (paper)."""
 REFINEMENT_TOKEN_PX = 16
@@ -48,13 +51,16 @@ class VaeConfig:
         require_counts(self, "latent_channels", "pixel_patch", "blocks")
         known = isinstance(self.pca_shortcut, bool)
         require(known, "VaeConfig.pca_shortcut", "true or false", self.pca_shortcut)
-        enough = isinstance(self.widths, tuple) and len(self.widths) >= 3
+        enough = isinstance(self.widths, tuple) and 3 <= len(self.widths) <= MAX_WIDTHS
         require(
-            enough, "VaeConfig.widths", "at least 3 widths, for two halvings of time", self.widths
+            enough,
+            "VaeConfig.widths",
+            f"at least 3 widths, for two halvings of time, and at most {MAX_WIDTHS}",
+            self.widths,
         )
         for width in self.widths:
             require(
-                isinstance(width, int) and width >= 1,
+                isinstance(width, int) and 1 <= width <= MAX_COUNT,
                 "VaeConfig.widths",
                 "whole numbers above 0",
                 width,
@@ -223,12 +229,13 @@ class DeformationConfig:
     def __post_init__(self) -> None:
         require_counts(self, "width", "blocks", "time_frequencies")
         threshold = self.static_threshold_px
-        small = 0 <= threshold < math.inf
+        number = isinstance(threshold, int | float) and not isinstance(threshold, bool)
+        small = number and 0 <= threshold < math.inf
         require(small, "DeformationConfig.static_threshold_px", "a number from 0 on", threshold)
         three = isinstance(self.level_widths, tuple) and len(self.level_widths) == 3
         require(three, "DeformationConfig.level_widths", "three widths", self.level_widths)
         for width in self.level_widths:
-            whole = isinstance(width, int) and width >= 1
+            whole = isinstance(width, int) and 1 <= width <= MAX_COUNT
             require(whole, "DeformationConfig.level_widths", "whole numbers above 0", width)
 
 

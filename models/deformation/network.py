@@ -23,6 +23,7 @@ from diff4splat.models.blocks.feedforward import FeedForward
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
 from diff4splat.models.blocks.norm import EPSILON
+from diff4splat.models.blocks.resize import upsample_bilinear
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp, fourier_embedding
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import DEFORMATION_SPLIT, TIME_STRIDE
@@ -133,12 +134,3 @@ class DeformationNetwork(nn.Module):
         for block in self.blocks:
             features = block(features, condition)
         return features
-
-
-def upsample_bilinear(maps: Float[Tensor, "n c h w"], scale: int) -> Float[Tensor, "n c h2 w2"]:
-    """Bilinear upsampling in space by a whole factor."""
-    if scale == 1:
-        return maps
-    return torch.nn.functional.interpolate(
-        maps, scale_factor=scale, mode="bilinear", align_corners=False
-    )

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from diff4splat.errors import FileFormatError
 from diff4splat.io.atomic import write_text
+from diff4splat.io.require_file import read_text
 from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.provenance import PROVENANCE_FILE
 from diff4splat.models.hub.weights import CONFIG_FILE, part_file
@@ -66,8 +67,8 @@ def file_sha256(file: Path) -> str:
 
 def _read_sums(file: Path, advice: str) -> dict[str, str]:
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_text(file, "a list of checksums").splitlines()
+    except FileFormatError as error:
         raise FileFormatError(
             f"{file}: expected a list of checksums, got none that can be read; {advice}"
         ) from error

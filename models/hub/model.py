@@ -11,6 +11,7 @@ from pathlib import Path
 import torch
 
 from diff4splat.errors import ConfigError
+from diff4splat.io.locks import sole_writer
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import SIZES, size_by_name
 from diff4splat.models.factory import Networks, create_networks, model_parts, parameter_counts
@@ -25,6 +26,7 @@ from diff4splat.models.hub.provenance import (
 )
 from diff4splat.models.hub.weights import (
     CONFIG_FILE,
+    has_weights,
     load_config,
     load_networks,
     save_networks,
@@ -104,18 +106,26 @@ def with_parts(model: Model, parts: Collection[str]) -> Model:
 
 
 def save_model(model: Model, folder: Path) -> None:
-    """Write a folder that ``load_model`` reads, all parts included, without checksums."""
+    """Write a folder that ``load_model`` reads, all parts included, without checksums.
+
+    Another process that writes there, such as a stage that ends at the same time, is waited for.
+    """
     complete = with_parts(model, model.parts)
     provenance = ModelProvenance(trained=model.trained, license=model.license, origin=model.origin)
-    write_provenance(provenance, folder)
-    # Checksums of the files before would call the new ones damaged.
-    (folder / SUMS_FILE).unlink(missing_ok=True)
-    save_networks(complete.networks, model.config, folder)
+    with sole_writer(folder, wait=True):
+        write_provenance(provenance, folder)
+        # Checksums of the files before would call the new ones damaged.
+        (folder / SUMS_FILE).unlink(missing_ok=True)
+        save_networks(complete.networks, model.config, folder)
 
 
 def _stored(model: Model, parts: Collection[str]) -> Networks:
     require_parts(model.folder, parts)
     may_lack = read_provenance(model.folder).may_lack
+    drawn = [part for part in parts if part in may_lack and not has_weights(model.folder, part)]
+    if drawn:
+        counts = parameter_counts(model.config)
+        _require_memory(model.config.name, sum(counts[part] for part in drawn))
     return load_networks(model.folder, model.config, parts, may_lack)
 
 

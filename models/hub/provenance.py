@@ -17,9 +17,11 @@ from typing import Any
 
 from diff4splat.errors import CheckpointError
 from diff4splat.io.atomic import write_text
+from diff4splat.io.require_file import is_file, read_text
 from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.legacy import SOURCES
 from diff4splat.models.hub.weights import is_version_1
+from diff4splat.paths.formats.json_text import decode_json
 
 PROVENANCE_FILE = "provenance.json"
 FORMAT, VERSION = "diff4splat-model", 2
@@ -48,11 +50,12 @@ def read_provenance(folder: Path) -> ModelProvenance:
         CheckpointError: the file is damaged, or from a newer version.
     """
     file = folder / PROVENANCE_FILE
-    if not file.is_file():
+    if not is_file(file):
         return ModelProvenance()
+    text = read_text(file, "a JSON object of what is trained", CheckpointError)
     try:
-        provenance = _parse(json.loads(file.read_text(encoding="utf-8")), file)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        provenance = _parse(decode_json(text), file)
+    except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, CheckpointError):
             raise
         raise CheckpointError(

@@ -8,20 +8,21 @@ may be stored in half precision; they are read into float32. Folders of version 
 """
 
 import hashlib
-import json
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.atomic import atomic_path, write_text
+from diff4splat.io.require_file import is_file, read_text
+from diff4splat.io.scene_files.tensor_file import WEIGHT_DTYPES, read_tensors
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import PARTS, Networks, create_networks, model_parts
 from diff4splat.models.hub.legacy import legacy_file, upgrade_tensors
+from diff4splat.paths.formats.json_text import decode_json
 
 CONFIG_FILE = "config.json"
 MAX_LISTED = 3
@@ -111,24 +112,19 @@ def has_weights(folder: Path, part: str) -> bool:
 def is_version_1(folder: Path) -> bool:
     """Whether the folder has the layout of version 1; without a configuration it has not."""
     try:
-        data = json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        data = decode_json(_config_text(folder))
+    except (CheckpointError, FileFormatError):
         return False
     return isinstance(data, dict) and data.get("version", 1) == 1
 
 
 def _config_text(folder: Path) -> str:
     path = folder / CONFIG_FILE
-    if not path.is_file():
+    if not is_file(path):
         raise CheckpointError(
             f"{folder}: expected a model folder with {CONFIG_FILE}, got none; check the path"
         )
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise FileFormatError(
-            f"{path}: expected JSON in UTF-8, got other bytes; fetch the model again"
-        ) from error
+    return read_text(path, "the configuration of a model")
 
 
 def _read_part(folder: Path, part: str, config: ModelConfig) -> dict[str, Tensor]:
@@ -137,13 +133,13 @@ def _read_part(folder: Path, part: str, config: ModelConfig) -> dict[str, Tensor
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    if not path.is_file():
+    if not is_file(path):
         raise CheckpointError(f"{path}: expected a weight file, got none; fetch the model again")
     try:
-        return load_file(path)
-    except SafetensorError as error:
+        return read_tensors(path, WEIGHT_DTYPES)
+    except FileFormatError as error:
         raise FileFormatError(
-            f"{path}: expected safetensors, got a damaged file; fetch the model again"
+            f"{path}: expected safetensors, got a damaged file ({error}); fetch the model again"
         ) from error
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import tyro
 
-from diff4splat.cli.main import Command
+from diff4splat.cli.common.parser import Command
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("diff4splat", "models", "training", "data_prep", "configs")

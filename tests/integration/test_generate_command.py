@@ -15,10 +15,10 @@ from diff4splat.io.ply.ply_file import read_ply
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.metrics.image import psnr
 from diff4splat.models.hub.model import load_model
-from diff4splat.outputs import scene_folder
+from diff4splat.outputs import filming
 from diff4splat.render.api import render, render_video
 
-FILES = {"scene.safetensors", "video.mp4", "depth.exr", "preview.png", "card.json"}
+FILES = {"scene.safetensors", "video.webm", "depth.exr", "preview.png", "card.json"}
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def folder(photo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def generate(photo: Path, out: Path, *more: str) -> int:
     arguments = ["generate", str(photo), "--out", str(out), "--model", "test", "--frames", "4"]
-    return run([*arguments, "--steps", "2", "--camera", "spiral", *more])
+    return run([*arguments, "--steps", "2", "--camera", "spiral", "--video", "webm", *more])
 
 
 def test_every_promised_file_appears_and_nothing_else(folder: Path) -> None:
@@ -144,9 +144,9 @@ def test_depth_is_blended_only_when_asked_for(
         asked.append(outputs)
         return render_video(*arguments, outputs=outputs, **rest)
 
-    monkeypatch.setattr(scene_folder, "render_video", spy)
+    monkeypatch.setattr(filming, "render_video", spy)
     assert generate(photo, tmp_path / "out", "--skip-depth") == 0
-    assert asked == [("rgb",)]
+    assert asked == [("rgb", "alpha")]
     names = {file.name for file in (tmp_path / "out").iterdir()}
     assert names == FILES - {"depth.exr"}
 

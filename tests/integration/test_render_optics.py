@@ -176,7 +176,7 @@ def test_a_data_set_is_written_whole_and_once(
             ("--lens", "fisheye", "--lens-coefficients", "-9", "0", "0", "0", "--fov", "90"),
             "--fov: expected at most 22.05 degrees",
         ),
-        (("--lens", "fisheye", "--out", "x.gif"), "--out: expected a name ending in .mp4"),
+        (("--lens", "fisheye", "--out", "x.avi"), "--out: expected a name ending in .mp4"),
         (("--lens", "fisheye", "--frame", "9"), "--frame: expected -3 to 2, got 9"),
         (("--dataset", "--lens", "opencv"), "--dataset: expected --lens fisheye or blender"),
         (("--dataset", "--frame", "1"), "--frame: expected without --dataset"),

@@ -41,7 +41,8 @@ def test_an_image_without_a_prompt_needs_its_depth_alone(side_px: int) -> None:
 
 def test_every_network_runs_where_the_video_model_fills() -> None:
     image, pipeline = waves(64), Diff4SplatPipeline.from_pretrained("small")
-    scene = pipeline(image, "arc:0.1", "waves", settings=GenerationSettings(fill="video", steps=1))
+    settings = GenerationSettings(fill="video", steps=1)
+    scene = pipeline(image, "arc:0.1", "the blue ball moves to the left", settings=settings)
     assert pipeline.model.loaded == set(pipeline.model.parts)
     assert not scene.provenance.untrained
     assert float(psnr(render(scene, image.camera).rgb.clamp(0, 1), image.rgb)) >= 50

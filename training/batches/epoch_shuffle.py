@@ -1,6 +1,6 @@
 """Which of a limited number of clips a sample takes: shuffled anew in every epoch.
 
-The last clips of each kind are kept back for evaluation, so that it never sees what is trained on.
+The last clips of each kind are for evaluation alone, so that it never reads what is trained on.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from diff4splat.training.stage import SampleKey
 from diff4splat.training.trainer.loading.samples import EVALUATION_START
 
 VALIDATION_EVERY = 16
-"""One clip in so many is kept back for evaluation."""
+"""One clip in so many is for evaluation alone."""
 IndicesByMotion = dict[tuple[str, bool], list[int]]
 """Positions by kind, still or moving, and by whether evaluation owns them."""
 
@@ -42,10 +42,10 @@ class ShuffledIndices:
 
     def place(self, index: int, places: IndicesByMotion) -> int:
         """The position of a sample."""
-        judged = index >= EVALUATION_START
+        evaluates = index >= EVALUATION_START
         draw = torch.rand((), generator=SampleKey(self.seed, "kind", index, "still").generator())
         kind = "still" if bool(draw < self.still_share) else "moving"
-        positions = places[kind, judged]
+        positions = places[kind, evaluates]
         epoch, place = divmod(index % EVALUATION_START, len(positions))
         shuffle = SampleKey(self.seed, "epoch", epoch, kind).generator()
         order = torch.randperm(len(positions), generator=shuffle)

@@ -1,7 +1,7 @@
 """The unit of length that a model sees.
 
 One image does not tell its scale, so every clip is scaled until the median depth of its first
-input frame is where the photograph's plane stands (``models/ldrm/plane_prior.py``). Camera paths at
+input frame is where the photograph's plane lies (``models/ldrm/plane_prior.py``). Camera paths at
 generation time are in the same unit.
 """
 

@@ -1,4 +1,4 @@
-"""Which images of a clip a sample is judged by, and which points.
+"""Which images and points of a clip a sample is evaluated on.
 
 Axes: ``f`` frames, ``m`` target times, ``p`` views per time, ``n`` points. At least half of the
 images come from other cameras than the input's: supervision by the input views alone over-fits
@@ -16,7 +16,7 @@ from diff4splat.training.recipe.data import DataSettings
 
 INPUT_VIEW = 0
 MIN_MOTION = 0.02
-"""Way of a point, in units of which the plane stands at 4, that counts as motion."""
+"""Displacement of a point that counts as motion; the plane is at depth 4."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +82,7 @@ def draw_tracks(
 def _balanced(seen: Int[Tensor, "u 4"], clip: Clip, count: int) -> Int[Tensor, "s 4"]:
     """Up to ``count`` rows; points that move come first, for at most half of them.
 
-    Most points of most clips stand still, and the median of their displacements, which a distance
+    Most points of most clips are static, and the median of their displacements, which a distance
     is minimised by, would be nothing at all.
     """
     if not len(seen):

@@ -15,16 +15,19 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.errors import FileFormatError, InputError
+from diff4splat.errors import FileFormatError, InputError, ShapeError
 from diff4splat.geometry.camera import Camera, join_cameras
+from diff4splat.io.scene_files.tensor_checks import take_flags, take_floats
 from diff4splat.io.scene_files.tensor_file import (
     TensorFile,
     read_metadata,
     read_tensors,
     write_tensors,
 )
+from diff4splat.paths.formats.json_text import decode_json
 
 PATTERN = "latents-*.safetensors"
+MAX_SIDE_PX, MAX_VERSIONS = 16384, 1000
 TENSORS = ("latent", "focal_px", "center_px", "pose", "is_static")
 
 
@@ -135,9 +138,9 @@ def _read_pack(file: Path) -> LatentPack:
     try:
         stored = read_tensors(file)
         pack = None if "draft" in stored else _pack(stored, read_metadata(file))
-    except (FileFormatError, KeyError, ValueError, TypeError) as error:
+    except (FileFormatError, ShapeError) as error:
         raise FileFormatError(
-            f"{file}: expected {', '.join(TENSORS)} of encoded clips, got a file without; "
+            f"{file}: expected {', '.join(TENSORS)} of encoded clips, got others ({error}); "
             "encode the clips again"
         ) from error
     if pack is None:
@@ -149,30 +152,57 @@ def _read_pack(file: Path) -> LatentPack:
 
 
 def _pack(stored: Mapping[str, Tensor], metadata: Mapping[str, str]) -> LatentPack:
-    render, validity = stored.get("render_latent"), stored.get("validity")
-    if (render is None) != (validity is None):
-        raise ValueError("a render condition without its latent or its validity")
-    cameras = Camera(
-        focal_px=stored["focal_px"],
-        center_px=stored["center_px"],
-        world_from_camera=stored["pose"],
-        size_px=tuple(json.loads(metadata["size_px"])),
-    )
+    if "model" not in metadata:
+        raise FileFormatError("model: expected the digest of its weights, got none")
+    text = {key: decode_json(metadata.get(key, "")) for key in ("size_px", "captions", "versions")}
+    latent = _clips(stored, "latent", (None, None, None, None, None))
+    count, focal_px = len(latent), take_floats(stored, "focal_px", (len(latent), None, 2))
+    frames, size_px = focal_px.shape[1], _size_px(text["size_px"])
+    is_rendered = "render_latent" in stored or "validity" in stored
     return LatentPack(
-        latent=stored["latent"],
-        render_latent=render,
-        validity=None if validity is None else validity.bool(),
-        cameras=cameras,
-        is_static=stored["is_static"].bool(),
-        captions=_captions(metadata, len(stored["latent"])),
+        latent=latent,
+        render_latent=_clips(stored, "render_latent", latent.shape) if is_rendered else None,
+        validity=_validity(stored, (count, 1, frames, *size_px)) if is_rendered else None,
+        cameras=Camera(
+            focal_px=focal_px,
+            center_px=take_floats(stored, "center_px", (count, frames, 2)),
+            world_from_camera=take_floats(stored, "pose", (count, frames, 4, 4)),
+            size_px=size_px,
+        ),
+        is_static=take_flags(stored, "is_static", (count,), torch.int64),
+        captions=_captions(text["captions"], count),
         model=metadata["model"],
-        versions=int(metadata["versions"]),
+        versions=_versions(text["versions"]),
     )
 
 
-def _captions(metadata: dict[str, str], count: int) -> tuple[str, ...]:
+def _clips(stored: Mapping[str, Tensor], name: str, shape: tuple[int | None, ...]) -> Tensor:
+    values = take_floats(stored, name, tuple(shape))
+    if values.dtype != torch.float32 or not len(values):
+        raise FileFormatError(f"{name}: expected float32 of some clips, got {values.dtype}")
+    return values
+
+
+def _validity(stored: Mapping[str, Tensor], shape: tuple[int, ...]) -> Tensor:
+    return take_flags(stored, "validity", shape, torch.uint8)
+
+
+def _size_px(value: object) -> tuple[int, int]:
+    whole = isinstance(value, list) and len(value) == 2 and all(type(side) is int for side in value)
+    if not whole or not all(1 <= side <= MAX_SIDE_PX for side in value):
+        raise FileFormatError(f"size_px: expected height and width, got {str(value)[:60]}")
+    return value[0], value[1]
+
+
+def _captions(value: object, count: int) -> tuple[str, ...]:
     """One per latent."""
-    captions = tuple(json.loads(metadata["captions"]))
-    if len(captions) != count:
-        raise ValueError(f"{len(captions)} captions for {count} latents")
-    return captions
+    texts = isinstance(value, list) and all(isinstance(text, str) for text in value)
+    if not texts or len(value) != count:
+        raise FileFormatError(f"captions: expected {count} texts, got {str(value)[:60]}")
+    return tuple(value)
+
+
+def _versions(value: object) -> int:
+    if type(value) is not int or not 1 <= value <= MAX_VERSIONS:
+        raise FileFormatError(f"versions: expected 1 to {MAX_VERSIONS}, got {str(value)[:60]}")
+    return value

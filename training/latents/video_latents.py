@@ -85,7 +85,7 @@ def render_condition(model: Model, first: FirstFrame) -> RenderCondition | None:
     layered = build_layered_image(image, image, maps, border_cells)
     times_s = torch.linspace(0, 1, len(first.cameras), device=depth.device)
     path = CameraPath(cameras=first.cameras, times_s=times_s)
-    return encode_condition(model, render_layered_image(layered, path))
+    return encode_condition(model, render_layered_image(layered, path, times_s))
 
 
 @torch.no_grad()

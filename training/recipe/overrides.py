@@ -4,11 +4,11 @@ A key names a field: ``trainer.precision``, ``model.ldrm.width``, or ``stages.va
 stage's name.
 """
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
-from diff4splat.errors import ConfigError
+from diff4splat.errors import ConfigError, FileFormatError
+from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.recipe_json import recipe_from_dict, recipe_to_dict
 
@@ -36,10 +36,15 @@ def _parent(data: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
     for depth, word in enumerate(words[:-1]):
         parent = _child(parent, word, ".".join(words[: depth + 1]))
         if isinstance(parent, list) and depth == 0:
-            parent = {stage["name"]: stage for stage in parent}
+            parent = {str(stage["name"]): stage for stage in parent if _is_named(stage)}
     if not isinstance(parent, dict) or words[-1] not in parent:
         _refuse(key, parent)
     return parent, words[-1]
+
+
+def _is_named(stage: Any) -> bool:
+    """Earlier changes may have put anything in the place of a stage."""
+    return isinstance(stage, dict) and "name" in stage
 
 
 def _child(parent: Any, word: str, path: str) -> Any:
@@ -56,6 +61,6 @@ def _refuse(key: str, parent: Any) -> None:
 
 def _parsed(text: str) -> Any:
     try:
-        return json.loads(text)
-    except (json.JSONDecodeError, RecursionError):
+        return decode_json(text)
+    except FileFormatError:
         return text

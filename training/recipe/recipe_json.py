@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from diff4splat.errors import ConfigError
+from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.models.config.model import ModelConfig
+from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.training.config_codec import TypedReader
 from diff4splat.training.recipe.legacy import upgraded
 from diff4splat.training.recipe.losses import LOSSES, Losses
@@ -39,9 +40,9 @@ def recipe_from_json(text: str) -> Recipe:
             kind.
     """
     try:
-        data = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise ConfigError(f"recipe: expected JSON, got {error}") from error
+        data = decode_json(text)
+    except FileFormatError as error:
+        raise ConfigError(f"recipe: {error}") from error
     return recipe_from_dict(data)
 
 

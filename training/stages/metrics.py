@@ -21,7 +21,7 @@ Metrics = dict[str, Float[Tensor, " b"]]
 def reconstruction_metrics(rendered: RenderedScenes, batch: ClipBatch) -> Metrics:
     """``psnr``, ``depth_correlation`` and, with motion, ``track_error`` and its share of the truth.
 
-    ``track_share`` is the error over that of standing still: 1 is no better than no motion. Where a
+    ``track_share`` is the error over that of no motion: 1 is no better than no motion. Where a
     measure does not apply (no moving point, no true depth that varies) it is NaN, and means leave
     it out; a rendered depth that does not vary counts as uncorrelated.
     """

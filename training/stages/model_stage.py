@@ -37,7 +37,7 @@ class StagePlan:
 class ModelStage(Stage):
     """Parts of a model as submodules; frozen parts have no gradient and stay in eval.
 
-    Abstract: every kind is a final class that adds its losses, measures and preview.
+    Abstract: every kind is a final class with its losses, metrics and preview.
     """
 
     parts: tuple[str, ...] = ()

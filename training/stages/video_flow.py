@@ -33,6 +33,8 @@ from diff4splat.training.stages.text_conditioning import TextConditioning
 
 EVAL_LEVELS = (0.25, 0.5, 0.75)
 """Noise levels at which evaluation measures the velocity."""
+EVAL_NOISE = "judged"
+"""Purpose of the noise in evaluation. It seeds the draws, so another word would change them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +114,7 @@ class VideoFlow:
 
     def at_level(self, batch: LatentBatch, level: float) -> NoisyVideo:
         """All samples at one level, with the noise of evaluation."""
-        return self.with_noise(batch, batch.latent.new_full((len(batch),), level), "judged")
+        return self.with_noise(batch, batch.latent.new_full((len(batch),), level), EVAL_NOISE)
 
     def with_noise(
         self, batch: LatentBatch, level: Float[Tensor, " b"], purpose: str

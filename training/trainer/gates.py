@@ -1,14 +1,21 @@
 """Whether a stage was good enough for the next one, and the file that says how good it was."""
 
 import json
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.atomic import write_text
+from diff4splat.io.require_file import is_file, read_text
+from diff4splat.paths.formats.json_text import decode_object
 from diff4splat.training.recipe.stage import Gate, StageRecipe
 from diff4splat.training.trainer.logs.run_files import RESULT_FILE, finite
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
+"""Of a checkpoint: a name inside its folder."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,19 +49,30 @@ def read_result(folder: Path) -> StoredResult:
         FileFormatError: the file is damaged.
     """
     file = folder / RESULT_FILE
-    if not file.is_file():
+    if not is_file(file) and not file.exists():
         raise ConfigError(
             f"{file}: expected the result of the stage before, got none; train that stage first"
         )
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-        if not isinstance(found["measures"], dict):
-            raise TypeError
-        return StoredResult(**found)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        return _stored(decode_object(read_text(file, "the result of a stage")))
+    except FileFormatError as error:
         raise FileFormatError(
             f"{file}: expected the result of a stage, got something else; evaluate it again"
         ) from error
+
+
+def _stored(found: dict[str, object]) -> StoredResult:
+    wanted = {"stage": str, "finished": bool, "step": int, "checkpoint": str, "measures": dict}
+    wrong = [key for key in {*wanted, *found} if type(found.get(key)) is not wanted.get(key)]
+    if wrong:
+        raise FileFormatError(f"expected {', '.join(wanted)}, got others at {min(wrong)[:60]}")
+    name = str(found["checkpoint"])
+    if not _NAME.fullmatch(name):
+        raise FileFormatError(f"expected the name of a checkpoint, got {name[:60]!r}")
+    numbers = [value for value in found["measures"].values() if value is not None]
+    if not all(type(value) in (int, float) and abs(value) < math.inf for value in numbers):
+        raise FileFormatError("expected measures that are numbers or null, got others")
+    return StoredResult(**found)
 
 
 def stage_may_start(previous: StageRecipe, folder: Path, override: bool = False) -> None:

@@ -64,7 +64,7 @@ class RunSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageResult:
-    """Where a stage stands."""
+    """The state of a stage."""
 
     stage: str
     outcome: Outcome

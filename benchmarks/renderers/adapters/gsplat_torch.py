@@ -45,7 +45,7 @@ def prepare(gaussians: Gaussians, camera: Camera) -> TorchPrepared:
 
 
 def draw(gaussians: Gaussians, camera: Camera) -> Float[Tensor, "h w 3"]:
-    """The picture, as ``gsplat.rasterization`` puts the pieces together."""
+    """The image, as ``gsplat.rasterization`` puts the pieces together."""
     from gsplat.cuda import _torch_impl as gsplat
 
     height, width = camera.size_px
@@ -113,7 +113,7 @@ def pairs_in_range(  # noqa: PLR0913, PLR0917  the signature is gsplat's
     offsets: Int[Tensor, "1 rows columns"],
     members: Int[Tensor, " m"],
 ) -> tuple[Int[Tensor, " p"], Int[Tensor, " p"], Int[Tensor, " p"]]:
-    """(Gaussian, pixel, picture) of all contributions, as ``RasterizeToIndices3DGS.cu`` does."""
+    """(Gaussian, pixel, image) of all contributions, as ``RasterizeToIndices3DGS.cu`` does."""
     starts = [*offsets.flatten().tolist(), len(members)]
     block, columns = tile_px * tile_px, offsets.shape[-1]
     gaussians, pixels = [members[:0]], [members[:0]]

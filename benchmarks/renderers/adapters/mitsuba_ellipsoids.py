@@ -1,8 +1,8 @@
 """Mitsuba 3 (BSD): its ellipsoids and radiance-field integrator, ray-traced on the CPU.
 
 It evaluates a Gaussian at its peak along the ray, orders by where rays enter the 3-sigma shell, and
-has no dilation of the picture. Scales are widened here by what 0.3 px² means at the Gaussian's
-depth, s'² = s² + 0.3 (z / f)², so that footprints are about ours; the picture stays another one.
+has no dilation of the image. Scales are widened here by what 0.3 px² means at the Gaussian's
+depth, s'² = s² + 0.3 (z / f)², so that footprints are about ours; the image stays another one.
 Quaternions are xyzw there. The search structure is built outside of what is timed.
 """
 
@@ -44,7 +44,7 @@ class Traced:
     """One through the centre of every pixel."""
 
     def forward(self) -> Float[Tensor, "h w 3"]:
-        """The picture, row by row."""
+        """The image, row by row."""
         import drjit
 
         with drjit.suspend_grad():

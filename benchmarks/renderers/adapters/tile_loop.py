@@ -1,8 +1,8 @@
 """The obvious loop in PyTorch: what one writes in an afternoon, and what many projects ship.
 
 For every 16×16 tile: the Gaussians whose 3-sigma box touches it, nearest first, a dense
-(pixels × Gaussians) matrix of alphas, a cumulative product, autograd for the way back. Footprints
-as in docs/reference/rendering.md.
+(pixels × Gaussians) matrix of alphas, a cumulative product, autograd for the backward pass.
+Footprints as in docs/reference/rendering.md.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ TILE_PX, DILATION_PX2, CUTOFF, LARGEST = 16, 0.3, 1 / 255, 0.999
 
 @dataclass(frozen=True, slots=True)
 class Splats:
-    """Gaussians on the picture, nearest first."""
+    """Gaussians on the image, nearest first."""
 
     center: Float[Tensor, "n 2"]
     conic: Float[Tensor, "n 3"]
@@ -43,7 +43,7 @@ def prepare(gaussians: Gaussians, camera: Camera) -> TorchPrepared:
 
 
 def draw(gaussians: Gaussians, camera: Camera) -> Float[Tensor, "h w 3"]:
-    """The picture, tile by tile."""
+    """The image, tile by tile."""
     splats = project(gaussians, camera)
     height, width = camera.size_px
     bands = [
@@ -82,7 +82,7 @@ def project(gaussians: Gaussians, camera: Camera) -> Splats:
 
 
 def tile(splats: Splats, top: int, left: int, camera: Camera) -> Float[Tensor, "rows columns 3"]:
-    """One tile of the picture."""
+    """One tile of the image."""
     rows = torch.arange(top, min(top + TILE_PX, camera.size_px[0])) + 0.5
     columns = torch.arange(left, min(left + TILE_PX, camera.size_px[1])) + 0.5
     nearest, farthest = splats.center - splats.radius, splats.center + splats.radius

@@ -18,7 +18,7 @@ from diff4splat.data_prep.readers.colmap.model import (
     ModelImage,
 )
 from diff4splat.errors import FileFormatError
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_bytes
 
 _POINT_2D_BYTES, _SEEN_BYTES = 24, 8
 
@@ -27,8 +27,8 @@ class _Bytes:
     """A sequential binary reader."""
 
     def __init__(self, file: Path) -> None:
-        require_file(file, "a binary file of a COLMAP model")
-        self.file, self._data, self._position = file, file.read_bytes(), 0
+        data = read_bytes(file, "a binary file of a COLMAP model")
+        self.file, self._data, self._position = file, data, 0
 
     def take(self, layout: str) -> tuple:
         """Read the next values."""

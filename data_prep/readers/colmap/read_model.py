@@ -18,7 +18,7 @@ from torch import Tensor
 from diff4splat.data_prep.readers.colmap import binary_model, text_model
 from diff4splat.data_prep.readers.colmap.model import Model, ModelCamera, ModelImage, suffix_of
 from diff4splat.data_prep.readers.common.fisheye_lenses import require_fisheye
-from diff4splat.data_prep.readers.common.intrinsics import Intrinsics
+from diff4splat.data_prep.readers.common.intrinsics import MAX_SIDE_PX, Intrinsics
 from diff4splat.errors import FileFormatError
 from diff4splat.geometry import quaternion, rigid
 from diff4splat.paths.formats.checks import exact_poses
@@ -85,10 +85,11 @@ def camera_intrinsics(camera: ModelCamera, where: str) -> Intrinsics:
     two = camera.model in ("PINHOLE", "OPENCV", "OPENCV_FISHEYE")
     focal_px = (numbers[0], numbers[1] if two else numbers[0])
     column, row, *bent = numbers[2:] if two else numbers[1:]
-    if not (np.isfinite(numbers).all() and min(*focal_px, *camera.size_px) > 0):
+    sized = all(1 <= side <= MAX_SIDE_PX for side in camera.size_px)
+    if not (sized and np.isfinite(numbers).all() and min(focal_px) > 0):
         raise FileFormatError(
             f"{where}: expected sizes and focal lengths above 0 and finite numbers, got "
-            f"{camera.size_px} and {numbers}; write the model again"
+            f"{str(camera.size_px)[:60]} and {numbers}; write the model again"
         )
     straight = Intrinsics(focal_px=focal_px, center_px=(column, row), size_px=camera.size_px)
     four = (*bent, *[0.0] * (4 - len(bent)))

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from diff4splat.data_prep.readers.colmap.binary_model import require_known_model
 from diff4splat.data_prep.readers.colmap.model import PARAMETERS, ModelCamera, ModelImage
 from diff4splat.errors import FileFormatError
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_bytes
 
 _CAMERA = "CAMERA_ID MODEL WIDTH HEIGHT PARAMS"
 _IMAGE = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
@@ -87,8 +87,8 @@ def read_points(file: Path) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray,
 
 
 def _lines(file: Path, keep_empty: bool = False) -> Iterator[tuple[int, str]]:
-    require_file(file, "a text file of a COLMAP model")
-    text = file.read_text(encoding="utf-8", errors="replace")
+    content = read_bytes(file, "a text file of a COLMAP model")
+    text = content.decode("utf-8", errors="replace")
     for number, line in enumerate(text.split("\n"), start=1):
         if not line.startswith("#") and (keep_empty or line.strip()):
             yield number, line
@@ -97,7 +97,7 @@ def _lines(file: Path, keep_empty: bool = False) -> Iterator[tuple[int, str]]:
 def _numbers(words: list[str], kind: type, where: str, form: str) -> list:
     try:
         return [kind(word) for word in words]
-    except ValueError:
+    except ValueError:  # of words that are no numbers, and of thousands of digits
         raise _odd(where, form) from None
 
 

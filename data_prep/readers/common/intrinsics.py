@@ -20,6 +20,12 @@ from diff4splat.errors import FileFormatError
 _ROUNDING_PX = 1.5
 """What halving an image may do to its sides."""
 _OUTSIDE = -2.0
+_LARGEST = 1e12
+"""Of any number of a camera; powers of larger ones leave float64."""
+_FARTHEST_PX = 1e6
+"""Outside any image, and inside what OpenCV's remap can hold."""
+MAX_SIDE_PX = 100_000
+"""Of an image; larger sizes are damage."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +63,16 @@ class Intrinsics:
             FileFormatError: the shape differs by more than rounding to whole pixels.
         """
         (height, width), (new_height, new_width) = self.size_px, size_px
+        if max(height, width) > MAX_SIDE_PX:
+            raise FileFormatError(
+                f"{where}: expected a camera of up to {MAX_SIDE_PX} pixels per side, got more; "
+                "repair its size"
+            )
+        if not self._is_bounded():
+            raise FileFormatError(
+                f"{where}: expected focal lengths above 0 and numbers up to {_LARGEST:.0e}, got "
+                "others; calibrate the camera again"
+            )
         across, along = new_width / width, new_height / height
         if abs(height * across - new_height) > _ROUNDING_PX:
             raise FileFormatError(
@@ -70,6 +86,11 @@ class Intrinsics:
             skew_px=self.skew_px * across,
             size_px=size_px,
         )
+
+    def _is_bounded(self) -> bool:
+        numbers = (*self.center_px, self.skew_px, *self.radial, *self.tangential, *self.fisheye)
+        small = all(abs(number) <= _LARGEST for number in numbers)
+        return small and all(0 < focal <= _LARGEST for focal in self.focal_px)
 
     def downscaled(self, factor: int) -> "Intrinsics":
         """The intrinsics for images downscaled by ``factor``."""
@@ -105,8 +126,11 @@ def undistortion_map(lens: Intrinsics) -> tuple[Float[np.ndarray, "h w"], Float[
     column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     x = (column - lens.center_px[0]) / lens.focal_px[0]
     y = (row - lens.center_px[1]) / lens.focal_px[1]
-    across, down = distort(lens, x, y)
-    seen = x * x + y * y < _turning_point(lens)
+    # Strong distortion far outside the image leaves any range; such pixels have no source.
+    with np.errstate(over="ignore", invalid="ignore"):
+        across, down = distort(lens, x, y)
+        seen = x * x + y * y < _turning_point(lens)
+        seen &= (np.abs(across) < _FARTHEST_PX) & (np.abs(down) < _FARTHEST_PX)
     across, down = (np.where(seen, source - 0.5, _OUTSIDE) for source in (across, down))
     return across.astype(np.float32), down.astype(np.float32)
 

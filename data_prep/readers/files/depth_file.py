@@ -10,7 +10,8 @@ from PIL import Image
 
 from diff4splat.data_prep.readers.files.float_files import exr_channels, npy_array
 from diff4splat.errors import FileFormatError
-from diff4splat.io.require_file import require_file
+from diff4splat.io.photos import photo_validation
+from diff4splat.io.require_file import opened_file
 
 MILLIMETRE = 1e-3
 """Default unit of integer depth, in metres."""
@@ -85,10 +86,16 @@ def grey_levels(file: Path) -> np.ndarray:
     Raises:
         FileFormatError: missing or damaged.
     """
-    require_file(file, "an image")
     try:
-        with Image.open(file, formats=("PNG", "TIFF", "JPEG", "BMP")) as image:
+        with (
+            opened_file(file, "an image") as stream,
+            Image.open(stream, formats=("PNG", "TIFF", "JPEG", "BMP")) as image,
+        ):
+            if image.width * image.height > photo_validation.MAX_PIXELS:
+                raise ValueError("more pixels than any depth map")
             return np.asarray(image)
+    except FileFormatError:
+        raise
     except Exception as error:  # damaged files make Pillow's readers raise almost anything
         raise FileFormatError(
             f"{file}: expected a whole image, got a cut off, damaged or other file; copy it again"

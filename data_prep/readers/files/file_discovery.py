@@ -6,11 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from diff4splat.errors import FileFormatError, InputError
+from diff4splat.io.require_file import is_file
 from diff4splat.paths.messages import quoted
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".exr", ".npy")
 
-_CAMERA = re.compile(r"cam(era)?[_-]?\d+", re.IGNORECASE)
+_CAMERA = re.compile(r"cam(era)?[_-]?[0-9]+", re.IGNORECASE)
+_MAX_DIGITS = 18
+_PATH_BYTES, _NAME_BYTES = 2048, 240
+"""Somewhat less than Linux allows: a suffix may be appended."""
 _VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
 
 
@@ -35,6 +39,11 @@ def locate_capture(path: Path | str) -> CaptureLocation:
         InputError: nothing is there, or the folder is empty.
     """
     path = Path(path)
+    if path.suffix.lower() in (*_VIDEO_SUFFIXES, ".gif") and not path.is_dir():
+        raise InputError(
+            f"{path}: expected a folder with images, poses and times, got one video; "
+            "estimate its poses with COLMAP and give that folder"
+        )
     if path.is_file():
         return CaptureLocation(folder=path.parent, file=path)
     if not path.is_dir():
@@ -48,15 +57,24 @@ def resolve_inside(folder: Path, name: str, where: str) -> Path:
     """The path ``name`` inside ``folder``.
 
     Raises:
-        FileFormatError: it is empty, absolute, or leaves the folder.
+        FileFormatError: it is empty, absolute, leaves the folder, or is no name of a file.
     """
-    plain = os.path.normpath(name.replace("\\", "/")) if name and "\0" not in name else ".."
+    plain = os.path.normpath(name.replace("\\", "/")) if _is_name(name) else ".."
     if os.path.isabs(plain) or plain == ".." or plain.startswith("../"):
         raise FileFormatError(
             f"{where}: expected a path inside {folder}, got {quoted(name)}; move the file there "
             "and write its path from there"
         )
     return folder / plain
+
+
+def _is_name(name: str) -> bool:
+    """Whether a file can have this name: systems limit the length of a path and of its parts."""
+    encoded = name.encode(errors="replace")
+    parts = encoded.replace(b"\\", b"/").split(b"/")
+    encodable = encoded.decode() == name and b"\0" not in encoded
+    longest = max(len(part) for part in parts)
+    return bool(name) and encodable and len(encoded) <= _PATH_BYTES and longest <= _NAME_BYTES
 
 
 def find_image(folder: Path, name: str, where: str) -> Path:
@@ -67,15 +85,15 @@ def find_image(folder: Path, name: str, where: str) -> Path:
     """
     file = resolve_inside(folder, name, where)
     for candidate in (file, *(file.with_name(file.name + suffix) for suffix in IMAGE_SUFFIXES)):
-        if candidate.is_file():
+        if is_file(candidate):
             return candidate
     raise FileFormatError(f"{where}: expected the image {file}, got no such file; copy it again")
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
     """Sorts ``frame_10`` after ``frame_9``."""
-    parts = re.split(r"(\d+)", name)
-    return tuple((1, int(part), part) if part.isdigit() else (0, 0, part) for part in parts)
+    parts = re.split(r"([0-9]+)", name)
+    return tuple((1, _number(part), part) if part.isdecimal() else (0, 0, part) for part in parts)
 
 
 def images_in(folder: Path) -> list[Path]:
@@ -118,5 +136,10 @@ def camera_videos(folder: Path) -> dict[str, Path]:
 
 def last_number(name: str) -> int | None:
     """The last number in a file name without its suffix: 12 of ``frame_00012.jpg``."""
-    numbers = re.findall(r"\d+", PurePosixPath(name).stem)
-    return int(numbers[-1]) if numbers else None
+    numbers = re.findall(r"[0-9]+", PurePosixPath(name).stem)
+    return _number(numbers[-1]) if numbers else None
+
+
+def _number(digits: str) -> int:
+    """Of a name; one of hundreds of digits counts by its last ones, which Python can convert."""
+    return int(digits[-_MAX_DIGITS:])

@@ -22,7 +22,7 @@ from diff4splat.data_prep.readers.files.float_files import (
 )
 from diff4splat.errors import FileFormatError
 from diff4splat.io.photos import photo_validation
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import opened_file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,12 +99,19 @@ class ImageFile:
 
 @contextmanager
 def _image(file: Path) -> Iterator[Image.Image]:
-    require_file(file, "an image")
     try:
         # Pillow warns about sizes and odd metadata; neither is a reason to stop.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with Image.open(file, formats=photo_validation.FORMATS) as image:
+            with (
+                opened_file(file, "an image") as stream,
+                Image.open(stream, formats=photo_validation.FORMATS) as image,
+            ):
+                if image.width * image.height > photo_validation.MAX_PIXELS:
+                    raise FileFormatError(
+                        f"{file}: expected at most {photo_validation.MAX_PIXELS:,} pixels, got "
+                        f"{image.width} x {image.height}; make it smaller first"
+                    )
                 yield image
     except FileFormatError:
         raise

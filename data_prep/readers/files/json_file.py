@@ -1,13 +1,11 @@
 """JSON files of other programs."""
 
-import json
 from pathlib import Path
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import MAX_TEXT_BYTES, read_bytes
 from diff4splat.paths.formats.json_fields import kind_of
-
-MAX_BYTES = 256 * 2**20
+from diff4splat.paths.formats.json_text import decode_json
 
 
 def read_object(file: Path) -> dict[str, object]:
@@ -16,19 +14,11 @@ def read_object(file: Path) -> dict[str, object]:
     Raises:
         FileFormatError: missing, huge, not JSON, or JSON of another kind.
     """
-    require_file(file, "a JSON file")
-    if file.stat().st_size > MAX_BYTES:
-        raise FileFormatError(
-            f"{file}: expected at most {MAX_BYTES // 2**20} MiB of JSON, got more; wrong file?"
-        )
+    content = read_bytes(file, "a JSON file", max_bytes=MAX_TEXT_BYTES)
     try:
-        root = json.loads(file.read_bytes())
-    except json.JSONDecodeError as error:
-        raise FileFormatError(
-            f"{file}: line {error.lineno}: expected JSON, but {error.msg}; repair the file"
-        ) from None
-    except (ValueError, RecursionError):
-        raise FileFormatError(f"{file}: expected JSON, got other data; copy it again") from None
+        root = decode_json(content)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from None
     if not isinstance(root, dict):
         raise FileFormatError(
             f"{file}: expected a JSON object, got {kind_of(root)}; check the path"

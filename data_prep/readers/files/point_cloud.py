@@ -14,10 +14,11 @@ from diff4splat.data_prep.readers.files.float_files import npy_array
 from diff4splat.errors import FileFormatError
 from diff4splat.io.ply.ply_body import Columns, read_columns
 from diff4splat.io.ply.ply_header import read_header
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_bytes
 
 DEFAULT_GREY = 0.5
 """For points without colours."""
+_LARGEST = float(np.finfo(np.float32).max)
 
 CloudWithNotes = tuple[PointCloud | None, tuple[str, ...]]
 """The cloud and notes about it."""
@@ -27,7 +28,8 @@ def cloud_from_arrays(
     positions: Float[np.ndarray, "p 3"], rgb: Float[np.ndarray, "p 3"] | None, where: str
 ) -> CloudWithNotes:
     """A cloud of the finite points; without colours they are grey."""
-    finite = np.isfinite(positions).all(-1)
+    # Beyond float32 as well: stored as such, they would be infinite.
+    finite = (np.abs(positions) <= _LARGEST).all(-1)
     notes = []
     if not finite.all():
         notes.append(f"{where}: {int((~finite).sum())} points that are not finite were dropped")
@@ -49,8 +51,7 @@ def read_cloud(file: Path) -> CloudWithNotes:
     Raises:
         FileFormatError: missing, damaged, or without x, y and z.
     """
-    require_file(file, "a PLY file")
-    data = file.read_bytes()
+    data = read_bytes(file, "a PLY file")
     try:
         columns = read_columns(data, read_header(data), "vertex")
     except FileFormatError as error:

@@ -20,6 +20,7 @@ from diff4splat.io.silence_stderr import silence_native_stderr
 
 CACHE_BYTES = 1 << 30
 """For all videos of a capture together."""
+MAX_FRAMES, MAX_PIXELS = 1_000_000, 100_000_000
 
 
 class VideoFile:
@@ -43,6 +44,13 @@ class VideoFile:
         self.full_size_px = (height, width)
         if min(self.frames, height, width) < 1:
             raise FileFormatError(f"{file}: expected a video with frames, got none; copy it again")
+        # A header can claim any number; a frame takes a byte at least.
+        if self.frames > min(MAX_FRAMES, file.stat().st_size) or height * width > MAX_PIXELS:
+            raise FileFormatError(
+                f"{file}: expected up to {MAX_FRAMES:,} frames of up to {MAX_PIXELS:,} pixels, got "
+                f"{self.frames:,} of {width} x {height} in {file.stat().st_size:,} bytes; the "
+                "video is damaged, copy it again"
+            )
 
     @property
     def size_px(self) -> tuple[int, int]:

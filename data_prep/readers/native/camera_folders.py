@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diff4splat.data_prep.readers.files.file_discovery import natural_key
-from diff4splat.errors import ConfigError
+from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.cameras.camera_record import FILE, FORMAT
+from diff4splat.io.require_file import opened_file
 from diff4splat.paths.messages import unknown_name
 
 DATASET, DATASET_FORMAT = "dataset.json", "diff4splat-camera-dataset"
@@ -78,7 +79,7 @@ def _folders_in(folder: Path) -> list[Path]:
 def _is_marked(file: Path, mark: str) -> bool:
     """Check the start of the file only; the reader reports later damage."""
     try:
-        with file.open("rb") as stream:
+        with opened_file(file, "a file of cameras") as stream:
             return f'"{mark}"'.encode() in stream.read(_HEAD_BYTES)
-    except OSError:
+    except FileFormatError:
         return False

@@ -1,4 +1,4 @@
-"""The ground out of doors: flat where things happen, rolling beyond, hills at the horizon.
+"""The ground out of doors: flat where objects move, rolling beyond, hills at the horizon.
 
 Heights are metres above y = 0. The mesh is a disc of rings whose spacing grows with distance, so
 triangles look equally large from the stage.
@@ -13,8 +13,8 @@ from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
 from diff4splat.data_prep.synthetic.motions.context import rest_positions
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.shape import one
-from diff4splat.data_prep.synthetic.shapes.surface import Surface, grid_triangles, surface
-from diff4splat.data_prep.synthetic.shapes.sweep import plane_waves
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import Surface, grid_triangles, surface
+from diff4splat.data_prep.synthetic.shapes.surfaces.sweep import plane_waves
 
 _RINGS, _SECTORS = 30, 60
 

@@ -1,6 +1,6 @@
 """The kinds of scenes and their measures.
 
-The stage is the circle around the origin in which things happen; its radius sets the scale of
+The stage is the circle around the origin in which objects move; its radius sets the scale of
 everything else. Ranges are drawn from evenly.
 """
 

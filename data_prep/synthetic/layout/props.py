@@ -10,7 +10,7 @@ from diff4splat.data_prep.synthetic.motions.context import PartPositions, rest_p
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
-from diff4splat.data_prep.synthetic.shapes.surface import about_y
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
 
 
 def shape_of_size(

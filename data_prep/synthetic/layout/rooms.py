@@ -12,9 +12,9 @@ from jaxtyping import Float64
 from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
 from diff4splat.data_prep.synthetic.motions.context import PartPositions
 from diff4splat.data_prep.synthetic.rng import Rng
-from diff4splat.data_prep.synthetic.shapes.facets import box, boxes
 from diff4splat.data_prep.synthetic.shapes.shape import Shape, one, several
-from diff4splat.data_prep.synthetic.shapes.surface import about_y
+from diff4splat.data_prep.synthetic.shapes.surfaces.facets import box, boxes
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

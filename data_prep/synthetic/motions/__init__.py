@@ -1,1 +1,1 @@
-"""How things move: rigid, jointed and soft, as positions of every vertex at every time."""
+"""How objects move: rigid, jointed and soft, as positions of every vertex at every time."""

@@ -1,4 +1,4 @@
-"""Motions of things with joints or a flexible spine: walking, flying, crawling, driving."""
+"""Motions of objects with joints or a flexible spine: walking, flying, crawling, driving."""
 
 import numpy as np
 

@@ -1,6 +1,6 @@
-"""Motions of things that keep their form: along the ground, through the air, in place.
+"""Motions of objects that keep their form: along the ground, through the air, in place.
 
-Rolling and tumbling do not slip: the contact point stands still. Flight is y″ = g.
+Rolling and tumbling do not slip: the contact point is static. Flight is y″ = g.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ from diff4splat.data_prep.synthetic.motions.context import (
     transformed,
     translated,
 )
-from diff4splat.data_prep.synthetic.shapes.facets import boxes
 from diff4splat.data_prep.synthetic.shapes.shape import Part, Shape
-from diff4splat.data_prep.synthetic.shapes.sweep import tube
+from diff4splat.data_prep.synthetic.shapes.surfaces.facets import boxes
+from diff4splat.data_prep.synthetic.shapes.surfaces.sweep import tube
 
 
 def _done(context: MotionContext, parts: PartPositions) -> MotionResult:
@@ -28,7 +28,7 @@ def _done(context: MotionContext, parts: PartPositions) -> MotionResult:
 
 
 def _yawed(context: MotionContext, *, any_way: bool) -> PartPositions:
-    """At rest in every frame, facing any way unless the thing has a front to go by."""
+    """At rest in every frame, facing any way unless the object has a front."""
     frames = len(context.times_s)
     angle = context.rng.uniform(0.0, 2 * np.pi) if any_way else 0.0
     turn = axis_rotations((0.0, 1.0, 0.0), np.full(frames, angle))

@@ -1,6 +1,6 @@
 """Motions that change the form: cloth in the wind, jelly, foliage, growth.
 
-``q`` is the height of a vertex above the ground as a share of the thing's own height.
+``q`` is the height of a vertex above the ground as a share of the object's own height.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ def _scaled(
 
 
 def flutters(context: MotionContext) -> MotionResult:
-    """Cloth waves in the wind; what holds it stands still."""
+    """Cloth waves in the wind; what holds it is static."""
     phase, gust = context.phase(0.9, 1.5), context.phase(0.2, 0.4)
     parts = []
     for part in context.shape.parts:

@@ -16,15 +16,18 @@ from jaxtyping import Float64
 
 from diff4splat.data.clip import Clip, Flow, Tracks, View
 from diff4splat.data_prep.synthetic.renderer.cameras import RenderCamera, render_camera, to_camera
-from diff4splat.data_prep.synthetic.renderer.ground_truth import GroundTruth, render_ground_truth
-from diff4splat.data_prep.synthetic.renderer.image_renderer import Renderer, visible_world_points
-from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
-from diff4splat.data_prep.synthetic.renderer.tracks import (
+from diff4splat.data_prep.synthetic.renderer.ground_truth.maps import (
+    GroundTruth,
+    render_ground_truth,
+)
+from diff4splat.data_prep.synthetic.renderer.ground_truth.tracks import (
     TrackPoints,
     choose_track_points,
     observe_points,
     track_positions,
 )
+from diff4splat.data_prep.synthetic.renderer.image_renderer import Renderer, visible_world_points
+from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import (
     TriangleBuffer,
     build_triangle_buffer,

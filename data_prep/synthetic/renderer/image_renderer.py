@@ -7,15 +7,17 @@ import numpy as np
 from jaxtyping import Float64, UInt8
 
 from diff4splat.data_prep.synthetic.renderer.cameras import RenderCamera, sample_grid
-from diff4splat.data_prep.synthetic.renderer.ground_truth import GroundTruth, camera_vertices
-from diff4splat.data_prep.synthetic.renderer.normals import vertex_normals
+from diff4splat.data_prep.synthetic.renderer.ground_truth.maps import GroundTruth, camera_vertices
 from diff4splat.data_prep.synthetic.renderer.rasterise import NEAR_M, blank, rasterise
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
-from diff4splat.data_prep.synthetic.renderer.shading import Shade, Surfaces, shade
-from diff4splat.data_prep.synthetic.renderer.shadows import HeightMaps, chart_of
-from diff4splat.data_prep.synthetic.renderer.skies import lighting_of
+from diff4splat.data_prep.synthetic.renderer.shading.image_colors import ShadedView, shade
+from diff4splat.data_prep.synthetic.renderer.shading.normals import vertex_normals
+from diff4splat.data_prep.synthetic.renderer.shading.reflection import Shade
+from diff4splat.data_prep.synthetic.renderer.shading.shadows import HeightMaps, chart_of
+from diff4splat.data_prep.synthetic.renderer.shading.skies import lighting_of
+from diff4splat.data_prep.synthetic.renderer.shading.surface_point import Surfaces
+from diff4splat.data_prep.synthetic.renderer.shading.tone import byte_thresholds
 from diff4splat.data_prep.synthetic.renderer.textures.materials import materials_of
-from diff4splat.data_prep.synthetic.renderer.tone import byte_thresholds
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import TriangleBuffer
 from diff4splat.data_prep.synthetic.world import World
 
@@ -77,10 +79,8 @@ class Renderer:
             buffer.owners,
         )  # fmt: skip
         image = np.zeros((lens.height, lens.width, 3), np.uint8)
-        shade(
-            found, grid, lens, surfaces, self._materials, self._lighting, shades,
-            byte_thresholds(), image,
-        )  # fmt: skip
+        view = ShadedView(lens, surfaces, self._materials, self._lighting, shades)
+        shade(found, grid, view, byte_thresholds(), image)
         return image
 
 

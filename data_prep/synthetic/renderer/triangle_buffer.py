@@ -36,33 +36,33 @@ def build_triangle_buffer(world: World) -> TriangleBuffer:
         ConfigError: instances are out of range or not unique.
         InputError: shapes do not fit, or positions are not finite.
     """
-    numbers = [thing.instance for thing in world.objects]
+    numbers = [item.instance for item in world.objects]
     if any(not 1 <= number <= 254 for number in numbers) or len(set(numbers)) != len(numbers):
         raise ConfigError(f"instances: expected different numbers from 1 to 254, got {numbers}")
     frames = len(world.times_s)
-    for thing in world.objects:
-        _check(thing, frames)
-    objects = tuple(sorted(world.objects, key=lambda thing: len(thing.positions) > 1))
-    counts = [len(thing.mesh.rest) for thing in objects]
+    for item in world.objects:
+        _check(item, frames)
+    objects = tuple(sorted(world.objects, key=lambda item: len(item.positions) > 1))
+    counts = [len(item.mesh.rest) for item in objects]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    sizes = [len(thing.mesh.triangles) for thing in objects]
+    sizes = [len(item.mesh.triangles) for item in objects]
     positions = np.zeros((frames, int(starts[-1]), 3))
-    for thing, start in zip(objects, starts, strict=False):
-        positions[:, start : start + len(thing.mesh.rest)] = thing.positions
+    for item, start in zip(objects, starts, strict=False):
+        positions[:, start : start + len(item.mesh.rest)] = item.positions
     return TriangleBuffer(
         objects=objects,
         positions=positions,
-        rest=_joined([thing.mesh.rest for thing in objects], (0, 3), np.float64),
-        uv=_joined([thing.mesh.uv for thing in objects], (0, 2), np.float64),
+        rest=_joined([item.mesh.rest for item in objects], (0, 3), np.float64),
+        uv=_joined([item.mesh.uv for item in objects], (0, 2), np.float64),
         triangles=_joined(
-            [thing.mesh.triangles + start for thing, start in zip(objects, starts, strict=False)],
+            [item.mesh.triangles + start for item, start in zip(objects, starts, strict=False)],
             (0, 3),
             np.int32,
         ),
         owners=np.repeat(np.arange(len(objects), dtype=np.int32), sizes),
-        instances=np.array([thing.instance for thing in objects], np.uint8),
+        instances=np.array([item.instance for item in objects], np.uint8),
         static_count=sum(
-            size for size, thing in zip(sizes, objects, strict=True) if len(thing.positions) == 1
+            size for size, item in zip(sizes, objects, strict=True) if len(item.positions) == 1
         ),
     )
 
@@ -71,18 +71,18 @@ def _joined(parts: list[np.ndarray], empty: tuple[int, int], kind: type) -> np.n
     return np.concatenate([np.zeros(empty, kind), *parts]).astype(kind)
 
 
-def _check(thing: WorldObject, frames: int) -> None:
+def _check(item: WorldObject, frames: int) -> None:
     """Check shapes, indices and finite values."""
-    what, mesh = f"instance {thing.instance}", thing.mesh
+    what, mesh = f"instance {item.instance}", item.mesh
     vertices = len(mesh.rest)
-    if len(thing.positions) not in (1, frames) or thing.positions.shape[1:] != (vertices, 3):
+    if len(item.positions) not in (1, frames) or item.positions.shape[1:] != (vertices, 3):
         raise InputError(
             f"{what}: expected positions for 1 or {frames} frames of {vertices} vertices, "
-            f"got {thing.positions.shape}"
+            f"got {item.positions.shape}"
         )
     if len(mesh.uv) != vertices:
         raise InputError(f"{what}: expected uv of {vertices} vertices, got {len(mesh.uv)}")
-    for name, values in (("positions", thing.positions), ("rest", mesh.rest), ("uv", mesh.uv)):
+    for name, values in (("positions", item.positions), ("rest", mesh.rest), ("uv", mesh.uv)):
         if not np.isfinite(values).all():
             raise InputError(f"{what}: expected finite {name}, got NaN or infinity")
     if mesh.triangles.size and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < vertices:

@@ -1,1 +1,1 @@
-"""Families of things, as triangle meshes of unit height that stand on y = 0 and face +x."""
+"""Object families, as triangle meshes of unit height that stand on y = 0 and face +x."""

@@ -1,14 +1,14 @@
-"""All families of things: how they are made, how high they are, and what they can do.
+"""All object families: how they are made, how high they are, and what they can do.
 
-``heights_m`` are the natural heights, several ranges where a thing also exists as a toy.
-``abilities`` are what motions ask for; ``places`` say where a thing stands when it does not move.
+``heights_m`` are the natural heights, several ranges where an object also exists as a toy.
+``abilities`` are what motions ask for; ``places`` say where an object is put when it does not move.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from diff4splat.data_prep.synthetic.rng import Rng
-from diff4splat.data_prep.synthetic.shapes import (
+from diff4splat.data_prep.synthetic.shapes.families import (
     animals,
     buildings,
     chains,
@@ -24,7 +24,7 @@ from diff4splat.data_prep.synthetic.shapes.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """One kind of thing."""
+    """One kind of object."""
 
     make: Callable[[Rng], Shape]
     noun: str

@@ -1,6 +1,6 @@
-"""A thing: parts of different materials on one skeleton.
+"""An object: parts of different materials on one skeleton.
 
-Axes: ``v`` vertices, ``j`` joints. Joint 0 is the thing itself; the others turn about an axis
+Axes: ``v`` vertices, ``j`` joints. Joint 0 is the object itself; the others turn about an axis
 through a pivot and carry along whatever hangs on them.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.shapes.surface import Surface
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import Surface
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """Parts that move together; the first names the thing's colour."""
+    """Parts that move together; the first names the object's colour."""
 
     parts: tuple[Part, ...]
     joints: tuple[Joint, ...] = ()
@@ -64,7 +64,7 @@ class Shape:
         return sum(len(part.surface.triangles) for part in self.parts)
 
     def of_height(self, height_m: float) -> "Shape":
-        """The same, so large that it is ``height_m`` high, centred, standing on y = 0."""
+        """The same, so large that it is ``height_m`` high, centred, with its bottom on y = 0."""
         factor = height_m / self.height
         low, high = self.bounds
         shift = -factor * np.array([(low[0] + high[0]) / 2, high[1], (low[2] + high[2]) / 2])
@@ -80,10 +80,10 @@ class Shape:
 
 
 def one(role: str, surface: Surface, *, smooth: bool = True) -> Shape:
-    """A thing of a single part."""
+    """An object of a single part."""
     return Shape(parts=(Part(role=role, surface=surface, smooth=smooth),))
 
 
 def several(**surfaces: Surface) -> Shape:
-    """A thing of several parts, named by what they are made of."""
+    """An object of several parts, named by what they are made of."""
     return Shape(parts=tuple(Part(role=role, surface=s) for role, s in surfaces.items()))

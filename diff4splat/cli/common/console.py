@@ -4,15 +4,37 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
 
 from diff4splat.progress.phases import Advance, Phases
+from diff4splat.progress.plain_text import plain_text
 
 CONSOLE = Console(stderr=True, highlight=False)
+SPEED_PERIOD_S = 600.0
+"""Steps of the last minutes give the time that remains; one may take minutes."""
+
+
+class RemainingColumn(TimeRemainingColumn):
+    """Time that remains, while there are steps to go and two of them were seen."""
+
+    def render(self, task: Task) -> Text:
+        """Hours, minutes and seconds."""
+        if task.finished or task.time_remaining is None:
+            return Text("")
+        return super().render(task) + Text(" left")
 
 
 class ConsolePhases(Phases):
-    """Phases with one progress bar each."""
+    """Phases with one progress bar each: steps, time so far and time left."""
 
     @contextmanager
     def bar(self, name: str, steps: int) -> Iterator[Advance]:
@@ -25,8 +47,10 @@ class ConsolePhases(Phases):
             BarColumn(bar_width=28),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
+            RemainingColumn(),
         )
-        with Progress(*columns, console=CONSOLE) as progress:
+        period_s = SPEED_PERIOD_S
+        with Progress(*columns, console=CONSOLE, speed_estimate_period=period_s) as progress:
             task = progress.add_task(name, total=steps)
             yield lambda: progress.advance(task)
             if not progress.tasks[task].completed:
@@ -35,10 +59,10 @@ class ConsolePhases(Phases):
 
 def note(text: str) -> None:
     """Print one line of information."""
-    CONSOLE.print(text, markup=False, soft_wrap=True)
+    CONSOLE.print(plain_text(text), markup=False, soft_wrap=True)
 
 
 def fail(error: Exception) -> None:
     """Print an error in one line."""
-    line = " ".join(str(error).split())
+    line = plain_text(" ".join(str(error).split()))
     CONSOLE.print(f"diff4splat: {line}", style="bold red", markup=False, soft_wrap=True)

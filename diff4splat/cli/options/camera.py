@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
+from diff4splat.cli.options.constraints import InputPath, Number
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -18,14 +19,40 @@ FILE_SUFFIXES = (".txt", ".json", ".tum")
 class CameraOptions:
     """Length, speed and easing of the camera path."""
 
-    frames: int | None = None
+    frames: Annotated[int | None, Number(least=1, most=100_000)] = None
     """Number of frames. Default: 49 for presets, all frames of a path file."""
-    fps: float | None = None
+    fps: Annotated[float | None, Number(above=0)] = None
     """Frames per second. Default: 24 for presets, the times of a path file."""
-    amplitude: float | None = None
+    amplitude: Annotated[float | None, Number(least=-100, most=100)] = None
     """Size of a preset's motion, in near depths or turns. Default: depends on the preset."""
     easing: Literal["linear", "smooth", "ease-in", "ease-out"] = "smooth"
     """Speed profile of a preset."""
+
+
+def require_camera(camera: str, options: CameraOptions) -> None:
+    """Check preset names and amplitudes, or that the path file is there.
+
+    Raises:
+        InputError, ConfigError: a camera path that cannot be used.
+    """
+    from diff4splat.paths.language import parse_path, require_short_of_near
+
+    if not _is_file(camera):
+        require_short_of_near(parse_path(camera, options.amplitude))
+        return
+    InputPath(what="a camera path file", folder=False).check("--camera", Path(camera))
+    if options.amplitude is not None:
+        raise ConfigError("--amplitude: expected with presets only, got a path file; leave it out")
+
+
+def require_no_preset_options(options: CameraOptions) -> None:
+    """Check that nothing is asked of a scene's own path that only presets have.
+
+    Raises:
+        ConfigError: an amplitude or an easing.
+    """
+    if options.amplitude is not None or options.easing != CameraOptions().easing:
+        raise ConfigError("--amplitude, --easing: expected with presets; name one with --camera")
 
 
 def choose_path(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
@@ -54,12 +81,19 @@ def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "Camer
     """The poses and times of the file, resampled if a frame count or rate is given."""
     from diff4splat.io.cameras.path_files import read_path
     from diff4splat.paths.resize import resized
+
+    read = read_path(Path(camera), view.camera, options.fps or DEFAULT_FPS)
+    return _resampled(resized(read, view.camera.size_px), options)
+
+
+def scene_path(path: "CameraPath", options: CameraOptions) -> "CameraPath":
+    """The path of a scene file with the frame count and rate of ``options``."""
+    return _resampled(path, options)
+
+
+def _resampled(path: "CameraPath", options: CameraOptions) -> "CameraPath":
     from diff4splat.paths.spline import resample
 
-    if options.amplitude is not None:
-        raise ConfigError("--amplitude: expected with presets only, got a path file; leave it out")
-    read = read_path(Path(camera), view.camera, options.fps or DEFAULT_FPS)
-    path = resized(read, view.camera.size_px)
     if options.frames is None and options.fps is None:
         return path
     frames = len(path) if options.frames is None else options.frames

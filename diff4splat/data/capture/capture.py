@@ -83,7 +83,7 @@ class Capture:
     optics: Optics | None = None
     """Of all cameras, where they are more than pinholes."""
     tracks: Mapping[int, PoseTrack] = field(default_factory=dict)
-    """Where each camera is at any time, by its index; the others stand at the pose of the frame."""
+    """Where each camera is at any time, by its index; the others keep the pose of the frame."""
     points: PointCloud | None = None
     background: tuple[float, float, float] | None = None
     """What lies behind the scene where the source says so, such as white for D-NeRF."""

@@ -11,6 +11,8 @@ from diff4splat.geometry.rigid import require_rigid
 
 ROUNDING = 1e-9
 """Places closer than this share of their coordinates are one place."""
+_LARGEST = 1e18
+"""Squares of larger numbers are infinite in float32."""
 
 
 def require_valid_capture(capture: Capture) -> Capture:
@@ -28,6 +30,12 @@ def require_valid_capture(capture: Capture) -> Capture:
     focal_px = capture.cameras.focal_px
     if not bool((torch.isfinite(focal_px) & (focal_px > 0)).all()):
         raise InputError(f"{capture.name}: expected focal lengths above 0; repair the cameras")
+    numbers = (focal_px, capture.cameras.center_px, capture.cameras.position)
+    if not all(bool((values.abs() <= _LARGEST).all()) for values in numbers):
+        raise InputError(
+            f"{capture.name}: expected cameras in numbers up to {_LARGEST:.0e}, as fits need them, "
+            "got larger ones; repair the cameras or scale the scene down"
+        )
     _require_parallax(capture)
     return capture
 
@@ -73,6 +81,6 @@ def _require_parallax(capture: Capture) -> None:
         return
     if capture.frames.read(int(learnt[0])).depth is None:
         raise InputError(
-            f"{capture.name}: expected images from at least two places, got one standing camera "
+            f"{capture.name}: expected images from at least two places, got one static camera "
             "and no depth; move the camera, add cameras, or give depth"
         )

@@ -5,6 +5,7 @@ several times smaller than ZIP; half precision has an error up to 4.9e-4 and a r
 """
 
 import io
+import math
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from diff4splat.errors import FileFormatError, InputError
 
 DepthCoding = Literal["pxr24", "half", "float"]
 """For truth, for training copies, and without loss."""
+_MOST_PER_BYTE = 2000
 _HALF_RANGE = (6.2e-5, 65504.0)
 """Below, half precision loses digits; above is infinity."""
 
@@ -77,6 +79,9 @@ def _require_size(content: bytes, shape: tuple[int, int, int]) -> None:
     """Look at the headers alone: a false size would fill the memory before it is noticed."""
     with OpenEXR.File(io.BytesIO(content), header_only=True) as opened:
         windows = [part.header["dataWindow"] for part in opened.parts]
+    # No compression of the format packs more pixels into a byte.
+    if math.prod(shape) > _MOST_PER_BYTE * len(content):
+        raise ValueError("more pixels than the file can hold")
     sizes = {(int(y1 - y0) + 1, int(x1 - x0) + 1) for (x0, y0), (x1, y1) in windows}
     if len(windows) != shape[0] or sizes != {shape[1:]}:
         raise FileFormatError(

@@ -4,6 +4,7 @@ Axes: ``t`` frames, ``h w`` pixels, 3 colours or none (instances).
 """
 
 import io
+import math
 
 import numpy as np
 from jaxtyping import UInt8
@@ -11,6 +12,7 @@ from PIL import Image, PngImagePlugin
 
 from diff4splat.errors import FileFormatError
 
+_MOST_PER_BYTE = 1032
 _LEVEL = 3
 """Deflate; a tenth larger than the default level in half the time."""
 
@@ -34,6 +36,9 @@ def decode_png(content: bytes, shape: tuple[int, ...]) -> UInt8[np.ndarray, "t h
         image = PngImagePlugin.PngImageFile(io.BytesIO(content))
         got = (image.size[::-1], image.mode)
         want = ((shape[0] * shape[1], shape[2]), "RGB" if len(shape) == 4 else "L")
+        # Deflate packs at most 1032 bytes into one: what claims more would only fill the memory.
+        if math.prod(shape) > _MOST_PER_BYTE * len(content):
+            raise ValueError("more pixels than the file can hold")
         if got == want:
             return np.array(image).reshape(shape)
     except Exception as error:  # damaged data makes Pillow's decoders raise almost anything

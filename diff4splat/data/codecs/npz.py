@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from diff4splat.errors import FileFormatError
+from diff4splat.io.npy_header import START_BYTES, read_npy_header
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The first time that ZIP knows; real ones would make equal clips differ."""
@@ -63,35 +64,27 @@ def take_array(
     Raises:
         FileFormatError: missing, damaged, of another type or shape, or of another length.
     """
+    want = math.prod(shape) * np.dtype(dtype).itemsize
     try:
         with archive.open(f"{name}.npy") as stream:
-            got = _header(stream)
-            if got == (shape, np.dtype(dtype)):
-                return _body(stream, np.dtype(dtype), shape)
+            # One byte too many shows a longer array; what claims to be huge is never unpacked.
+            content = stream.read(START_BYTES + want + 1)
     except KeyError as error:
         raise FileFormatError(f"expected the array '{name}', got an archive without it") from error
     except Exception as error:  # as above
         raise FileFormatError(f"expected a whole array '{name}', got a damaged one") from error
-    raise FileFormatError(
-        f"'{name}': expected {np.dtype(dtype)} of shape {shape}, got {got[1]} of shape {got[0]}"
-    )
-
-
-def _body(stream: zipfile.ZipExtFile, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
-    want = math.prod(shape) * dtype.itemsize
-    content = bytearray(stream.read(want + 1))
-    if len(content) != want:
-        raise ValueError("more or fewer bytes than the shape says")
-    return np.frombuffer(content, dtype).reshape(shape)
-
-
-def _header(stream: zipfile.ZipExtFile) -> tuple[tuple[int, ...], np.dtype]:
-    if np.lib.format.read_magic(stream) != (1, 0):
-        raise ValueError("another version of the array format")
-    shape, by_columns, dtype = np.lib.format.read_array_header_1_0(stream)
-    if by_columns:
-        raise ValueError("columns first")
-    return shape, dtype
+    try:
+        header = read_npy_header(content[:START_BYTES])
+    except FileFormatError as error:
+        raise FileFormatError(f"'{name}': {error}") from error
+    if (header.shape, header.dtype, header.by_columns) != (shape, np.dtype(dtype), False):
+        raise FileFormatError(
+            f"'{name}': expected {np.dtype(dtype)} of shape {shape}, got {header.dtype} of shape "
+            f"{header.shape}"
+        )
+    if len(content) - header.data_start != want:
+        raise FileFormatError(f"expected a whole array '{name}', got a damaged one")
+    return np.frombuffer(bytearray(memoryview(content)[header.data_start :]), dtype).reshape(shape)
 
 
 def pack(values: Bool[np.ndarray, "..."]) -> np.ndarray:

@@ -27,12 +27,12 @@ def decode_mp4(content: bytes, shape: tuple[int, ...]) -> UInt8[np.ndarray, "t h
     Raises:
         FileFormatError: damaged, or of another length or size.
     """
+    size_px = (shape[1] + shape[1] % 2, shape[2] + shape[2] % 2)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "frames.mp4"
         file.write_bytes(content)
         with silence_native_stderr():
-            frames = _decode(file, shape[0] + 1)
-    size_px = (shape[1] + shape[1] % 2, shape[2] + shape[2] % 2)
+            frames = _decode(file, shape[0] + 1, size_px)
     if len(frames) != shape[0] or {frame.shape[:2] for frame in frames} != {size_px}:
         got = frames[0].shape[:2] if frames else "nothing"
         raise FileFormatError(
@@ -42,11 +42,13 @@ def decode_mp4(content: bytes, shape: tuple[int, ...]) -> UInt8[np.ndarray, "t h
     return np.stack([frame[: shape[1], : shape[2], ::-1] for frame in frames])
 
 
-def _decode(file: Path, most: int) -> list[np.ndarray]:
-    """Up to ``most`` frames, so that a video of hours is not decoded to be refused."""
+def _decode(file: Path, most: int, size_px: tuple[int, int]) -> list[np.ndarray]:
+    """Up to ``most`` frames of ``size_px``: hours of video are not decoded to be refused."""
     reader = cv2.VideoCapture(str(file), cv2.CAP_FFMPEG)
     frames: list[np.ndarray] = []
-    while len(frames) < most:
+    sides = (cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FRAME_WIDTH)
+    fits = tuple(int(reader.get(side)) for side in sides) == size_px
+    while fits and len(frames) < most:
         decoded, frame = reader.read()
         if not decoded:
             break

@@ -22,7 +22,7 @@ from diff4splat.io.pixels import to_bytes
 from diff4splat.metrics.pose import PathError, path_error
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render_video
-from diff4splat.render.settings import RenderOutput
+from diff4splat.render.settings import RenderOutput, RenderSettings
 from diff4splat.scene.scene import Scene
 
 MIN_MATCHES = 12
@@ -55,7 +55,9 @@ def pose_entries(row: str, scene: Scene, path: CameraPath) -> Entries:
 def step_errors(scene: Scene, path: CameraPath) -> StepErrors:
     """Compare every estimated step with the true one."""
     translation, rotation, failed = [], [], 0
-    frames = list(render_video(scene, path, outputs=("rgb", "depth")))
+    # Protocols measure larger images than the scene's own, without closing what lies between.
+    settings = RenderSettings(dilation_px2=scene.dilation_px2)
+    frames = list(render_video(scene, path, outputs=("rgb", "depth"), settings=settings))
     for index in range(len(path) - 1):
         pair = (path.cameras[index], path.cameras[index + 1])
         step = recover_step(frames[index], frames[index + 1], pair)

@@ -43,6 +43,12 @@ def covisible_masks(sample: EvalSample) -> Bool[Tensor, "p h w"] | None:
     return torch.stack([_covisible_mask(sample, pair, is_static) for pair in sample.targets.pairs])
 
 
+def hidden_masks(sample: EvalSample, covisible: Bool[Tensor, "p h w"]) -> Bool[Tensor, "p h w"]:
+    """Pixels with a surface that is not covisible: disoccluded, uncovered, or out of the frame."""
+    depth = torch.stack([sample.true_depth(pair) for pair in sample.targets.pairs])
+    return valid_depth(depth) & ~covisible
+
+
 def static_instances(clip: Clip) -> Bool[Tensor, " 256"]:
     """Instance numbers that are static: those with tracked points, none of which moves."""
     is_static = torch.zeros(INSTANCE_COUNT, dtype=torch.bool)

@@ -1,31 +1,27 @@
 """Colour and depth metrics of the target images.
 
 Axes: ``p`` target images, ``h w`` pixels. A constant depth map has no correlation, and an image
-without true depth has no depth error: means skip and count both. The covisible PSNR skips images
-with almost no covisible pixel.
+without true depth has no depth error: means skip and count both.
 """
-
-import math
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.evaluation.columns import PSNR_CAP_DB
+from diff4splat.evaluation.measures.covisibility import hidden_masks
+from diff4splat.evaluation.measures.regions import ComparedImages, region_entries
 from diff4splat.evaluation.protocols.sample import EvalSample
 from diff4splat.evaluation.records import Score, Skip, score
 from diff4splat.evaluation.systems.predictions import Prediction, RenderedView
 from diff4splat.metrics.depth import depth_pearson, relative_error
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.metrics.image import psnr
-from diff4splat.metrics.masked import mean_or_nan
 from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.metrics.ssim import ssim
 from diff4splat.training.batches.normalise_scale import valid_depth
 
 Entries = list[Score | Skip]
-MIN_COVISIBLE_PX = 16
-"""Smallest number of covisible pixels for a covisible PSNR."""
 
 
 def image_entries(
@@ -46,7 +42,7 @@ def image_entries(
     truth = torch.stack([sample.true_rgb(pair) for pair in sample.targets.pairs])
     entries = [
         score(row, "psnr", psnr(rgb, truth).clamp_max(PSNR_CAP_DB).tolist()),
-        *_covisible_entries(row, rgb, truth, covisible),
+        *region_entries(row, _compared(sample, rgb, truth, covisible), features),
         score(row, "ssim", ssim(rgb, truth).tolist()),
     ]
     if features is not None:
@@ -56,39 +52,22 @@ def image_entries(
     return entries + _depth_entries(row, sample, views)
 
 
+def _compared(
+    sample: EvalSample,
+    rgb: Float[Tensor, "p h w 3"],
+    truth: Float[Tensor, "p h w 3"],
+    covisible: Bool[Tensor, "p h w"] | None,
+) -> ComparedImages:
+    hidden = None if covisible is None else hidden_masks(sample, covisible)
+    return ComparedImages(rgb=rgb, truth=truth, covisible=covisible, hidden=hidden)
+
+
 def _rendered_views(sample: EvalSample, prediction: Prediction) -> list[RenderedView]:
     views = (
         prediction.render(sample.camera(pair), sample.time_s(pair[1]), pair[1])
         for pair in sample.targets.pairs
     )
     return [view for view in views if view is not None]
-
-
-def _covisible_entries(
-    row: str,
-    rgb: Float[Tensor, "p h w 3"],
-    truth: Float[Tensor, "p h w 3"],
-    covisible: Bool[Tensor, "p h w"] | None,
-) -> Entries:
-    if covisible is None:
-        return [
-            Skip(row=row, key=key, why="the clip has no depth")
-            for key in ("covisible_psnr", "covisible_share")
-        ]
-    return [
-        score(row, "covisible_psnr", covisible_psnr(rgb, truth, covisible).tolist()),
-        score(row, "covisible_share", covisible.double().mean((-2, -1)).tolist()),
-    ]
-
-
-def covisible_psnr(
-    rgb: Float[Tensor, "p h w 3"], truth: Float[Tensor, "p h w 3"], covisible: Bool[Tensor, "p h w"]
-) -> Float[Tensor, " p"]:
-    """PSNR over the ``covisible`` pixels, capped; NaN for images with too few of them."""
-    squares = (rgb - truth).square().mean(-1)
-    error = mean_or_nan(squares.flatten(1), covisible.flatten(1))
-    enough = covisible.sum((-2, -1)) >= MIN_COVISIBLE_PX
-    return torch.where(enough, (-10 * error.log10()).clamp_max(PSNR_CAP_DB), math.nan)
 
 
 def _depth_entries(row: str, sample: EvalSample, views: list[RenderedView]) -> Entries:

@@ -30,7 +30,7 @@ NEAREST_DEPTH = 1e-3
 def scene_entries(row: str, sample: EvalSample, scene: Scene, protocol: Protocol) -> Entries:
     """Fraction of moving Gaussians, and loop closure; both for static clips only."""
     if not sample.clip.note.is_static:
-        why = "things move in the clip"
+        why = "objects move in the clip"
         return [Skip(row=row, key=key, why=why) for key in ("moving_share", "loop_psnr")]
     camera, times_s = sample.input_view.cameras[0], sample.clip.times_s
     moving = moving_share(scene, camera, times_s, protocol.still_px)

@@ -101,6 +101,7 @@ class Protocol:
     """Reconstruction gets every ``input_stride``-th frame of the input view, from the first on."""
 
     def __post_init__(self) -> None:
+        _require_limits(self)
         for what, is_valid, expected in _rules(self):
             if not is_valid:
                 raise ConfigError(f"protocol {self.name}: expected {expected}, got another {what}")
@@ -142,6 +143,28 @@ class Protocol:
     def items(self, task: Task) -> int:
         """Number of items of a task."""
         return self.text_cases if task == "text" else self.source.count
+
+
+MAX_FRAMES, MAX_VIEWS, MAX_SIDE_PX, MAX_COUNT = 10_000, 100, 16384, 10_000_000
+"""More is damage, and would fill the memory before a rule is looked at."""
+
+
+def _require_limits(protocol: Protocol) -> None:
+    sides = (*protocol.size_px, *protocol.loop.size_px, *protocol.pose.size_px)
+    frames = (protocol.frames, protocol.input_stride, protocol.loop.frames, protocol.pose.frames)
+    counts = (protocol.source.count, protocol.planes.candidates, protocol.bootstrap.resamples)
+    limits = {
+        "size": (max(sides), MAX_SIDE_PX),
+        "number of frames": (max(frames), MAX_FRAMES),
+        "number of views": (protocol.views, MAX_VIEWS),
+        "count": (max(counts), MAX_COUNT),
+    }
+    for what, (largest, limit) in limits.items():
+        if largest > limit:
+            raise ConfigError(
+                f"protocol {protocol.name[:60]}: expected a {what} of up to {limit}, got "
+                f"{str(largest)[:20]}"
+            )
 
 
 def _rules(protocol: Protocol) -> list[tuple[str, bool, str]]:

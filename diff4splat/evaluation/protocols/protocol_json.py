@@ -10,7 +10,8 @@ from pathlib import Path
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.evaluation.protocols.protocol import VERSION, Protocol
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_text
+from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.training.config_codec import TypedReader
 
 FORMAT = "diff4splat-evaluation"
@@ -45,11 +46,7 @@ def load_protocol(name_or_file: str) -> LoadedProtocol:
         known = ", ".join(protocol_names())
         raise ConfigError(f"--protocol: expected {known} or a .json file, got {name_or_file!r}")
     file = Path(name_or_file)
-    require_file(file, "an evaluation protocol")
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file}: expected JSON text, got {error}") from error
+    text = read_text(file, "an evaluation protocol")
     return LoadedProtocol(protocol=parse_protocol(text, str(file)), folder=file.parent)
 
 
@@ -61,9 +58,9 @@ def parse_protocol(text: str, where: str) -> Protocol:
         ConfigError: a value out of range.
     """
     try:
-        data = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise FileFormatError(f"{where}: expected JSON, got {error}") from error
+        data = decode_json(text)
+    except FileFormatError as error:
+        raise FileFormatError(f"{where}: {error}") from error
     if not isinstance(data, dict) or data.pop("format", None) != FORMAT:
         raise FileFormatError(f"{where}: expected the format {FORMAT!r}, got something else")
     version = data.pop("version", None)

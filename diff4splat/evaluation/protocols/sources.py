@@ -1,7 +1,5 @@
 """Clip sources of an evaluation."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol as Interface
 from typing import runtime_checkable
 
@@ -21,20 +19,6 @@ class ClipSource(Interface):
     def clip(self, index: int) -> Clip:
         """Generate or read one clip."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class ListedClips:
-    """Clips in memory."""
-
-    clips: Sequence[Clip]
-
-    def __len__(self) -> int:
-        return len(self.clips)
-
-    def clip(self, index: int) -> Clip:
-        """The clip at ``index``."""
-        return self.clips[index]
 
 
 def require_enough(source: ClipSource, protocol: Protocol) -> ClipSource:

@@ -15,6 +15,8 @@ from diff4splat.evaluation.columns import columns_of
 from diff4splat.evaluation.measure_item import Setup
 from diff4splat.evaluation.records import ItemResult, read_item
 from diff4splat.io.atomic import write_text
+from diff4splat.io.require_file import read_text
+from diff4splat.paths.formats.json_text import decode_json
 
 FORMAT = "diff4splat-evaluation-items 1"
 NAME = "items.jsonl"
@@ -65,9 +67,10 @@ def _read(file: Path, key: str) -> list[ItemResult]:
     if not file.is_file():
         return []
     try:
-        head, *rows = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+        text = read_text(file, "items of an evaluation")
+        head, *rows = [decode_json(line) for line in text.splitlines()]
         is_valid = isinstance(head, dict) and head.get("format") == FORMAT
-    except (ValueError, RecursionError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise _damaged(file) from error
     if not is_valid:
         raise _damaged(file)

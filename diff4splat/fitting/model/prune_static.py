@@ -54,6 +54,7 @@ def prune_static(
         f"{limits.offset_px:g} px nor changed by more than {limits.change:g}",
         saved=f"{float(static.float().mean()):.0%} of all motion look-ups",
         error=limits.offset_px,
+        error_unit="px",
     )
 
 

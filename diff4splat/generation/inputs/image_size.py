@@ -8,18 +8,25 @@ scene is as fine as the networks' grid.
 import math
 from collections.abc import Collection
 
+from diff4splat.generation.inputs.input_image import require_side
 from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
 from diff4splat.models.config.model import Fill, ModelConfig
 from diff4splat.models.hub.folders import find_config, find_provenance
 
-DEFAULT_SIDE_PX = 256
-"""Side of a square with as many pixels as an image has by default."""
+DEFAULT_SIDE_PX, LEAST_DEFAULT_PX = 512, 256
+"""Side of a square with as many pixels as an image has by default; smaller images are enlarged to
+the second at most."""
 
 
-def default_side_px(config: ModelConfig, plan: GenerationPlan) -> int:
-    """Longer side of images read from files."""
+def default_side_px(
+    config: ModelConfig, plan: GenerationPlan, photo_px: tuple[int, int] | None = None
+) -> int:
+    """Side of a square with as many pixels as an image of ``photo_px``, read from a file."""
     trained_px = max(config.size_px)
-    return max(trained_px, DEFAULT_SIDE_PX) if plan.shows_image else trained_px
+    if not plan.shows_image:
+        return trained_px
+    side_px = DEFAULT_SIDE_PX if photo_px is None else round(math.sqrt(math.prod(photo_px)))
+    return max(trained_px, LEAST_DEFAULT_PX, min(side_px, DEFAULT_SIDE_PX))
 
 
 def size_multiple_px(config: ModelConfig, plan: GenerationPlan, side_px: int) -> int:
@@ -48,7 +55,10 @@ def downsampling_factor(config: ModelConfig, plan: GenerationPlan, size_px: tupl
 
 
 def find_image_size(
-    name_or_folder: str, side_px: int | None = None, fill: Fill | None = None
+    name_or_folder: str,
+    side_px: int | None = None,
+    fill: Fill | None = None,
+    photo_px: tuple[int, int] | None = None,
 ) -> tuple[int, int]:
     """(side, multiple) in pixels for a model, before any weights are read.
 
@@ -57,7 +67,8 @@ def find_image_size(
     """
     config = find_config(name_or_folder)
     plan = image_plan(config, find_provenance(name_or_folder).trained, fill)
-    side_px = default_side_px(config, plan) if side_px is None else side_px
+    side_px = default_side_px(config, plan, photo_px) if side_px is None else side_px
+    require_side(side_px, config.token_px)
     return side_px, size_multiple_px(config, plan, side_px)
 
 

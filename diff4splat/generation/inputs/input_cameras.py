@@ -1,6 +1,6 @@
 """Camera paths as the model sees them: a fixed number of cameras spread over the asked path.
 
-The path that generates a scene and the path it is shown along are different things: the first has
+The path that generates a scene and the path it is shown along differ: the first has
 as many cameras as the model was made for, the second as many frames as the video.
 """
 

@@ -1,13 +1,14 @@
 """The photograph as the model sees it: size, crop and focal length.
 
 Axes: ``h w 3`` RGB in [0, 1]. The image keeps the photograph's shape: both sides become multiples
-of 16 within a pixel budget, and at most a few columns or rows are cropped. Focal lengths follow
-scale and crop, so the geometry stays that of the photograph.
+of 16 within a pixel budget, by cropping rows or columns or by padding with those of the edge. Focal
+lengths follow scale and window, so the geometry stays that of the photograph.
 """
 
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import torch
@@ -18,6 +19,8 @@ from diff4splat.errors import ConfigError, InputError
 from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, pinhole
 from diff4splat.io.photos.images import read_photo
 
+Fit = Literal["crop", "pad"]
+"""How a photograph comes to a shape that networks take: less of it, or more around it."""
 SIDE_MULTIPLE = 16
 """Of the sizes that ship: VAE stride 8 times patch 2. A model's own is ``config.token_px``."""
 MAX_SIDE_PX = 1024
@@ -71,6 +74,7 @@ def load_image(
     fov_deg: float | None = None,
     convert: bool = False,
     multiple_px: int = SIDE_MULTIPLE,
+    fit: Fit = "crop",
 ) -> InputImage:
     """A photograph's file at the model's size; ``convert`` accepts grey, alpha, 16 bits and so on.
 
@@ -81,7 +85,7 @@ def load_image(
     photo = read_photo(file, convert)
     size_px = (photo.rgb.shape[0], photo.rgb.shape[1])
     focal = choose_focal(size_px, fov_deg, photo.focal_35mm)
-    image = prepare_image(photo.rgb, focal, side_px, multiple_px)
+    image = prepare_image(photo.rgb, focal, side_px, multiple_px, fit)
     return replace(image, notes=(*photo.notes, *image.notes))
 
 
@@ -113,6 +117,18 @@ def choose_focal(
     )
 
 
+def require_side(side_px: int, least_px: int) -> None:
+    """Refuse a side before anything is derived from it.
+
+    Raises:
+        ConfigError: it is too small for one patch or too large to be meant.
+    """
+    if not least_px <= side_px <= MAX_SIDE_PX:
+        raise ConfigError(
+            f"--resolution: expected {least_px} to {MAX_SIDE_PX} pixels, got {side_px}"
+        )
+
+
 def model_size(
     photo_size_px: tuple[int, int], side_px: int, multiple_px: int = SIDE_MULTIPLE
 ) -> tuple[int, int]:
@@ -122,10 +138,7 @@ def model_size(
         ConfigError: the side is too small for one patch or too large to be meant.
         InputError: the photograph is too long and thin to fit.
     """
-    if not multiple_px <= side_px <= MAX_SIDE_PX:
-        raise ConfigError(
-            f"--resolution: expected {multiple_px} to {MAX_SIDE_PX} pixels, got {side_px}"
-        )
+    require_side(side_px, multiple_px)
     aspect = photo_size_px[1] / photo_size_px[0]
     rows = range(multiple_px, side_px * side_px // multiple_px + 1, multiple_px)
     columns = [(math.floor(h * aspect / multiple_px), h) for h in rows]
@@ -151,37 +164,62 @@ def prepare_image(
     focal: FocalChoice,
     side_px: int,
     multiple_px: int = SIDE_MULTIPLE,
+    fit: Fit = "crop",
 ) -> InputImage:
-    """Crop the centre to the model's shape and resize it."""
+    """Crop or pad evenly around the centre to the model's shape, and resize."""
     photo_size = (rgb.shape[0], rgb.shape[1])
     size = model_size(photo_size, side_px, multiple_px)
-    scale = min(photo_size[0] / size[0], photo_size[1] / size[1])
-    crop = (min(photo_size[0], round(size[0] * scale)), min(photo_size[1], round(size[1] * scale)))
-    top, left = (photo_size[0] - crop[0]) // 2, (photo_size[1] - crop[1]) // 2
-    camera = pinhole(focal.focal_px, photo_size).cropped((top, left), crop).resized(size)
-    window = rgb[top : top + crop[0], left : left + crop[1]]
+    window = _padded_size(photo_size, size) if fit == "pad" else _cropped_size(photo_size, size)
+    top, left = ((whole - new) // 2 for whole, new in zip(photo_size, window, strict=True))
+    camera = pinhole(focal.focal_px, photo_size).cropped((top, left), window).resized(size)
     return InputImage(
-        rgb=_resize(window, size),
+        rgb=_resize(_window(rgb, (top, left), window), size),
         camera=camera,
         focal_source=focal.source,
         focal_known=focal.known,
-        notes=_crop_notes(photo_size, crop, size),
+        notes=_fit_notes(photo_size, window, size),
     )
 
 
-def _crop_notes(
-    photo_size: tuple[int, int], crop: tuple[int, int], size: tuple[int, int]
+def _cropped_size(photo_px: tuple[int, int], size_px: tuple[int, int]) -> tuple[int, int]:
+    """The largest window of the shape of ``size_px`` inside the photograph."""
+    scale = min(photo_px[0] / size_px[0], photo_px[1] / size_px[1])
+    return tuple(min(photo_px[i], round(size_px[i] * scale)) for i in (0, 1))
+
+
+def _padded_size(photo_px: tuple[int, int], size_px: tuple[int, int]) -> tuple[int, int]:
+    """The smallest window of the shape of ``size_px`` around the photograph."""
+    scale = max(photo_px[0] / size_px[0], photo_px[1] / size_px[1])
+    return tuple(max(photo_px[i], round(size_px[i] * scale)) for i in (0, 1))
+
+
+def _window(
+    rgb: Float[Tensor, "height width 3"], corner: tuple[int, int], size_px: tuple[int, int]
+) -> Float[Tensor, "h w 3"]:
+    """Pixels from ``corner`` on; outside of the photograph those of its edge go on."""
+    rows, columns = (
+        torch.arange(first, first + count).clamp(0, whole - 1)
+        for first, count, whole in zip(corner, size_px, rgb.shape, strict=False)
+    )
+    return rgb[rows[:, None], columns]
+
+
+def _fit_notes(
+    photo_size: tuple[int, int], window: tuple[int, int], size: tuple[int, int]
 ) -> tuple[str, ...]:
-    """What a crop cost, in words; nothing where every pixel is used."""
-    cut = [1 - kept / whole for kept, whole in zip(crop, photo_size, strict=True)]
+    """What a crop cost or a padding added, in words; nothing where the shape is the same."""
+    cut = [1 - kept / whole for kept, whole in zip(window, photo_size, strict=True)]
     axes = [
-        f"{share:.0%} of the {name}"
+        f"{abs(share):.0%} of the {name}"
         for share, name in zip(cut, ("height", "width"), strict=True)
-        if share >= SMALLEST_CROP
+        if abs(share) >= SMALLEST_CROP
     ]
     if not axes:
         return ()
-    return (f"cropped by {' and '.join(axes)} to {size[1]}×{size[0]} pixels",)
+    to_size = f"to {size[1]}×{size[0]} pixels"
+    if min(cut) < 0:
+        return (f"padded by {' and '.join(axes)} {to_size}, with the colours of the edge",)
+    return (f"cropped by {' and '.join(axes)} {to_size}; --fit pad keeps everything",)
 
 
 def _resize(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import torch
 
+from diff4splat.captions.known_words import why_static
 from diff4splat.generation.inputs.image_size import (
     default_side_px,
     downsampling_factor,
@@ -19,6 +20,7 @@ from diff4splat.generation.inputs.input_cameras import (
 from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
 from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
 from diff4splat.generation.settings import GenerationSettings, require_seed
+from diff4splat.io.photos.images import photo_size
 from diff4splat.models.hub.model import Model
 from diff4splat.models.text_encoder.prompt import require_prompt
 from diff4splat.paths.camera_path import CameraPath
@@ -69,6 +71,7 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         fill=settings.fill,
         still=settings.still,
         frames=config.frames,
+        static_prompt="" if user.prompt is None else why_static(user.prompt),
     )
     plan = plan_generation(config, model.trained, facts)
     image = image.to(device)
@@ -90,7 +93,7 @@ def _load(model: Model, user: UserInput) -> InputImage:
     config, image = model.config, user.image
     if not isinstance(image, InputImage):
         plan = image_plan(config, model.trained, user.settings.fill)
-        side_px = default_side_px(config, plan)
+        side_px = default_side_px(config, plan, photo_size(Path(image)))
         multiple_px = size_multiple_px(config, plan, side_px)
         image = load_image(Path(image), side_px, multiple_px=multiple_px)
     config.latent_grid(config.frames, image.camera.size_px)

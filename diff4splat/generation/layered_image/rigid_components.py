@@ -21,17 +21,21 @@ def rigid_component_offsets(
     field: Float[Tensor, "3 t hc wc"],
     moving: Bool[Tensor, "h w"],
     depth: Float[Tensor, "h w"],
+    mean_field: Float[Tensor, "3 t hc wc"] | None = None,
 ) -> Float[Tensor, "t h w 3"]:
     """Displacement of every pixel at the time of every latent frame, in scene units.
 
-    Each component is translated by its mean displacement at its median depth.
+    Each component is translated by its mean displacement at its median depth. Which ones move is
+    decided on ``mean_field`` if that is given: a sample is noisier than the mean of all samples.
     """
     relative, place = upsample_to_pixels(field), depth.clone()
+    typical = relative.clone() if mean_field is None else upsample_to_pixels(mean_field)
     component = connected_components(moving)
     for number in range(1, int(component.max()) + 1):
         inside = component == number
         mean = relative[:, :, inside].mean(-1, keepdim=True)
-        moves = mean.norm(dim=1).max() * UNIT >= MIN_RELATIVE_DISPLACEMENT
+        expected = typical[:, :, inside].mean(-1, keepdim=True)
+        moves = expected.norm(dim=1).max() * UNIT >= MIN_RELATIVE_DISPLACEMENT
         relative[:, :, inside] = mean * moves
         place[inside] = depth[inside].median()
     return masked_offsets(relative, moving, place)

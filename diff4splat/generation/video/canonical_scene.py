@@ -128,6 +128,7 @@ def prune_cells(
             f"opacity below {min_opacity:g}",
             f"{dropped:,} of {len(keep):,} Gaussians",
             faintest if faintest >= RENDER_CUTOFF else 0.0,
+            "opacity",
         )
     return CanonicalScene(
         gaussians=scene.gaussians.select(keep),

@@ -87,5 +87,8 @@ def at_grid(rendered: RenderedImage, frames: Int[Tensor, " f"], stride: int) -> 
     """The render at LDRM's frames and cells."""
     cells = (frames, slice(None, None, stride), slice(None, None, stride))
     return RenderedImage(
-        rgb=rendered.rgb[cells], valid=rendered.valid[cells], depth=rendered.depth[cells]
+        rgb=rendered.rgb[cells],
+        valid=rendered.valid[cells],
+        depth=rendered.depth[cells],
+        surface_depth=rendered.surface_depth[cells],
     )

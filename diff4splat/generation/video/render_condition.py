@@ -1,6 +1,6 @@
 """The layered image seen along the path: what the video model is conditioned on (ADR 16, 26).
 
-Axes: ``f`` frames, ``h w`` pixels of the copy that the networks see, ``n`` Gaussians. All layers
+Axes: ``f`` frames, ``h w`` pixels of the copy that the networks see, ``k`` key times. All layers
 are rendered, with the motion of the motion prior. A pixel is valid where the image's own layers
 cover it; elsewhere the extended layers show a guess that the video model is to replace.
 """
@@ -13,11 +13,13 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.gaussians import image_gaussians
 from diff4splat.generation.layered_image.types import LayeredImage
+from diff4splat.geometry.camera import Camera
 from diff4splat.models.hub.model import Model
 from diff4splat.models.video_dit.render_condition import RenderCondition
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.gaussians import Gaussians
 
 MIN_COVERAGE = 0.5
 """Opacity of the image's own layers from which a pixel is valid."""
@@ -34,24 +36,36 @@ class RenderedImage:
     """Whether the image shows what the pixel sees; all true in the first frame."""
     depth: Float[Tensor, "f h w"]
     """z of the image's own layers; 0 where they cover nothing."""
+    surface_depth: Float[Tensor, "f h w"]
+    """z of all layers."""
 
 
 @torch.no_grad()
-def render_layered_image(image: LayeredImage, path: CameraPath) -> RenderedImage:
-    """Every camera of ``path`` at its time; the first one took the image."""
-    scene = image_gaussians(image, path.times_s)
-    first = image.layers[0]
-    rgb, valid = [first.rgb.float()], [first.mask]
-    depth = [first.depth.float()]
+def render_layered_image(
+    image: LayeredImage, path: CameraPath, key_times_s: Float[Tensor, " k"]
+) -> RenderedImage:
+    """Every camera of ``path`` at its time; the first one took the image.
+
+    ``key_times_s`` are evenly spread over the time in which the image's layers move.
+    """
+    scene, first = image_gaussians(image, key_times_s), image.layers[0]
+    depth = first.depth.float()
+    frames = [(first.rgb.float(), first.mask, depth, depth)]
     for index in range(1, len(path)):
         state = scene.motion.state_at(scene.gaussians, float(path.times_s[index]))
-        camera = path.cameras[index]
-        rgb.append(render(state, camera, settings=UNDILATED).rgb.clamp(0, 1))
-        shown = state.select(slice(image.visible_count))
-        seen = render(shown, camera, outputs=("alpha", "depth"), settings=UNDILATED)
-        valid.append(seen.alpha > MIN_COVERAGE)
-        depth.append(seen.depth)
-    return RenderedImage(rgb=torch.stack(rgb), valid=torch.stack(valid), depth=torch.stack(depth))
+        frames.append(_frame(state, image.visible_count, path.cameras[index]))
+    rgb, valid, depth, surface_depth = (torch.stack(maps) for maps in zip(*frames, strict=True))
+    return RenderedImage(rgb=rgb, valid=valid, depth=depth, surface_depth=surface_depth)
+
+
+def _frame(
+    state: Gaussians, visible_count: int, camera: Camera
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Colour, validity, depth of what the image shows, and depth of all layers."""
+    every = render(state, camera, outputs=("rgb", "depth"), settings=UNDILATED)
+    shown = state.select(slice(visible_count))
+    own = render(shown, camera, outputs=("alpha", "depth"), settings=UNDILATED)
+    return every.rgb.clamp(0, 1), own.alpha > MIN_COVERAGE, own.depth, every.depth
 
 
 @torch.no_grad()

@@ -1,11 +1,12 @@
 """What the image hides, by the video model and LDRM.
 
-    layered image ─ render along the path ─ VAE ─┐
-    noise, rays, text ───────────────────────────┴─ DiT ─ latents ─ LDRM ─ hidden cells ─ deform
+    path ─ views that see most of what is hidden ─┐
+    layered image ─ render there ─ VAE ───────────┤
+    noise, rays, text ────────────────────────────┴─ DiT ─ latents ─ LDRM ─ hidden cells ─ deform
 
-Axes: ``s d`` text. A cell of a later frame is hidden where no layer that the image shows covers
-it. Without a depth prior the image has no geometry of its own: then LDRM reconstructs every cell of
-every frame, which is the paper's way.
+Axes: ``s d`` text, ``k`` key times. A cell of a later frame is hidden where no layer that the image
+shows covers it. Without a depth prior the image has no geometry of its own: then LDRM reconstructs
+every cell of every frame of the whole path, which is the paper's way.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +27,7 @@ from diff4splat.generation.video.canonical_scene import (
     reconstruct,
 )
 from diff4splat.generation.video.deformation_motion import deform
+from diff4splat.generation.video.fill_path import fill_path
 from diff4splat.generation.video.hidden_cells import FillGrid, at_grid, full_grid, hidden_grid
 from diff4splat.generation.video.render_condition import (
     RenderedImage,
@@ -46,6 +48,7 @@ from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
+from diff4splat.scene.motion.keyframe_algebra import hold_until
 
 FOOTPRINT_CELLS = 0.6
 """Standard deviation of a hidden cell: the scene is drawn without dilation, and cells must meet."""
@@ -58,6 +61,9 @@ class FillRequest:
     image: InputImage
     layered: LayeredImage
     path: CameraPath
+    """Where the video is sampled."""
+    key_times_s: Float[Tensor, " k"]
+    """Of the image's motion, evenly spread over the whole path."""
     text: Float[Tensor, "1 s d"] | None
     seed: int
     settings: GenerationSettings
@@ -81,8 +87,17 @@ class _FilledVideo:
     rendered: RenderedImage | None
 
 
-def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill:
-    """Sample a video, and reconstruct what the image does not show of it."""
+def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill | None:
+    """Sample a video, and reconstruct what the image does not show of it.
+
+    None where the path sees nothing that the image hides.
+    """
+    if request.hidden_only:
+        with log.phases.phase("choose key frames"):
+            path = fill_path(request.layered, request.path)
+        if path is None:
+            return None
+        request = replace(request, path=path)
     video = _sample(model, request, log)
     with log.phases.phase("reconstruct"):
         moving = model.networks.deformation is not None
@@ -121,7 +136,7 @@ def _conditions(
     conditioned, rendered = model.config.dit.render_condition, None
     if conditioned or request.hidden_only:
         with log.phases.phase("render condition"):
-            rendered = render_layered_image(request.layered, request.path)
+            rendered = render_layered_image(request.layered, request.path, request.key_times_s)
     with log.phases.phase("encode image"):
         image = request.image.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
         conditions = Conditions(
@@ -153,6 +168,7 @@ def _with_motion(
     units = DeformationUnits(length_unit=PLANE_DEPTH, activation=model.config.activation)
     camera, threshold_px = request.image.camera, request.settings.static_threshold_px
     motion = deform(model.networks.deformation, canonical, request.path.times_s, units, log)
+    motion = hold_until(motion, float(request.key_times_s[-1]))
     threshold_px = deformation_threshold_px(model.config, camera, threshold_px)
     return GaussianSet(
         gaussians=canonical.gaussians,

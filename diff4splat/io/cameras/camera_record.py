@@ -17,7 +17,7 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.io.atomic import write_text
 from diff4splat.io.cameras.optics_json import optics_json, read_optics, read_track, track_json
 from diff4splat.io.cameras.photo_settings_json import photo_settings_json, read_photo_settings
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_text
 from diff4splat.io.strict_json import (
     JsonObject,
     as_object,
@@ -110,11 +110,7 @@ def read_camera_record(file: Path) -> CameraRecord:
         FileFormatError: missing, damaged, of another format or version, or with a value that is
             missing, of another type, or out of range.
     """
-    require_file(file, f"a {FORMAT} file")
-    try:
-        root = load_object(file.read_text(encoding="utf-8"), str(file))
-    except (UnicodeDecodeError, OSError) as error:
-        raise FileFormatError(f"{file}: expected JSON in UTF-8, got other data") from error
+    root = load_object(read_text(file, f"a {FORMAT} file"), str(file))
     where = str(file)
     _require_version(root, where)
     try:

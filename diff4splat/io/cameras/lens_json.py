@@ -135,4 +135,3 @@ _READERS: dict[str, Callable[[JsonObject, str], Lens]] = {
     "blender": _blender,
     "equirectangular": lambda record, where: Equirectangular(),
 }
-LENS_MODELS = tuple(_READERS)

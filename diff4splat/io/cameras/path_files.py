@@ -5,8 +5,6 @@ clock the file used, and has the dtype of the default camera. The image size is 
 where it says one; ``paths.image_size.resized`` brings it to another.
 """
 
-import errno
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +16,7 @@ from diff4splat.errors import FileFormatError, InputError
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.io.atomic import write_text
+from diff4splat.io.require_file import is_file, read_bytes
 from diff4splat.paths.camera_path import CameraPath, require_valid_path
 from diff4splat.paths.formats import camera_path_json, realestate10k, transforms_json, tum
 from diff4splat.paths.formats.json_fields import load_object
@@ -143,18 +142,8 @@ def _known(format: str) -> PathFormat:
 
 
 def _read_text(file: Path) -> str:
-    try:
-        with file.open("rb") as handle:
-            content = handle.read(MAX_BYTES + 1)
-    except OSError as error:
-        reason = os.strerror(error.errno or errno.EIO)
-        raise InputError(
-            f"{file}: expected a camera path file, but: {reason}; check the name"
-        ) from error
-    if len(content) > MAX_BYTES:
-        raise FileFormatError(
-            f"{file}: expected at most {MAX_BYTES // 2**20} MiB, got more; wrong file?"
-        )
+    error = FileFormatError if is_file(file) else InputError
+    content = read_bytes(file, "camera poses", error, MAX_BYTES)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

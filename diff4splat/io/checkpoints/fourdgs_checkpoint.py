@@ -21,10 +21,11 @@ from torch import Tensor
 
 from diff4splat.errors import FileFormatError, InputError, ShapeError
 from diff4splat.io.checkpoints.fourdgs_settings import heads_in_use
+from diff4splat.io.checkpoints.torch_file import load_torch_file
 from diff4splat.io.ply.ply_body import read_columns
 from diff4splat.io.ply.ply_columns import from_columns
 from diff4splat.io.ply.ply_header import read_header
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_bytes
 from diff4splat.io.scene_files.tensor_checks import take_floats
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.hexplane.decoder import HEAD_NAMES, Layer, MotionDecoder
@@ -38,6 +39,7 @@ _HEADS = {
     "opacity": "opacity_deform",
     "color": "shs_deform",
 }
+_ITERATION = re.compile(r"iteration_([0-9]{1,12})")
 _NET = "deformation_net."
 _PLANE = re.compile(r"grid\.grids\.(\d{1,2})\.([0-5])")
 _TRUNK = re.compile(r"feature_out\.(\d{1,2})\.(?:weight|bias)")
@@ -81,7 +83,7 @@ def _iteration(folder: Path) -> Path:
     if (folder / "point_cloud.ply").exists():
         return folder
     found = [*folder.glob("iteration_*"), *folder.glob("point_cloud/iteration_*")]
-    numbered = [(int(at.name[10:]), at) for at in found if at.name[10:].isdecimal()]
+    numbered = [(int(match[1]), at) for at in found if (match := _ITERATION.fullmatch(at.name))]
     if not numbered:
         raise FileFormatError(
             f"{folder}: expected point_cloud.ply or folders iteration_N, got neither; give the "
@@ -92,8 +94,7 @@ def _iteration(folder: Path) -> Path:
 
 def _read_gaussians(file: Path) -> Gaussians:
     """Read a PLY file; quaternions keep their stored lengths."""
-    require_file(file, "a PLY file")
-    data = file.read_bytes()
+    data = read_bytes(file, "a PLY file")
     try:
         columns = read_columns(data, read_header(data), "vertex")
         gaussians = from_columns(columns)
@@ -104,14 +105,7 @@ def _read_gaussians(file: Path) -> Gaussians:
 
 
 def _load(file: Path, kind: type) -> Any:
-    require_file(file, "a file of 4DGaussians")
-    try:
-        found = torch.load(file, map_location="cpu", weights_only=True)
-    except Exception as error:  # what damaged bytes make it raise is not documented
-        raise FileFormatError(
-            f"{file}: expected a torch file of tensors and nothing else, got one that is damaged "
-            "or would run code; save the tensors alone"
-        ) from error
+    found = load_torch_file(file, "a file of 4DGaussians")
     if not isinstance(found, kind):
         raise FileFormatError(f"{file}: expected {kind.__name__}, got {type(found).__name__}")
     return found

@@ -1,13 +1,14 @@
 """The active heads of a 4DGaussians model, from the ``cfg_args`` text beside its checkpoints.
 
-The file is the printed form of a Python ``Namespace``. It is parsed, never evaluated, and only
-literal values are read.
+The file is the printed form of a Python ``Namespace``. Only truth values are read, by name: a
+parser of Python would need exponential time for some of what can stand there.
 """
 
-import ast
+import re
 from pathlib import Path
 
 from diff4splat.errors import FileFormatError
+from diff4splat.io.require_file import is_file, read_text
 
 DEFAULT_HEADS = ("position", "rotation", "scale")
 """Heads that the program uses by default."""
@@ -21,6 +22,9 @@ _SWITCHED_OFF_BY = {
 _REFUSED = ("apply_rotation", "static_mlp", "empty_voxel", "no_grid", "grid_pe")
 """Experimental switches that change the field, and are not supported."""
 _LARGEST_BYTES = 1 << 20
+_NAMESPACE = re.compile(r"Namespace\(.*\)", re.DOTALL)
+_SETTING = re.compile(r"[(\s,](\w{1,60})=(True|False|[0-9]{1,9})(?=[,)])")
+_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 
 
 def heads_in_use(folder: Path) -> tuple[str, ...]:
@@ -33,23 +37,21 @@ def heads_in_use(folder: Path) -> tuple[str, ...]:
     """
     for place in (folder, *folder.resolve().parents[:2]):
         file = place / "cfg_args"
-        if file.is_file():
+        if is_file(file):
             return _heads(_switches(file), file)
     return DEFAULT_HEADS
 
 
-def _switches(file: Path) -> dict[str, object]:
-    """Literal values by name; other values are skipped."""
+def _switches(file: Path) -> dict[str, bool]:
+    """Truth values and whole numbers by name, as truth values; others are skipped."""
     try:
-        if file.stat().st_size > _LARGEST_BYTES:
-            raise ValueError("larger than any settings")
-        call = ast.parse(file.read_text(encoding="utf-8").strip(), mode="eval").body
-    except (OSError, ValueError, SyntaxError, RecursionError, MemoryError) as error:
+        text = read_text(file, "the settings of 4DGaussians").strip()
+    except FileFormatError as error:
         raise _unlike_settings(file) from error
-    if not isinstance(call, ast.Call):
+    if len(text) > _LARGEST_BYTES or _NAMESPACE.fullmatch(text) is None:
         raise _unlike_settings(file)
-    values = ((keyword.arg, keyword.value) for keyword in call.keywords)
-    return {k: v.value for k, v in values if k is not None and isinstance(v, ast.Constant)}
+    plain = _QUOTED.sub("''", text)
+    return {match[1]: match[2] not in ("False", "0") for match in _SETTING.finditer(plain)}
 
 
 def _unlike_settings(file: Path) -> FileFormatError:
@@ -59,7 +61,7 @@ def _unlike_settings(file: Path) -> FileFormatError:
     )
 
 
-def _heads(switches: dict[str, object], file: Path) -> tuple[str, ...]:
+def _heads(switches: dict[str, bool], file: Path) -> tuple[str, ...]:
     for name in _REFUSED:
         if switches.get(name):
             raise FileFormatError(f"{file}: expected a run without {name}, got {switches[name]!r}")

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
 from torch import Tensor
 
 from diff4splat.errors import FileFormatError
 from diff4splat.io.checkpoints.native_4dgs_import import RawSpacetime
-from diff4splat.io.require_file import require_file
+from diff4splat.io.checkpoints.torch_file import load_torch_file
 
 _ENTRIES = 19
 _INDEX = {
@@ -69,14 +68,7 @@ def read_native_4dgs_checkpoint(file: Path) -> NativeCheckpoint:
 
 
 def _load(file: Path) -> Sequence[object]:
-    require_file(file, "a checkpoint of native 4D Gaussians (.pth)")
-    try:
-        content = torch.load(file, map_location="cpu", weights_only=True)
-    except Exception as error:  # the exceptions that damaged bytes raise are not documented
-        raise FileFormatError(
-            f"{file}: expected a torch file of tensors and nothing else, got one that is damaged "
-            "or would run code; save the tensors alone"
-        ) from error
+    content = load_torch_file(file, "a checkpoint of native 4D Gaussians (.pth)")
     is_pair = isinstance(content, tuple | list) and len(content) == 2
     values = content[0] if is_pair else None
     if not isinstance(values, tuple | list) or len(values) != _ENTRIES:

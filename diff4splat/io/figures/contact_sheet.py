@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import InputError, ShapeError
-from diff4splat.io.figures.depth_colors import color_bar, colorize, robust_range
+from diff4splat.io.figures.depth_colors import color_bar, colorize, is_flat, robust_range
 from diff4splat.io.figures.page_layout import (
     FAINT,
     NOTE_INK,
@@ -148,12 +148,18 @@ def _depth_row(content: SheetContent, index: Tensor) -> _Block:
         if limits is None:
             canvas.text((x, y + 4), "none in these frames", _SMALL)
             return
-        low, high = f"{limits[0]:#.3g}", f"{limits[1]:#.3g} {content.depth_unit}"
+        if is_flat(limits):
+            text = f"flat: {limits[0]:#.3g} {content.depth_unit} everywhere; grey has no depth"
+            canvas.text((x, y + 4), text, _SMALL)
+            return
+        low, high = f"{limits[0]:#.3g}", f"{limits[1]:#.3g}"
+        middle = f"{2 / (1 / limits[0] + 1 / limits[1]):#.3g}"
         canvas.text((x, y + 4), low, _SMALL)
         x += text_width(low, _SMALL) + 10
-        canvas.image((x, y + 7), _BAR, color_bar(*_BAR))
+        canvas.image((x, y + 7), _BAR, color_bar(*_BAR, limits))
         x += _BAR[0] + 10
-        canvas.text((x, y + 4), f"{high}   (2 to 98 % of all pixels; grey has no depth)", _SMALL)
+        text = f"{high} {content.depth_unit}, {middle} in the middle: even in 1 / depth"
+        canvas.text((x, y + 4), f"{text}   (2 to 98 % of all pixels; grey has no depth)", _SMALL)
 
     return _Block(height=row.height, draw=draw)
 

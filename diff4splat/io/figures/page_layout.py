@@ -1,15 +1,17 @@
 """A page to put images and short texts on; positions are (x, y) pixels from the top left."""
 
+import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import torch
 from jaxtyping import Float
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 from torch import Tensor
 
+from diff4splat.io.figures.fonts import BOX_EM, run_width, runs
 from diff4splat.io.pixels import from_bytes, to_bytes
+from diff4splat.progress.plain_text import plain_text
 
 BACKGROUND, INK, FAINT = (22, 24, 29), (236, 238, 242), (154, 160, 172)
 FRAME, NOTE_PAPER, NOTE_INK = (48, 52, 62), (64, 46, 12), (255, 205, 112)
@@ -30,14 +32,10 @@ class Style:
         return round(self.size_px * 1.4)
 
 
-@cache
-def _font(size_px: int) -> ImageFont.FreeTypeFont:
-    return ImageFont.load_default(size_px)
-
-
 def text_width(text: str, style: Style) -> int:
     """Pixels that one line takes."""
-    return -int(-_font(style.size_px).getlength(text) // 1)
+    parts = runs(plain_text(text), style.size_px)
+    return math.ceil(math.fsum(run_width(font, part, style.size_px) for font, part in parts))
 
 
 def wrap(text: str, style: Style, width: int) -> list[str]:
@@ -65,7 +63,21 @@ class Canvas:
 
     def text(self, position: tuple[int, int], text: str, style: Style) -> None:
         """One line; ``position`` is the top left of its letters."""
-        self._draw.text(position, text, fill=style.color, font=_font(style.size_px))
+        x, y = float(position[0]), position[1]
+        for font, part in runs(plain_text(text), style.size_px):
+            if font is None:
+                self._boxes((x, y), len(part), style)
+            else:
+                self._draw.text((x, y), part, fill=style.color, font=font)
+            x += run_width(font, part, style.size_px)
+
+    def _boxes(self, position: tuple[float, int], count: int, style: Style) -> None:
+        """Characters that no font has."""
+        size_px, (x, y) = style.size_px, position
+        for index in range(count):
+            left = x + BOX_EM * size_px * index + 1
+            corners = (left, y + 0.25 * size_px, left + (BOX_EM * size_px - 3), y + size_px)
+            self._draw.rectangle(corners, outline=style.color)
 
     def box(self, position: tuple[int, int], size: tuple[int, int], color: Color) -> None:
         """A filled rectangle with round corners; ``size`` is (width, height)."""

@@ -5,21 +5,20 @@ conversion (alpha, palette, 16 bits) changes the image in ways that show only in
 """
 
 import io
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import Image, ImageOps
 from torch import Tensor
 
 from diff4splat.errors import InputError
 from diff4splat.io.atomic import atomic_path
 from diff4splat.io.photos import photo_validation
 from diff4splat.io.photos.photo_convert import reduce_depth, to_srgb
+from diff4splat.io.photos.photo_header import damaged, open_photo
 from diff4splat.io.pixels import from_bytes, to_bytes
-from diff4splat.io.require_file import require_file
 
 _EXIF_IFD = 0x8769
 _FOCAL_LENGTH_IN_35MM_FILM = 0xA405
@@ -54,15 +53,17 @@ def read_photo(file: Path | str, convert: bool = False) -> Photo:
         InputError: it cannot be read, is too small or enormous, or is not 8-bit RGB.
     """
     file = Path(file)
-    require_file(file, photo_validation.WANTED, InputError)
-    with warnings.catch_warnings():
-        # Pillow warns about sizes and EXIF; we judge both ourselves.
-        warnings.simplefilter("ignore")
-        with _open(file) as image:
-            photo_validation.require_size(image, file)
-            if not convert:
-                photo_validation.require_plain(image, file)
-            return _decode(image, file)
+    with open_photo(file, convert) as image:
+        return _decode(image, file)
+
+
+def photo_size(file: Path) -> tuple[int, int] | None:
+    """(height, width) that the head of a file states; None where ``read_photo`` would refuse it."""
+    try:
+        with open_photo(file, convert=True) as image:
+            return image.height, image.width
+    except InputError:
+        return None
 
 
 def write_png(rgb: Float[Tensor, "h w 3"], file: Path | str) -> None:
@@ -76,17 +77,6 @@ def write_png(rgb: Float[Tensor, "h w 3"], file: Path | str) -> None:
     # Encoding in memory first keeps the system's own error when the disk is full.
     with atomic_path(Path(file)) as temporary:
         temporary.write_bytes(encoded.getvalue())
-
-
-def _open(file: Path) -> Image.Image:
-    try:
-        return Image.open(file, formats=photo_validation.FORMATS)
-    except Image.DecompressionBombError as error:
-        raise photo_validation.too_large(file, "far more") from error
-    except UnidentifiedImageError as error:
-        raise InputError(f"{file}: {photo_validation.describe_unknown(file)}") from error
-    except Exception as error:  # damaged headers make Pillow's readers raise almost anything
-        raise _damaged(file) from error
 
 
 def _decode(image: Image.Image, file: Path) -> Photo:
@@ -111,13 +101,7 @@ def _load(image: Image.Image, file: Path) -> None:
     try:
         image.load()
     except Exception as error:  # damaged data makes Pillow's decoders raise almost anything
-        raise _damaged(file) from error
-
-
-def _damaged(file: Path) -> InputError:
-    return InputError(
-        f"{file}: expected a whole image, got a cut off or damaged one; copy it again"
-    )
+        raise damaged(file) from error
 
 
 def _read_exif(image: Image.Image) -> _Exif:

@@ -55,8 +55,11 @@ def to_srgb(image: Image.Image) -> Noted:
 
 def _decode(file: Path, grey: bool) -> np.ndarray:
     """All bits of every channel; through OpenCV, since Pillow has no mode for deep colour."""
-    with silence_native_stderr():
-        pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
+    try:
+        with silence_native_stderr():
+            pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pixels = None
     if pixels is None or pixels.dtype == np.uint8 or (pixels.ndim == 2) != grey:
         raise InputError(
             f"{file}: expected a whole image of 16 bits per channel, got one that cannot be "

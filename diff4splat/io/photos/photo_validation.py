@@ -1,4 +1,4 @@
-"""Which images are photographs we take as they are, judged from the header before decoding."""
+"""Checks of a photograph from its header, before decoding: format, size, bits and colours."""
 
 from pathlib import Path
 
@@ -36,7 +36,8 @@ def require_size(image: Image.Image, file: Path) -> None:
             f"{file}: expected at least {MIN_SIDE_PX}x{MIN_SIDE_PX} pixels, got {width}x{height}; "
             "use a larger image"
         )
-    if image.format == "TIFF" and int(image.tag_v2.get(_REDUCED_COPY, 0)) & 1:
+    kind = image.tag_v2.get(_REDUCED_COPY, 0) if image.format == "TIFF" else 0
+    if isinstance(kind, int) and kind & 1:
         raise InputError(
             f"{file}: expected {WANTED}, got a camera raw file; develop it and save it as JPEG"
         )
@@ -81,7 +82,7 @@ def describe_unknown(file: Path) -> str:
     with file.open("rb") as stream:
         start = stream.read(16)
     if start[4:8] == b"ftyp" and start[8:12] in (b"heic", b"heix", b"hevc", b"mif1", b"msf1"):
-        return f"expected {WANTED}, got HEIC; save or export it as JPEG"
+        return f"expected {WANTED}, got HEIC; save or export it as JPEG, or run heif-convert"
     if start.startswith(_MAGIC):
         return "expected a whole image, got a cut off or damaged one; copy it again"
     return f"expected {WANTED}, got another kind of file; convert it to one of these"
@@ -107,5 +108,5 @@ def _frame_count(image: Image.Image) -> int:
     """Images in the file; a damaged directory of further ones counts as none."""
     try:
         return getattr(image, "n_frames", 1)
-    except (TypeError, ValueError, KeyError, OSError, SyntaxError):
+    except Exception:  # damaged data makes Pillow's readers raise almost anything
         return 1

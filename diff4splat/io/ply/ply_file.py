@@ -15,7 +15,7 @@ from diff4splat.io.atomic import atomic_folder, atomic_path
 from diff4splat.io.ply.ply_body import read_columns
 from diff4splat.io.ply.ply_columns import column_names, from_columns, to_table
 from diff4splat.io.ply.ply_header import read_header
-from diff4splat.io.require_file import require_file
+from diff4splat.io.require_file import read_bytes
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
@@ -72,8 +72,7 @@ def read_ply(file: Path | str) -> Gaussians:
         FileFormatError: not a PLY of Gaussians, cut off, or with NaN in it.
     """
     file = Path(file)
-    require_file(file, "a PLY file")
-    data = file.read_bytes()
+    data = read_bytes(file, "a PLY file")
     try:
         return from_columns(read_columns(data, read_header(data), "vertex"))
     except FileFormatError as error:

@@ -13,6 +13,7 @@ from typing import Any
 
 from diff4splat.errors import FileFormatError
 from diff4splat.io.scene_files.tensor_checks import take_numbers, take_value
+from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.scene.scene import DILATION_PX2, Provenance
 
 FORMAT = "diff4splat-scene"
@@ -117,9 +118,9 @@ def _require_version(strings: Mapping[str, str]) -> None:
 
 def _parse(text: str) -> dict[str, Any]:
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise FileFormatError("metadata 'scene': expected JSON, got broken text") from error
+        document = decode_json(text)
+    except FileFormatError as error:
+        raise FileFormatError(f"metadata 'scene': {error}") from error
     if not isinstance(document, dict):
         raise FileFormatError(f"metadata 'scene': expected a JSON object, got {text[:40]!r}")
     return document

@@ -50,6 +50,20 @@ def take_index(tensors: Mapping[str, Tensor], name: str, count: int) -> Tensor:
     return value
 
 
+def take_flags(
+    tensors: Mapping[str, Tensor], name: str, shape: tuple[int | None, ...], dtype: torch.dtype
+) -> Tensor:
+    """The truth values that a tensor of 0 and 1 stores in ``dtype``.
+
+    Raises:
+        FileFormatError: it is missing, of another shape or type, or holds other numbers.
+    """
+    value = _take(tensors, name, shape, (dtype,))
+    if bool(((value != 0) & (value != 1)).any()):
+        raise FileFormatError(f"{name}: expected 0 and 1, got other numbers")
+    return value.bool()
+
+
 def _take(
     tensors: Mapping[str, Tensor],
     name: str,

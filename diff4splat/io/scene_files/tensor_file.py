@@ -7,6 +7,8 @@ the result; read through the library.
 """
 
 import json
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from torch import Tensor
 
 from diff4splat.errors import FileFormatError
 from diff4splat.io.atomic import atomic_path
+from diff4splat.io.require_file import require_file
 
 _TYPE_NAMES = {
     torch.float64: "F64",
@@ -23,6 +26,10 @@ _TYPE_NAMES = {
     torch.float32: "F32",
     torch.uint8: "U8",
 }
+STORED_DTYPES = tuple(_TYPE_NAMES.values())
+"""What ``write_tensors`` writes, by the names of the format."""
+WEIGHT_DTYPES = ("F64", "F32", "F16", "BF16", "I64", "U8")
+"""What weights of networks may be stored in."""
 MAX_HEADER_BYTES = 100_000_000
 """The library's own limit; real headers have a few kilobytes."""
 
@@ -69,23 +76,39 @@ def read_metadata(file: Path) -> dict[str, str]:
     Raises:
         FileFormatError: the file is damaged, cut off or of another kind.
     """
-    try:
-        with safe_open(file, "pt") as opened:
-            return opened.metadata() or {}
-    except (SafetensorError, OSError) as error:
-        raise FileFormatError(_diagnose(file)) from error
+    with _opened(file) as opened:
+        return opened.metadata() or {}
 
 
-def read_tensors(file: Path) -> dict[str, Tensor]:
+def read_tensors(file: Path, dtypes: Collection[str] = STORED_DTYPES) -> dict[str, Tensor]:
     """Every tensor, copied into memory so that the file may change afterwards.
 
     Raises:
-        FileFormatError: the file is damaged, cut off or of another kind.
+        FileFormatError: the file is damaged, cut off or of another kind, or holds a tensor of a
+            dtype that is not among ``dtypes`` (names of the format).
     """
+    with _opened(file) as opened:
+        names = sorted(opened.keys())
+        for name in names:
+            found = opened.get_slice(name).get_dtype()
+            if found not in dtypes:
+                raise FileFormatError(
+                    f"{name[:60]}: expected one of {', '.join(dtypes)}, got {found}; the file was "
+                    "not written by diff4splat, or is damaged"
+                )
+        return {name: opened.get_tensor(name).clone() for name in names}
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[safe_open]:
+    require_file(file, "a .safetensors file")
     try:
         with safe_open(file, "pt") as opened:
-            return {name: opened.get_tensor(name).clone() for name in sorted(opened.keys())}
-    except (SafetensorError, OSError) as error:
+            yield opened
+    except FileFormatError:
+        raise
+    # Shapes that no tensor can have end in errors of the library and of torch.
+    except (SafetensorError, OSError, RuntimeError, ValueError, TypeError, OverflowError) as error:
         raise FileFormatError(_diagnose(file)) from error
 
 

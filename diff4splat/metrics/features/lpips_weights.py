@@ -1,6 +1,6 @@
 """LPIPS weights from the files in circulation, safetensors or torch; nothing in them is executed.
 
-Two layouts, told apart by their names:
+Two layouts, distinguished by their names:
 
     the lpips package's state    net.slice2.5.weight …  lin0.model.1.weight …  scaling_layer.shift
     torchvision's network        features.5.weight …  (classifier.… is not needed)

@@ -28,6 +28,7 @@ from diff4splat.io.cameras.camera_record import (
 )
 from diff4splat.io.cameras.optics_json import optics_json
 from diff4splat.io.exr import write_depth_exr
+from diff4splat.io.partials import remove_abandoned
 from diff4splat.io.photos.images import write_png
 from diff4splat.outputs.camera_dataset.sheet import SheetRow, camera_sheet, thumbnail
 from diff4splat.outputs.photo_sequence import (
@@ -98,9 +99,13 @@ def write_camera_dataset(job: DatasetJob, folder: Path, log: RunLog) -> dict[str
 def require_empty(folder: Path) -> None:
     """Refuse a folder with something in it: a data set is not mixed with other files.
 
+    What a killed run left unfinished there is removed.
+
     Raises:
         ConfigError: naming what was found.
     """
+    if folder.is_dir():
+        remove_abandoned(folder)
     if folder.is_dir() and (found := sorted(path.name for path in folder.iterdir())):
         raise ConfigError(
             f"--out: expected a new or empty folder, got {folder} with {found[0]} in it; choose "

@@ -14,8 +14,8 @@ from diff4splat.errors import FileFormatError
 from diff4splat.geometry import rigid
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.paths.limits import MAX_POSES
 from diff4splat.paths.messages import quoted
-from diff4splat.paths.settings import MAX_POSES
 
 _ROUNDING = 1e-3
 """What rounded text may do to a rotation; the same as ``rigid.require_rigid`` allows."""

@@ -1,6 +1,5 @@
 """Typed fields out of JSON, with messages that name file, frame and key."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ from torch import Tensor
 
 from diff4splat.errors import FileFormatError
 from diff4splat.paths.formats.checks import finite_number, finite_numbers, require_pose_count
+from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.paths.messages import quoted
 
 _LARGEST_SIDE_PX = 100_000
@@ -33,15 +33,9 @@ def load_object(text: str, name: str) -> dict[str, object]:
         FileFormatError: not JSON, or JSON of another kind.
     """
     try:
-        root = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise FileFormatError(
-            f"{name}: line {error.lineno}: expected JSON, but {error.msg}; repair the file"
-        ) from None
-    except (ValueError, RecursionError):
-        raise FileFormatError(
-            f"{name}: expected plain JSON, got absurd numbers or nesting"
-        ) from None
+        root = decode_json(text)
+    except FileFormatError as error:
+        raise FileFormatError(f"{name}: {error}") from None
     if not isinstance(root, dict):
         raise FileFormatError(
             f"{name}: expected a JSON object with frames or camera_path, got {kind_of(root)}; "

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from diff4splat.errors import ShapeError
 from diff4splat.geometry.camera import Camera
-from diff4splat.paths.settings import require_frames
+from diff4splat.paths.limits import require_frames
 
 DEFAULT_FPS = 24.0
 

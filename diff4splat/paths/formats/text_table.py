@@ -10,7 +10,7 @@ from torch import Tensor
 
 from diff4splat.errors import FileFormatError
 from diff4splat.paths.formats.checks import finite_numbers, require_pose_count
-from diff4splat.paths.settings import MAX_POSES
+from diff4splat.paths.limits import MAX_POSES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,11 +11,13 @@ from dataclasses import replace
 import torch
 
 from diff4splat.errors import ConfigError, InputError
+from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.physical_camera import PhysicalCamera
 from diff4splat.render.physical.effects import find_effects
 from diff4splat.render.physical.exposure import Exposure
 from diff4splat.render.physical.pinhole import rasterize_pinhole
 from diff4splat.render.physical.settings import OUTPUTS, Photograph, PhotoSettings
+from diff4splat.render.resolution import scene_dilation_px2
 from diff4splat.render.settings import require_outputs
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import DILATION_PX2, Scene
@@ -46,7 +48,7 @@ def photograph(
     subject = scene_or_gaussians
     means = (subject if isinstance(subject, Gaussians) else subject.gaussians).means
     camera = _valid_camera(camera, time_s).to(means.dtype).to(means.device)
-    settings = with_default_smoothing(subject, settings)
+    settings = with_default_smoothing(subject, camera.camera, settings)
     effects = find_effects(subject, camera, time_s, settings)
     if backend == "trace" or effects.any:
         if backend not in ("trace", "auto"):
@@ -60,11 +62,14 @@ def photograph(
     return rasterize_pinhole(subject, camera, time_s, wanted, settings, effects, backend)
 
 
-def with_default_smoothing(subject: Scene | Gaussians, settings: PhotoSettings) -> PhotoSettings:
+def with_default_smoothing(
+    subject: Scene | Gaussians, camera: Camera, settings: PhotoSettings
+) -> PhotoSettings:
     """The settings with the smoothing that ``subject`` was trained with, unless they set one."""
     if settings.smoothing_px2 is not None:
         return settings
-    asked = subject.dilation_px2 if isinstance(subject, Scene) else DILATION_PX2
+    scene = isinstance(subject, Scene)
+    asked = scene_dilation_px2(subject, camera) if scene else DILATION_PX2
     return replace(settings, smoothing_px2=asked)
 
 

@@ -20,7 +20,17 @@ from diff4splat.render.raster.padded_image import PaddedImage, empty
 from diff4splat.render.raster.projection.harmonics import colors
 from diff4splat.render.raster.projection.project import SH, project
 from diff4splat.render.raster.raster_settings import RasterSettings
-from diff4splat.render.raster.tables import Cloud, Doubles, Floats, Grid, Integers, Lists, View
+from diff4splat.render.raster.tables import (
+    Cloud,
+    Doubles,
+    Floats,
+    Grid,
+    Integers,
+    Lists,
+    ProjectionInputs,
+    ProjectionOutputs,
+    View,
+)
 
 GAUSSIANS_PER_PART = 4096
 TILES_PER_PART = 4
@@ -70,11 +80,11 @@ def footprints(cloud: Cloud, sh: Floats, view: View, plan: RasterSettings) -> Fo
     prints, depth = empty(count, 8, dtype=torch.float64), empty(count)
     everyone = np.arange(count, dtype=np.int32)
     numbers, unusable = sh.reshape(count, sh.shape[1] * 3), np.zeros(SH + 1, np.int64)
+    inputs = ProjectionInputs(cloud, numbers, view, plan.rules)
 
     def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
-        return project(
-            first, last, everyone, cloud, numbers, view, plan.rules, prints, depth, visible, faults
-        )
+        outputs = ProjectionOutputs(prints, depth, visible, faults)
+        return project(first, last, everyone, inputs, outputs)
 
     visible = list_visible(count, work, unusable)
     order = depth_sort(visible, depth)

@@ -29,7 +29,14 @@ from diff4splat.render.raster.projection.harmonics import colors
 from diff4splat.render.raster.projection.moving import Moving
 from diff4splat.render.raster.projection.project import SH, project
 from diff4splat.render.raster.raster_settings import RasterSettings
-from diff4splat.render.raster.tables import Integers, Lists, View
+from diff4splat.render.raster.tables import (
+    Integers,
+    Lists,
+    ProjectionInputs,
+    ProjectionOutputs,
+    View,
+)
+from diff4splat.scene.motion.times import require_time_s
 from diff4splat.scene.scene import Scene
 
 
@@ -79,9 +86,13 @@ class Sequence:
         """The image at ``time_s``.
 
         With pixel ``rows`` (first, one past last) only the tiles in these rows are brought up to
-        the time while the camera stands; the others keep what they showed, as under a rolling
+        the time while the camera is static; the others keep what they showed, as under a rolling
         shutter.
+
+        Raises:
+            InputError: the time is not a finite number of seconds.
         """
+        require_time_s(time_s)
         same_camera = self._still is not None and self._still.view == view
         if not same_camera:
             self._see_still(view)
@@ -99,13 +110,12 @@ class Sequence:
             np.zeros(SH + 1, np.int64),
             self._sh.reshape(len(self._sh), self._sh.shape[1] * 3),
         )
-        index, rules = self._still_index, self._plan.rules
+        index = self._still_index
+        inputs = ProjectionInputs(self._cloud, numbers, view, self._plan.rules)
 
         def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
-            return project(
-                first, last, index, self._cloud, numbers, view, rules, self._prints, self._depth,
-                visible, faults,
-            )  # fmt: skip
+            outputs = ProjectionOutputs(self._prints, self._depth, visible, faults)
+            return project(first, last, index, inputs, outputs)
 
         visible = stages.list_visible(len(index), work, unusable)
         self._still = _Still(view, depth_sort(visible, self._depth), unusable)

@@ -60,6 +60,27 @@ class Rules(NamedTuple):
     near_depth: float
 
 
+class ProjectionInputs(NamedTuple):
+    """What footprints are made from."""
+
+    cloud: Cloud
+    sh: Floats
+    """One row per Gaussian."""
+    view: View
+    rules: Rules
+
+
+class ProjectionOutputs(NamedTuple):
+    """What projection fills."""
+
+    prints: Doubles
+    depth: Floats
+    visible: Integers
+    """Index of every Gaussian with a footprint."""
+    unusable: NDArray[np.int64]
+    """Gaussians left out, by the first parameter that cannot be used."""
+
+
 class Grid(NamedTuple):
     """Square tiles over an image whose rows are padded to whole tiles."""
 

@@ -1,4 +1,4 @@
-"""Key frames that stand in for any motion, with as few keys as a tolerance in pixels allows.
+"""Key frames that replace any motion, with as few keys as a tolerance in pixels allows.
 
 Between two keys the error of a smooth motion goes as the square of their distance. Cubic curves
 gain a factor and no power: at both ends their tangents are one-sided, and rotations and scales do

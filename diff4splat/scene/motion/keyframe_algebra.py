@@ -1,4 +1,4 @@
-"""Algebra of key-framed motions: resample, join two, drop the keys of what stands still.
+"""Algebra of key-framed motions: resample, join two, drop the keys of static Gaussians.
 
 Axes: ``t`` key times, ``m`` moving Gaussians. A linear motion is linear (slerp is constant speed)
 between its keys, so inserting key times changes nothing; a cubic one has no such property.
@@ -80,6 +80,17 @@ def resample(motion: KeyframeMotion, key_times_s: Float[Tensor, " t"]) -> Keyfra
         log_scale_offsets=torch.stack([state.scales.log() for state in states]).to(motion.offsets),
         interpolation="linear",
     )
+
+
+def hold_until(motion: KeyframeMotion | StaticMotion, end_s: float) -> Motion:
+    """The motion, standing still from its last key until ``end_s``."""
+    start_s, last_s = motion.time_range_s
+    if last_s >= end_s:
+        return motion
+    if isinstance(motion, StaticMotion):
+        return replace(motion, time_range_s=(start_s, end_s))
+    times_s = torch.cat([motion.key_times_s, motion.key_times_s.new_tensor([end_s])])
+    return resample(motion, times_s)
 
 
 def join(first: Motion, second: Motion, count: int) -> KeyframeMotion | StaticMotion:

@@ -19,11 +19,12 @@ from torch import Tensor
 from diff4splat.errors import ShapeError
 from diff4splat.geometry import quaternion
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.times import require_time_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyframeMotion:
-    """Key-framed deformation of the Gaussians at ``moving_index``; all others stand still."""
+    """Key-framed deformation of the Gaussians at ``moving_index``; all others are static."""
 
     key_times_s: Float[Tensor, " t"]
     moving_index: Int[Tensor, " m"]
@@ -56,6 +57,7 @@ class KeyframeMotion:
 
     def state_at(self, gaussians: Gaussians, time_s: float) -> Gaussians:
         """The Gaussians at ``time_s``; static ones are passed through untouched."""
+        require_time_s(time_s)
         if len(self.moving_index) == 0:
             return gaussians
         lower, weight = self._bracket(time_s)

@@ -27,7 +27,11 @@ class Motion(Protocol):
         ...
 
     def state_at(self, gaussians: Gaussians, time_s: float) -> Gaussians:
-        """The Gaussians as they stand at ``time_s``."""
+        """The Gaussians at ``time_s``.
+
+        Raises:
+            InputError: not a finite number of seconds (``times.require_time_s``).
+        """
         ...
 
     def select(self, keep: Bool[Tensor, " n"]) -> "Motion":

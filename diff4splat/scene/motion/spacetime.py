@@ -20,6 +20,7 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError, ShapeError
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.times import require_time_s
 
 GATE = 0.05
 """Yang et al. skip a Gaussian whose pulse is at or below this."""
@@ -29,7 +30,7 @@ FARTHEST = 38.6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpacetimeMotion:
-    """Velocity, pulse and colour waves of the Gaussians at ``moving_index``; all others stand."""
+    """Velocity, pulse and colour waves of the Gaussians at ``moving_index``; others are static."""
 
     moving_index: Int[Tensor, " m"]
     velocities: Float[Tensor, "m 3"]
@@ -66,6 +67,7 @@ class SpacetimeMotion:
 
     def state_at(self, gaussians: Gaussians, time_s: float) -> Gaussians:
         """The Gaussians at ``time_s``; those that are always the same are passed through."""
+        require_time_s(time_s)
         index = self.moving_index
         if len(index) == 0:
             return gaussians
@@ -79,7 +81,7 @@ class SpacetimeMotion:
         )
 
     def velocity_at(self, gaussians: Gaussians, time_s: float) -> Float[Tensor, "n 3"]:
-        """Scene units per second; 0 for what stands still and outside ``time_range_s``."""
+        """Scene units per second; 0 for what is static and outside ``time_range_s``."""
         start, stop = self.time_range_s
         still = torch.zeros_like(gaussians.means)
         if not start <= time_s <= stop:
@@ -97,7 +99,7 @@ class SpacetimeMotion:
         return replace(self.rows(survives), moving_index=new_index)
 
     def rows(self, which: Bool[Tensor, " m"]) -> "SpacetimeMotion":
-        """Only some of the moving Gaussians; the others of the same set stand still."""
+        """Only some of the moving Gaussians; the others of the same set are static."""
         return replace(self, **{name: value[which] for name, value in self._tensors().items()})
 
     def to(self, target: torch.device | torch.dtype) -> "SpacetimeMotion":

@@ -1,4 +1,4 @@
-"""Algebra of velocities and pulses: turn, join two, drop those of what stands still.
+"""Algebra of velocities and pulses: turn, join two, drop those of static Gaussians.
 
 Axes: ``m`` moving Gaussians, ``w`` colour waves, ``k`` harmonics.
 """

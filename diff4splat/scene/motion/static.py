@@ -7,6 +7,7 @@ from jaxtyping import Bool, Int
 from torch import Tensor
 
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.times import require_time_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +23,7 @@ class StaticMotion:
 
     def state_at(self, gaussians: Gaussians, time_s: float) -> Gaussians:
         """``gaussians`` itself."""
-        del time_s
+        require_time_s(time_s)
         return gaussians
 
     def select(self, keep: Bool[Tensor, " n"]) -> "StaticMotion":

@@ -13,6 +13,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.blocks.resize import upsample_bilinear
+
 PYRAMID = (2, 1)
 """Downsampling factors, coarse first."""
 STEPS = 3
@@ -35,7 +37,7 @@ def track_flow(
         gradients = _gradients(fixed)
         for _ in range(STEPS):
             coarse = coarse + _step(gradients, warp(moving, coarse) - fixed, coarse)
-        flow = _upsample(coarse, level) * level
+        flow = upsample_bilinear(coarse, level) * level
     return flow
 
 
@@ -89,11 +91,3 @@ def _averaging(length: int, side: int) -> Float[Tensor, "l l"]:
 
 def _downsample(maps: Float[Tensor, "n c h w"], factor: int) -> Float[Tensor, "n c h2 w2"]:
     return maps if factor == 1 else torch.nn.functional.avg_pool2d(maps, factor)
-
-
-def _upsample(maps: Float[Tensor, "n c h w"], factor: int) -> Float[Tensor, "n c h2 w2"]:
-    if factor == 1:
-        return maps
-    return torch.nn.functional.interpolate(
-        maps, scale_factor=factor, mode="bilinear", align_corners=False
-    )

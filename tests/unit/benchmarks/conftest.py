@@ -11,5 +11,5 @@ import jaxtyping
 
 HARNESS = Path(__file__).parents[3] / "benchmarks" / "renderers"
 sys.path[:0] = [str(HARNESS), str(HARNESS.parent)]
-SHAPED = ("ablations", "brute_force", "comparison", "sampling", "scenes", "torch_backward")
+SHAPED = ("ablations", "ground_truth", "scenes", "torch_backward")
 jaxtyping.install_import_hook(SHAPED, "type_checks.check_types")

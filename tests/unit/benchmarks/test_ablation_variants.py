@@ -126,7 +126,7 @@ def test_without_order_one_stage_starts_from_nothing_at_the_rate_of_what_does() 
     assert replace(stage, steps=full.steps, optimizer=full.optimizer) == full
 
 
-def test_pictures_are_true_in_training_and_judging() -> None:
+def test_pictures_are_true_in_training_and_evaluation() -> None:
     found = recipe("pictures")
     assert found.model.ldrm.input == "frames"
     assert all(found.stage(stage).use_ground_truth_frames for stage in STAGES)

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import torch
 from adapter import Adapter, judged, note, refusal
-from comparison import gradient_errors, image_error
+from ground_truth.comparison import gradient_errors, image_error
+from ground_truth.pixel_samples import find_truth
 from loading import BUILT_IN, find_peers, load
-from sampling import find_truth
 from scenes import TINY
 
 from diff4splat.errors import ConfigError, InputError

@@ -2,14 +2,14 @@
 
 from dataclasses import fields, replace
 
-import brute_force
 import numpy as np
 import oracles_render
 import pytest
 import torch
-from brute_force import gradients, look
+from ground_truth import brute_force
+from ground_truth.brute_force import gradients, look
+from ground_truth.pixel_samples import find_truth, read, sample, save
 from oracles_render import random_gaussians, small_camera
-from sampling import find_truth, read, sample, save
 from scenes import TINY, Scene, coincident
 
 from diff4splat.render.settings import RenderSettings

@@ -4,12 +4,18 @@ import math
 
 import pytest
 import torch
-from brute_force import Pixels
-from comparison import gradient_error, gradient_errors, image_error, verdict, worst_gradient
+from ground_truth.brute_force import Pixels
+from ground_truth.comparison import (
+    gradient_error,
+    gradient_errors,
+    image_error,
+    verdict,
+    worst_gradient,
+)
+from ground_truth.pixel_samples import Truth
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from records import GradientError, ImageError
-from sampling import Truth
 
 from diff4splat.scene.gaussians import Gaussians
 

@@ -6,16 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from drawing import draw_all, draw_slope, short
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from limits import BOTH_FLOPS_PER_PAIR, FORWARD_FLOPS_PER_PAIR, MachineLimits, shares
-from machine import this_machine
 from options import Options
 from records import Cell, ImageError, Work, plain, timing
-from slope import FIXED, SERIES, Point, fit, slopes
-from slope import to_markdown as slope_to_markdown
-from tables import Results, baseline, markdown_table, milliseconds, to_markdown
+from report.plots import draw_all, draw_slope, short
+from report.tables import Results, baseline, markdown_table, milliseconds, to_markdown
+from timing.limits import BOTH_FLOPS_PER_PAIR, FORWARD_FLOPS_PER_PAIR, MachineLimits, shares
+from timing.machine import this_machine
+from timing.scaling import FIXED, SERIES, Point, fit, slopes
+from timing.scaling import to_markdown as slope_to_markdown
 
 from diff4splat.errors import ConfigError
 

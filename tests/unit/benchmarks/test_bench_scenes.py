@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 import torch
-from brute_force import project
+from ground_truth.brute_force import project
 from scenes import SCENES, TINY, Look, Scene, choose, cloud, coincident
 
 from diff4splat.errors import ConfigError

@@ -5,18 +5,17 @@ import mmap
 from pathlib import Path
 from types import SimpleNamespace
 
-import machine
-import memory
 import pytest
-import rounds
 import torch
 from loading import BUILT_IN, Peer
-from machine import Disturbance
-from process import Limits, Worker, WorkerFailure, explain
 from records import timing
-from rounds import Effort, Turn
 from scenes import TINY
-from station import Station, TruthDesk
+from timing import interleaved, machine
+from timing.interleaved import Effort, Turn
+from timing.machine import Disturbance
+from workers import memory
+from workers.process import Limits, Worker, WorkerFailure, explain
+from workers.render_worker import GroundTruthWorker, RenderWorker
 
 LIMITS = Limits(threads=1, memory_bytes=4 << 30, answer_s=600.0)
 EFFORT = Effort(seconds=0.05, patience_s=100.0, memory_bytes=4 << 30, window_s=0.001)
@@ -60,7 +59,7 @@ def prepare(gaussians, camera):
 def test_failures_become_reasons_and_the_worker_lives_until_it_dies(tmp_path: Path) -> None:
     file = tmp_path / "unruly.py"
     file.write_text(UNRULY)
-    with Worker(Station, LIMITS) as worker:
+    with Worker(RenderWorker, LIMITS) as worker:
         assert worker.ask("load", file) == ("", True)
         # The warm-up is the first call.
         assert worker.ask("prepare", TINY[0]) is None
@@ -77,15 +76,18 @@ def test_failures_become_reasons_and_the_worker_lives_until_it_dies(tmp_path: Pa
 
 def test_a_worker_that_does_not_answer_is_stopped() -> None:
     limits = Limits(threads=1, memory_bytes=4 << 30, answer_s=0.01)
-    with Worker(TruthDesk, limits) as worker, pytest.raises(WorkerFailure, match="no answer"):
+    with (
+        Worker(GroundTruthWorker, limits) as worker,
+        pytest.raises(WorkerFailure, match="no answer"),
+    ):
         worker.ask("find", TINY[0], Path("unused"), False)
 
 
 def test_one_renderer_is_measured_and_checked(tmp_path: Path) -> None:
     peer = Peer(name="tile-loop", file=BUILT_IN / "tile_loop.py")
     said = []
-    subject = rounds.find_subject(TINY[0], tmp_path, EFFORT)
-    (cell,) = rounds.measure(subject, [peer], 1, EFFORT, said.append)
+    subject = interleaved.find_subject(TINY[0], tmp_path, EFFORT)
+    (cell,) = interleaved.measure(subject, [peer], 1, EFFORT, said.append)
     assert (cell.reason, cell.peer, cell.threads) == ("", "tile-loop", 1)
     assert cell.forward.windows >= 1
     assert cell.forward.best_s <= cell.forward.median_s
@@ -97,7 +99,7 @@ def test_one_renderer_is_measured_and_checked(tmp_path: Path) -> None:
 
 def test_a_truth_that_fails_is_said_and_not_compared(tmp_path: Path) -> None:
     nowhere = tmp_path / "missing" / "folder"
-    subject = rounds.find_subject(TINY[0], nowhere, EFFORT)
+    subject = interleaved.find_subject(TINY[0], nowhere, EFFORT)
     assert subject.truth_file is None
     assert subject.work.reason.startswith("truth: RuntimeError: ")
     assert "missing" in subject.work.reason
@@ -168,7 +170,7 @@ class Scripted:
 
 def scripted(monkeypatch: pytest.MonkeyPatch, workers: list) -> list[Turn]:
     queue = iter(workers)
-    monkeypatch.setattr(rounds, "Worker", lambda *_: next(queue))
+    monkeypatch.setattr(interleaved, "Worker", lambda *_: next(queue))
     effort = Effort(seconds=0.1, patience_s=1.0, memory_bytes=1, window_s=0.02)
     turns = [
         Turn(peer=Peer(name=w.name, file=Path()), scene=TINY[0], threads=1, effort=effort)
@@ -248,9 +250,9 @@ class Slow:
 def test_a_window_gives_seconds_per_call_and_a_first_call_its_growth(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    station, slow = Station(), Slow()
+    station, slow = RenderWorker(), Slow()
     station._prepared, station._grad_rgb = slow, torch.ones(1)
-    monkeypatch.setattr("station.time", slow)
+    monkeypatch.setattr("workers.render_worker.time", slow)
     assert station.window("forward", 0.0) == pytest.approx(0.01)
     before = slow.calls
     assert station.window("forward", 0.195) == pytest.approx(0.01)

@@ -2,8 +2,10 @@
 
 import io
 import json
+import os
 import struct
 import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +17,9 @@ from oracles_clips import make_clip
 from PIL import Image
 
 from diff4splat.data.clip_folder import ClipFolder
+from diff4splat.data.codecs.depth import decode_exr, encode_exr
 from diff4splat.data.codecs.encode import EncodedClip, Member, encode_clip
+from diff4splat.data.codecs.images import decode_png
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError
 
@@ -236,7 +240,7 @@ NOWHERE = np.full((2, 5, 4, 4), np.nan)
         (
             "camera.npz",
             camera(times_s=np.array([{}] * 5)),
-            "expected float64 of shape (5,), got obj",
+            "expected the header of an array of numbers",
         ),
         ("camera.npz", camera(times_s=np.zeros(5)), "as stored, clip 'clip-0', times_s: expected"),
         ("camera.npz", camera(world_from_camera=NOWHERE), "cameras: expected finite numbers"),
@@ -253,7 +257,7 @@ NOWHERE = np.full((2, 5, 4, 4), np.nan)
         ("flow00.npz", npz(to_next=np.zeros((5, 24, 32, 2), "f4")), "shape (4, 24, 32, 2), got"),
         ("tracks.npz", npz(positions=np.zeros((5, 17, 3), "f4")), "shape (5, 16, 3), got float32"),
         ("meta.json", b"{}", "'meta.json': expected a diff4splat-clip, got JSON of another kind"),
-        ("meta.json", b"\xff", "'meta.json': expected JSON, got damaged text"),
+        ("meta.json", b"\xff", "'meta.json': expected JSON in UTF-8"),
     ],
 )
 def test_forged_members(
@@ -315,3 +319,32 @@ def test_tracks_found_in_frames_that_do_not_exist(tmp_path: Path, encoded: Encod
         arrays["found_at"] = np.full((16, 2), bad, np.int32)
         folder = forged(tmp_path / str(bad), encoded, "tracks.npz", npz(**arrays))
         assert f"expected views below 2 and frames below 5, got [{bad}, {bad}]" in message(folder)
+
+
+def test_an_index_that_gives_gigabytes_to_one_member(folder: Path) -> None:
+    """A file with a hole costs nothing on the disk, and everything in memory."""
+    size = 60 << 30
+    os.truncate(folder / TAR, size)
+    edit(folder / MANIFEST, lambda document: document["shards"][0].update(size=size))
+    places = {"depth00.exr": [512, size - 512, 0]}
+    edit(folder / INDEX, lambda document: document["clips"]["clip-0"].update(places))
+    assert "'depth00.exr': expected up to" in message(folder)
+
+
+def test_pixels_that_no_file_of_this_size_can_hold() -> None:
+    for decode, content in ((decode_png, _png()), (decode_exr, _exr())):
+        with pytest.raises(FileFormatError, match="damaged or other"):
+            decode(content, (10_000, 16_384, 16_384))
+
+
+def _png() -> bytes:
+    """One that claims the size above, and holds nothing."""
+    header = struct.pack(">IIBBBBB", 16_384, 10_000 * 16_384, 8, 0, 0, 0, 0)
+    chunk = b"IHDR" + header
+    return (
+        b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    )
+
+
+def _exr() -> bytes:
+    return encode_exr(np.ones((1, 4, 4), np.float32), "float")

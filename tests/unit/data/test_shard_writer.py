@@ -113,7 +113,7 @@ def test_appending_to_nothing_begins(tmp_path: Path, encoded: list[EncodedClip])
 
 def test_appending_to_damage_is_refused(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text("{")
-    with pytest.raises(FileFormatError, match=r"manifest\.json: expected JSON, got damaged text"):
+    with pytest.raises(FileFormatError, match=r"manifest\.json: line 1: expected JSON"):
         ShardWriter(tmp_path, OPTIONS, append=True)
 
 

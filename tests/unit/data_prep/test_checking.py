@@ -34,17 +34,28 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def rows(table: str) -> dict[str, list[str]]:
-    lines = [line.strip("| ").split(" | ") for line in table.splitlines()]
+    lines = [line.strip("| ").split(" | ") for line in table.splitlines() if line[:1] == "|"]
     return {cells[0]: cells[1:] for cells in lines[2:]}
 
 
 def test_every_kind_of_truth_has_a_row(folder: Path) -> None:
     found = rows(check_folder(folder, None, Phases()))
     assert {"rotation", "reprojection", "flow_px", "projection_px", "across_views"} <= set(found)
-    worst, median, count = found["projection_px"]
+    worst, limit, median, count = found["projection_px"]
+    assert limit == "at most 0.001"
     assert 0 <= float(median) <= float(worst) < 1e-3
     assert int(count.replace(",", "")) > 100
     assert found["visible_depth"][0].endswith(" agree")
+
+
+def test_every_figure_stands_beside_its_limit_and_a_verdict_ends_the_table(folder: Path) -> None:
+    table = check_folder(folder, None, Phases())
+    assert table.splitlines()[-1] == "consistent: all 4 clips hold every limit"
+    for name, cells in rows(table).items():
+        if cells[0] == "–":
+            continue
+        value, limit = float(cells[0].split()[0]), float(cells[1].split()[-1])
+        assert value >= limit if "least" in cells[1] else value <= limit, name
 
 
 @pytest.mark.parametrize(("most", "looked_at"), [(None, 4), (1, 1), (2, 2), (99, 4)])
@@ -75,8 +86,8 @@ def test_what_is_not_there_is_not_compared(tmp_path: Path) -> None:
     found = rows(
         check_folder(write(tmp_path, replace(clip, views=views, tracks=None)), 1, Phases())
     )
-    assert found["projection_px"] == ["–", "–", "0"]
-    assert found["flow_px"] == ["–", "–", "0"]
+    assert found["projection_px"] == ["–", "–", "–", "0"]
+    assert found["flow_px"] == ["–", "–", "–", "0"]
 
 
 def test_a_clip_that_disagrees_is_named_with_its_likely_cause(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from listed_clips import ListedClips
 from oracles_clips import make_clip
 from oracles_evaluation import FRAMES, tiny_protocol, wall_and_patch
 from PIL import Image
@@ -19,7 +20,6 @@ from diff4splat.evaluation.protocols.protocol_json import (
     protocol_names,
 )
 from diff4splat.evaluation.protocols.sample import make_sample
-from diff4splat.evaluation.protocols.sources import ListedClips
 from diff4splat.evaluation.systems.evaluated_system import Generator
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings

@@ -122,7 +122,7 @@ def test_still_clips_are_asked_whether_they_stand_and_close() -> None:
 
 def test_a_moving_clip_says_why_it_is_not_asked(moving: ItemResult) -> None:
     reasons = {(skip.key, skip.why) for skip in moving.skips if skip.row == SYSTEM}
-    assert ("moving_share", "things move in the clip") in reasons
+    assert ("moving_share", "objects move in the clip") in reasons
     assert moving.value(SYSTEM, "moving_share") is None
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from listed_clips import ListedClips
 from oracles_evaluation import Fixed, filmed, tiny_protocol, wall_and_patch
 
 from diff4splat.data.clip import Clip
@@ -14,7 +15,6 @@ from diff4splat.errors import FileFormatError, InputError, OutputError
 from diff4splat.evaluation.columns import columns_of
 from diff4splat.evaluation.evaluate import OUTPUT_FILES, Evaluation, RunLimits, evaluate
 from diff4splat.evaluation.measure_item import Setup
-from diff4splat.evaluation.protocols.sources import ListedClips
 from diff4splat.evaluation.report.result_store import run_key
 from diff4splat.metrics.features.load import load_features
 from diff4splat.progress.phases import Phases

@@ -126,8 +126,8 @@ def test_divergence_keeps_the_last_good_state(tmp_path: Path, monkeypatch):
     with pytest.raises(DivergenceError, match=r"state of step \d+ is kept"):
         fit_scene(run(tmp_path, coarse_steps=400))
     monkeypatch.undo()
-    from diff4splat.fitting.checkpoint import load_checkpoint
-    from diff4splat.fitting.fingerprint import fingerprint
+    from diff4splat.fitting.checkpoints.checkpoint import load_checkpoint
+    from diff4splat.fitting.checkpoints.fingerprint import fingerprint
 
     asked = run(tmp_path, coarse_steps=400)
     kept = load_checkpoint(tmp_path, fingerprint(asked.capture, asked.settings, None))

@@ -45,7 +45,8 @@ def image() -> InputImage:
 
 
 def sample_of(probability: torch.Tensor) -> MotionSample:
-    return MotionSample(field=torch.zeros(3, 2, 1, 1), probability=probability, calls=CallCount())
+    still = torch.zeros(3, 2, 1, 1)
+    return MotionSample(field=still, mean_field=still, probability=probability, calls=CallCount())
 
 
 def test_the_most_probable_moves_where_nothing_is_probable() -> None:

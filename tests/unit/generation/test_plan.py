@@ -27,6 +27,8 @@ TABLE = [
     ("small", PARTS, {"prompt": False}, DEPTH),
     ("small", PARTS, {"prompt": True, "still": True}, DEPTH),
     ("small", PARTS, {"prompt": True, "frames": 1}, DEPTH),
+    ("small", PARTS, {"prompt": True, "static_prompt": "no word is known"}, DEPTH),
+    ("small", (), {"prompt": True, "static_prompt": "no word is known"}, PRIORS),
     ("small", PARTS, {"prompt": True, "fill": "none"}, PRIORS),
     ("small", PARTS, {"prompt": True, "fill": "video"}, PRIORS | VIDEO),
     ("small", PARTS, {"prompt": False, "fill": "video"}, (DEPTH | VIDEO) - {"deformation"}),

@@ -12,7 +12,7 @@ from diff4splat.io.atomic import atomic_folder, atomic_path, output_error, write
 def test_the_file_appears_only_at_the_end(tmp_path: Path) -> None:
     target = tmp_path / "deep" / "folder" / "a.txt"
     with atomic_path(target) as temporary:
-        assert temporary.parent == target.parent
+        assert temporary.parent.parent == target.parent, "a rename must not cross file systems"
         assert temporary.suffix == ".txt", "writers choose the format by it"
         temporary.write_text("x")
         assert not target.exists()

@@ -120,7 +120,9 @@ def test_missing_folder_empty_and_other_kinds(tmp_path: Path) -> None:
     (tmp_path / "a.exr").touch()
     assert "got an empty file" in refusal(tmp_path / "a.exr")
     (tmp_path / "a.exr").write_bytes(random.Random(0).randbytes(500))
-    assert "expected an OpenEXR file, got a damaged or other one" in refusal(tmp_path / "a.exr")
+    assert "expected a whole OpenEXR file, got a damaged or other one" in refusal(
+        tmp_path / "a.exr"
+    )
 
 
 def test_exr_of_other_programs(tmp_path: Path) -> None:

@@ -71,11 +71,14 @@ def test_odd_sizes_are_padded_and_said(tmp_path: Path, height: int, width: int) 
     assert np.abs(got[:, -1, -1] / 255 - frames[:, -1, -1].numpy()).max() < 0.06
 
 
-def test_equal_frames_give_equal_bytes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("suffix", ["mp4", "webm"])
+def test_equal_frames_give_equal_bytes(suffix: str, tmp_path: Path) -> None:
     frames = torch.rand(4, 32, 32, 3)
-    for name in ("a.mp4", "b.mp4"):
-        write_video(frames, tmp_path / name, 24.0)
-    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+    files = [tmp_path / f"{name}.{suffix}" for name in "ab"]
+    for file in files:
+        write_video(frames, file, 24.0)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert decoded(files[0]).shape == (4, 32, 32, 3)
 
 
 def test_values_beyond_the_range_are_clamped(tmp_path: Path) -> None:
@@ -129,7 +132,9 @@ def test_unusual_frame_rates(tmp_path: Path, fps: float) -> None:
 
 
 def test_other_names_and_no_frames(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"expected a name ending in \.mp4, got '\.avi'"):
+    with pytest.raises(
+        ConfigError, match=r"expected a name ending in \.mp4 or \.webm, got '\.avi'"
+    ):
         write_video(colours(2, 16, 16), tmp_path / "a.avi", 24.0)
     with pytest.raises(InputError, match="expected at least one frame"):
         write_video(iter([]), tmp_path / "a.mp4", 24.0)

@@ -101,7 +101,7 @@ def test_focal_length_carries_over_a_joint() -> None:
 
 
 def test_a_full_orbit_closes() -> None:
-    pose = _path("orbit", 25).cameras.world_from_camera
+    pose = _path("orbit:1", 25).cameras.world_from_camera
     torch.testing.assert_close(pose[-1], pose[0], atol=1e-14, rtol=0)
     assert float(pose[12, 2, 3]) == pytest.approx(10)
 

@@ -51,7 +51,7 @@ def test_numbers_agree_with_their_definitions(seed: int, count: int) -> None:
 
 
 def test_an_orbit_in_words() -> None:
-    found = summarize(_built("orbit", 361), near_depth=2.0)
+    found = summarize(_built("orbit:1", 361), near_depth=2.0)
     assert found.seconds == pytest.approx(18)
     assert found.travel == pytest.approx(2 * math.pi * 5, rel=1e-3)
     assert found.farthest == pytest.approx(10)

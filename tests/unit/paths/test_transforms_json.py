@@ -135,7 +135,7 @@ def _matrix(**entries: float) -> list[list[float]]:
         (_with(1, transform_matrix=[["1", 0, 0, 0]] * 4), "frame 1: .* got the text '1'"),
         (_with(1, transform_matrix=[[True, 0, 0, 0]] * 4), "expected a number, got True"),
         (_with(1, transform_matrix=[[None, 0, 0, 0]] * 4), "expected a number, got None"),
-        (_with(1, transform_matrix=[[10**400, 0, 0, 0]] * 4), "expected a number, got 1000"),
+        (_with(1, transform_matrix=[[10**400, 0, 0, 0]] * 4), "expected a finite number, got inf"),
         (
             _with(1, transform_matrix=_matrix(r00=math.nan)),
             "frame 1: .* expected a finite number, got nan",
@@ -204,8 +204,8 @@ def test_what_is_wrong_is_named_with_its_frame(root: object, words: str) -> None
             '{"frames": [\n{"transform_matrix": }]}',
             "t.json: line 2: expected JSON, but Expecting value",
         ),
-        ("[" * 100_000, "expected plain JSON, got absurd numbers or nesting"),
-        ('{"w": ' + "9" * 10_000 + "}", "expected plain JSON, got absurd numbers or nesting"),
+        ("[" * 100_000, "t.json: expected JSON of at most 64 levels"),
+        ('{"w": ' + "9" * 10_000 + "}", "expected a list under 'frames'"),
     ],
 )
 def test_what_is_no_json_is_refused(text: str, words: str) -> None:

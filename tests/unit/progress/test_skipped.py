@@ -7,12 +7,18 @@ from diff4splat.errors import ConfigError
 from diff4splat.progress.skipped import SkippedWork, SkippedWorkList
 
 TEXT = SkippedWork(what="text encoder", why="no prompt given", saved="12,345 parameters")
-MOTION = SkippedWork(what="deformation", why="nothing moves", saved="49 evaluations", error=2.5e-4)
+MOTION = SkippedWork(
+    what="deformation",
+    why="nothing moves",
+    saved="49 evaluations",
+    error=2.5e-4,
+    error_unit="px",
+)
 
 
 def test_reads_as_one_line() -> None:
     assert str(TEXT) == "text encoder: no prompt given; saved 12,345 parameters; error 0"
-    assert str(MOTION) == "deformation: nothing moves; saved 49 evaluations; error 0.00025"
+    assert str(MOTION) == "deformation: nothing moves; saved 49 evaluations; error 0.00025 px"
 
 
 def test_keeps_the_order_and_counts_repeats_once() -> None:
@@ -32,6 +38,7 @@ def test_survives_json() -> None:
             "why": "nothing moves",
             "saved": "49 evaluations",
             "error": 2.5e-4,
+            "error_unit": "px",
         }
     ]
     assert SkippedWorkList().to_json() == []
@@ -46,6 +53,11 @@ def test_collections_are_independent() -> None:
 def test_refuses_an_error_that_is_none(error: float) -> None:
     with pytest.raises(ConfigError, match="error: expected 0 or above"):
         SkippedWork(what="a", why="b", saved="c", error=error)
+
+
+def test_refuses_an_error_without_a_unit() -> None:
+    with pytest.raises(ConfigError, match="error_unit: expected a unit of 20"):
+        SkippedWork(what="a", why="b", saved="c", error=20.0)
 
 
 @pytest.mark.parametrize("field", ["what", "why", "saved"])

@@ -28,7 +28,7 @@ from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import motion_preview
 from diff4splat.training.stages.text_conditioning import TextConditioning
-from diff4splat.training.stages.video_flow import EVAL_LEVELS
+from diff4splat.training.stages.video_flow import EVAL_LEVELS, EVAL_NOISE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +96,7 @@ class MotionDiffusionStage(ModelStage):
         no motion; NaN where nothing moves.
         """
         level = batch.field.new_ones(len(batch))
-        noisy = [self._noisy(batch, fixed * level, "judged") for fixed in EVAL_LEVELS]
+        noisy = [self._noisy(batch, fixed * level, EVAL_NOISE) for fixed in EVAL_LEVELS]
         errors = [one.error(self._clean(batch, one)) for one in noisy]
         clean, predicted = batch.field[:, :, 1:], self._from_noise(batch)
         static = clean.square().flatten(1).mean(1)
@@ -126,7 +126,7 @@ class MotionDiffusionStage(ModelStage):
 
     def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
         """Clean motion in one step from noise."""
-        return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), "judged"))
+        return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), EVAL_NOISE))
 
 
 def _mask_error(

@@ -1,4 +1,4 @@
-"""CheckpointStore on disk: how folders are named, described, found and judged.
+"""CheckpointStore on disk: how folders are named, described, found and checked.
 
     checkpoints/latest                       the name of the newest one; replaced last
     checkpoints/window-000-step-00000500/    state.json and shard-*.safetensors
@@ -19,13 +19,15 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat.errors import FileFormatError
+from diff4splat.io.require_file import is_file, read_text, require_file
+from diff4splat.paths.formats.json_text import decode_object
 from diff4splat.training.recipe.legacy import upgraded_stage
 from diff4splat.training.trainer.distributed.processes import Processes
 from diff4splat.training.trainer.loop.progress import Progress
 
 STATE_FILE, LATEST_FILE = "state.json", "latest"
 FORMAT, VERSION = "diff4splat-training", 2
-_NAME = re.compile(r"window-(\d{3,})-step-(\d{8,})")
+_NAME = re.compile(r"window-([0-9]{3,9})-step-([0-9]{8,18})")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +44,7 @@ class Checkpoint:
     @property
     def finished(self) -> bool:
         """Whether the stage was over."""
-        return self.progress.step >= self.recipe.get("steps", 0)
+        return self.progress.step >= self.recipe["steps"]
 
 
 def checkpoint_name(progress: Progress) -> str:
@@ -62,9 +64,16 @@ def candidates(folder: Path) -> list[str]:
         return []
     present = [path.name for path in folder.iterdir() if _NAME.fullmatch(path.name)]
     present.sort(key=order, reverse=True)
-    pointer = folder / LATEST_FILE
-    latest = pointer.read_text(encoding="utf-8").strip() if pointer.is_file() else ""
+    latest = _pointer(folder / LATEST_FILE)
     return [name for name in present if name == latest] + [n for n in present if n != latest]
+
+
+def _pointer(file: Path) -> str:
+    """What ``latest`` says; a damaged one says nothing, and the newest checkpoint is tried."""
+    try:
+        return read_text(file, "the name of a checkpoint").strip() if is_file(file) else ""
+    except FileFormatError:
+        return ""
 
 
 def digests(folder: Path, processes: Processes) -> dict[str, str]:
@@ -99,6 +108,8 @@ def read_checkpoint(folder: Path, processes: Processes) -> Checkpoint:
     except FileFormatError as error:
         raise FileFormatError(f"{folder / STATE_FILE}, {error}") from error
     recipe = description["recipe"]
+    if type(recipe.get("steps")) is not int:
+        raise FileFormatError(f"{folder / STATE_FILE}: expected a recipe with steps, got none")
     return Checkpoint(
         folder=folder,
         stage=description["stage"],
@@ -111,23 +122,24 @@ def read_checkpoint(folder: Path, processes: Processes) -> Checkpoint:
 def _read_state(folder: Path) -> dict[str, Any]:
     file = folder / STATE_FILE
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        found = decode_object(read_text(file, "the state of a training run"))
+        version = found.get("version")
+        usable = found.get("format") == FORMAT and type(version) is int
         wanted = {"stage": str, "fingerprint": str, "recipe": dict, "progress": dict, "files": dict}
-        usable = found["format"] == FORMAT and all(
-            isinstance(found[key], kind) for key, kind in wanted.items()
-        )
-        version = int(found["version"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        wrong = [key for key, kind in wanted.items() if not isinstance(found.get(key), kind)]
+    except FileFormatError as error:
         raise FileFormatError(
-            f"{file}: expected the state of a training run, got none or a damaged one"
+            f"{file}: expected the state of a training run, got none or a damaged one ({error})"
         ) from error
-    if not usable or version > VERSION:
+    if not usable or wrong or not 1 <= version <= VERSION:
         raise FileFormatError(
-            f"{file}: expected {FORMAT} up to version {VERSION}, got {found['format']} {version}"
+            f"{file}: expected {FORMAT} up to version {VERSION}, got "
+            f"{str(found.get('format'))[:60]} {str(version)[:20]} without {', '.join(wrong) or '-'}"
         )
     return found
 
 
 def _sha256(file: Path) -> str:
+    require_file(file, "tensors of a checkpoint")
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

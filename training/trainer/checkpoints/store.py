@@ -161,7 +161,7 @@ def _make_empty(folder: Path) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Out of sight first: a half removed checkpoint must not look like a damaged one."""
+    """Renamed first: a half removed checkpoint must not look like a damaged one."""
     hidden = folder.with_name(f".partial-removed-{folder.name}")
     shutil.rmtree(hidden, ignore_errors=True)
     os.replace(folder, hidden)

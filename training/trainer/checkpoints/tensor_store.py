@@ -5,6 +5,7 @@ metadata as pickle, which runs code of whoever wrote the file; with this one, lo
 from somebody else is as harmless as loading weights.
 """
 
+import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,12 +13,12 @@ from pathlib import Path
 
 import torch
 import torch.distributed.checkpoint as dcp
-from safetensors import SafetensorError
 from torch import Tensor
 from torch.distributed.checkpoint.api import CheckpointException
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.atomic import output_error
+from diff4splat.io.require_file import require_file
 from diff4splat.training.trainer.loop.optim import local
 
 MOST_BYTES = 1 << 30
@@ -56,7 +57,7 @@ def read_tensors(folder: Path, tensors: Mapping[str, Tensor]) -> None:
     try:
         with _alone_is_fine():
             dcp.load(dict(tensors), storage_reader=reader)
-    except CheckpointException as error:
+    except (Exception, CheckpointException) as error:  # damage makes it raise almost anything
         raise FileFormatError(f"{folder}: expected whole shards, got damaged ones") from error
 
 
@@ -66,11 +67,18 @@ def stored_shapes(folder: Path) -> dict[str, tuple[int, ...]]:
     Raises:
         FileFormatError: a file is damaged.
     """
+    files = sorted(folder.glob("*.safetensors"))
+    for file in files:
+        require_file(file, "tensors of a checkpoint")
     try:
         metadata = dcp.HuggingFaceStorageReader(str(folder)).read_metadata()
-    except (SafetensorError, OSError, ValueError, KeyError) as error:
+        shapes = {name: tuple(item.size) for name, item in metadata.state_dict_metadata.items()}
+    except Exception as error:  # damaged headers make it raise almost anything
         raise FileFormatError(f"{folder}: expected whole shards, got damaged ones") from error
-    return {name: tuple(item.size) for name, item in metadata.state_dict_metadata.items()}
+    # Headers may speak of tensors that nobody stored, for which no memory should be taken.
+    if sum(math.prod(shape) for shape in shapes.values()) > sum(f.stat().st_size for f in files):
+        raise FileFormatError(f"{folder}: expected shards of whole tensors, got parts of them")
+    return shapes
 
 
 def _storable(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -12,7 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from diff4splat.errors import OutputError
 from diff4splat.io.atomic import output_error
+from diff4splat.io.require_file import require_writable
 
 LOG_FILE = "log.jsonl"
 RESULT_FILE = "result.json"
@@ -29,6 +31,8 @@ class EventLog:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._end_last_line()
+        except OutputError:
+            raise
         except OSError as error:
             raise output_error(self._file, error) from error
 
@@ -47,6 +51,7 @@ class EventLog:
 
     def _end_last_line(self) -> None:
         """A killed run may have left half a row, which must not swallow the next one."""
+        require_writable(self._file)
         if self._file.is_file() and self._file.read_bytes()[-1:] not in (b"", b"\n"):
             with self._file.open("a", encoding="utf-8") as file:
                 file.write("\n")

@@ -22,7 +22,7 @@ class TensorboardLogger:
             self._writer = SummaryWriter(str(folder))
         except ImportError:
             note("tensorboard is not installed: the numbers are in log.jsonl alone")
-        except OSError as error:
+        except (OSError, RuntimeError) as error:  # the latter where no thread can be started
             self._give_up(error)
 
     def scalars(self, step: int, values: Mapping[str, float | None]) -> None:
@@ -43,10 +43,10 @@ class TensorboardLogger:
         if self._writer is not None:
             try:
                 getattr(self._writer, method)(*values, **options)
-            except OSError as error:
+            except (OSError, RuntimeError) as error:
                 self._give_up(error)
 
-    def _give_up(self, error: OSError) -> None:
+    def _give_up(self, error: OSError | RuntimeError) -> None:
         self._writer = None
-        reason = error.strerror or str(error)
+        reason = getattr(error, "strerror", None) or str(error)
         self._note(f"tensorboard: no more curves ({reason}); the numbers are in log.jsonl")

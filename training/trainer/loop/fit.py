@@ -1,13 +1,16 @@
 """``fit_stage``: train one stage, from wherever its folder left off, until something says stop."""
 
 import math
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
+from pathlib import Path
 
+from diff4splat.io.locks import sole_writer
 from diff4splat.progress.phases import Phases
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import Stage
-from diff4splat.training.trainer.distributed.processes import open_processes
+from diff4splat.training.trainer.distributed.processes import Processes, open_processes
 from diff4splat.training.trainer.gates import StoredResult, write_result
 from diff4splat.training.trainer.loading.samples import Samples
 from diff4splat.training.trainer.loop.loop import finish_step, must_roll_back, take_step
@@ -27,16 +30,26 @@ def fit_stage(stage: Stage, samples: Samples, recipe: StageRecipe, run: RunSetti
         CheckpointError: the folder belongs to another stage or configuration.
         DivergenceError: the stage does not learn any more.
         InputError: the source of samples is broken.
-        OutputError: nothing can be written; the checkpoints so far stay.
+        OutputError: nothing can be written, or another run trains in the folder; the checkpoints
+            so far stay.
     """
     with (
         open_processes(run.trainer.parallel, run.device, run.timeout_s) as processes,
+        _sole_run(run.folder, processes),
         stop_request(run) as stop,
     ):
         training = assemble(stage, samples, recipe, run, processes)
         processes.first_does(run.begin)
         with closing(training.logger):
             return _conclude(training, _train(training, stop))
+
+
+@contextmanager
+def _sole_run(folder: Path, processes: Processes) -> Iterator[None]:
+    """The processes of one run share the folder; other runs may not."""
+    with ExitStack() as stack:
+        processes.first_does(lambda: stack.enter_context(sole_writer(folder)))
+        yield
 
 
 def _train(training: TrainingState, stop: StopRequest) -> Outcome:

@@ -1,4 +1,4 @@
-"""Where a run stands: everything beside tensors that makes it go on as if it had never stopped.
+"""The state of a run: everything beside tensors that makes it go on as if it had never stopped.
 
 Kept as ``state.json`` inside every checkpoint. Floats survive JSON exactly.
 """

@@ -9,12 +9,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from diff4splat.progress.interrupts import STOP_SIGNALS
 from diff4splat.training.trainer.settings import Outcome, RunSettings
-
-# Windows has no hang-up.
-_SIGNALS = tuple(
-    getattr(signal, name) for name in ("SIGTERM", "SIGINT", "SIGHUP") if hasattr(signal, name)
-)
 
 
 class StopRequest:
@@ -48,7 +44,7 @@ def stop_request(run: RunSettings) -> Iterator[StopRequest]:
     if threading.current_thread() is not threading.main_thread():
         yield request
         return
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
 
     def restore() -> None:
         for number, handler in before.items():
@@ -59,8 +55,10 @@ def stop_request(run: RunSettings) -> Iterator[StopRequest]:
         request.signalled()
         restore()  # the next one does what it would have done without us
 
-    for number in _SIGNALS:
-        signal.signal(number, on_signal)
+    for number in STOP_SIGNALS:
+        # `nohup` and background jobs ignore some.
+        if before[number] is not signal.SIG_IGN:
+            signal.signal(number, on_signal)
     try:
         yield request
     finally:

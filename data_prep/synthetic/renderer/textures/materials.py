@@ -45,28 +45,36 @@ def materials_of(buffer: TriangleBuffer) -> Materials:
     Raises:
         ConfigError: a family is unknown, or there are no two to four colours.
     """
-    looks = [thing.texture for thing in buffer.objects]
-    for look in looks:
-        if look.family not in FAMILIES:
-            raise ConfigError(f"texture: expected one of {', '.join(FAMILIES)}, got {look.family}")
-        if not 2 <= len(look.colors) <= 4:
-            raise ConfigError(f"{look.family}: expected 2 to 4 colours, got {len(look.colors)}")
+    textures = [item.texture for item in buffer.objects]
+    for texture in textures:
+        if texture.family not in FAMILIES:
+            raise ConfigError(
+                f"texture: expected one of {', '.join(FAMILIES)}, got {texture.family}"
+            )
+        if not 2 <= len(texture.colors) <= 4:
+            raise ConfigError(
+                f"{texture.family}: expected 2 to 4 colours, got {len(texture.colors)}"
+            )
     return Materials(
-        np.array([FAMILIES.index(look.family) for look in looks], np.int64),
-        np.array([_three(look) for look in looks], np.float64).reshape(-1, 3, 3),
-        np.array([look.scale for look in looks], np.float64),
-        np.array([look.seed for look in looks], np.int64),
-        np.array([look.solid for look in looks], np.bool_),
-        np.array([look.relief for look in looks], np.float64),
-        np.array([look.gloss for look in looks], np.float64),
-        np.array([thing.mesh.smooth for thing in buffer.objects], np.bool_),
+        np.array([FAMILIES.index(texture.family) for texture in textures], np.int64),
+        np.array([_three(texture) for texture in textures], np.float64).reshape(-1, 3, 3),
+        np.array([texture.scale for texture in textures], np.float64),
+        np.array([texture.seed for texture in textures], np.int64),
+        np.array([texture.solid for texture in textures], np.bool_),
+        np.array([texture.relief for texture in textures], np.float64),
+        np.array([texture.gloss for texture in textures], np.float64),
+        np.array([item.mesh.smooth for item in buffer.objects], np.bool_),
     )
 
 
-def _three(look: Texture) -> np.ndarray:
+def _three(texture: Texture) -> np.ndarray:
     """First, second and third colour; the third is a dark mixture where it is not given."""
-    third = look.colors[2] if len(look.colors) > 2 else (look.colors[0] + look.colors[1]) * 0.3
-    return np.stack([look.colors[0], look.colors[1], third])
+    third = (
+        texture.colors[2]
+        if len(texture.colors) > 2
+        else (texture.colors[0] + texture.colors[1]) * 0.3
+    )
+    return np.stack([texture.colors[0], texture.colors[1], third])
 
 
 @shared

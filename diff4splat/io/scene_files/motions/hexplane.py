@@ -9,7 +9,12 @@ from typing import Any
 from torch import Tensor
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.scene_files.motions.stored import MotionCodec, StoredMotion, take_time_range
+from diff4splat.io.scene_files.motions.stored import (
+    MotionCodec,
+    StoredMotion,
+    require_one_dtype,
+    take_time_range,
+)
 from diff4splat.io.scene_files.tensor_checks import take_floats, take_index, take_value
 from diff4splat.scene.motion.hexplane.decoder import HEAD_NAMES, Layer, MotionDecoder
 from diff4splat.scene.motion.hexplane.motion import HexPlaneMotion
@@ -49,7 +54,7 @@ def _unpack(stored: StoredMotion, count: int) -> HexPlaneMotion:
         moving_index=take_index(tensors, "moving_index", count),
         rotation=_take_choice(settings, "rotation", ("product", "additive")),
     )
-    _require_one_dtype({**motion.tensors(), "bounds": planes.bounds, "means": tensors.get("means")})
+    require_one_dtype({**motion.tensors(), "bounds": planes.bounds, "means": tensors.get("means")})
     _require_harmonics(motion, tensors.get("sh"))
     return motion
 
@@ -98,23 +103,15 @@ def _take_choice(settings: Mapping[str, Any], key: str, choices: tuple[str, ...]
     return choice
 
 
-def _require_one_dtype(tensors: Mapping[str, Tensor | None]) -> None:
-    kinds = {str(tensor.dtype)[6:] for tensor in tensors.values() if tensor is not None}
-    if len(kinds) != 1:
-        raise FileFormatError(
-            f"motion: expected the dtype of means, got {', '.join(sorted(kinds))}"
-        )
-
-
 def _require_harmonics(motion: HexPlaneMotion, sh: Tensor | None) -> None:
     head = motion.decoder.heads.get("color")
     if head is None or sh is None or sh.ndim != 3:
         return
-    told = len(head[1].bias)
-    if told > 3 * sh.shape[1] or told % 3:
+    channels = len(head[1].bias)
+    if channels > 3 * sh.shape[1] or channels % 3:
         raise FileFormatError(
             f"{_PREFIX}color.1.bias: expected at most {3 * sh.shape[1]} outputs for sh, three per "
-            f"harmonic, got {told}"
+            f"harmonic, got {channels}"
         )
 
 

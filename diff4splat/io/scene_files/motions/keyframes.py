@@ -1,7 +1,7 @@
 """Key frames as tensors. Axes: ``t`` key times, ``m`` moving Gaussians."""
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.scene_files.motions.stored import MotionCodec, StoredMotion
+from diff4splat.io.scene_files.motions.stored import MotionCodec, StoredMotion, require_one_dtype
 from diff4splat.io.scene_files.tensor_checks import take_floats, take_index, take_value
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 
@@ -26,13 +26,14 @@ def _unpack(stored: StoredMotion, count: int) -> KeyframeMotion:
     times = take_floats(stored.tensors, "key_times_s", (None,))
     index = take_index(stored.tensors, "moving_index", count)
     lead = (len(times), len(index))
+    values = {
+        "offsets": take_floats(stored.tensors, "offsets", (*lead, 3)),
+        "rotations": take_floats(stored.tensors, "rotations", (*lead, 4)),
+        "log_scale_offsets": take_floats(stored.tensors, "log_scale_offsets", (*lead, 3)),
+    }
+    require_one_dtype({**values, "means": stored.tensors.get("means")})
     return KeyframeMotion(
-        key_times_s=times,
-        moving_index=index,
-        offsets=take_floats(stored.tensors, "offsets", (*lead, 3)),
-        rotations=take_floats(stored.tensors, "rotations", (*lead, 4)),
-        log_scale_offsets=take_floats(stored.tensors, "log_scale_offsets", (*lead, 3)),
-        interpolation=interpolation,
+        key_times_s=times, moving_index=index, interpolation=interpolation, **values
     )
 
 

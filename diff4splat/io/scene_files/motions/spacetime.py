@@ -7,7 +7,12 @@ from typing import Any
 from torch import Tensor
 
 from diff4splat.errors import FileFormatError
-from diff4splat.io.scene_files.motions.stored import MotionCodec, StoredMotion, take_time_range
+from diff4splat.io.scene_files.motions.stored import (
+    MotionCodec,
+    StoredMotion,
+    require_one_dtype,
+    take_time_range,
+)
 from diff4splat.io.scene_files.tensor_checks import take_floats, take_index
 from diff4splat.scene.motion.spacetime import SpacetimeMotion
 
@@ -34,7 +39,7 @@ def _unpack(stored: StoredMotion, count: int) -> SpacetimeMotion:
         "time_deviations_s": _take_deviations(tensors, len(index)),
         "color_waves": _take_waves(tensors, len(index)),
     }
-    _require_one_dtype({**parts, "means": tensors.get("means")})
+    require_one_dtype({**parts, "means": tensors.get("means")})
     return SpacetimeMotion(
         moving_index=index,
         time_range_s=take_time_range(stored.settings),
@@ -63,14 +68,6 @@ def _take_waves(tensors: Mapping[str, Tensor], count: int) -> Tensor | None:
     if waves.shape[1] not in (1, 2):
         raise FileFormatError(f"color_waves: expected 1 or 2 waves, got {waves.shape[1]}")
     return waves
-
-
-def _require_one_dtype(tensors: Mapping[str, Tensor | None]) -> None:
-    kinds = {str(tensor.dtype)[6:] for tensor in tensors.values() if tensor is not None}
-    if len(kinds) != 1:
-        raise FileFormatError(
-            f"motion: expected the dtype of means, got {', '.join(sorted(kinds))}"
-        )
 
 
 def _take_period(settings: Mapping[str, Any]) -> float:

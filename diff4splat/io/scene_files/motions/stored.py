@@ -43,3 +43,16 @@ def take_time_range(settings: Mapping[str, Any]) -> tuple[float, float]:
             f"metadata 'time_range_s': expected first ≤ last, got {first}, {last}"
         )
     return float(first), float(last)
+
+
+def require_one_dtype(tensors: Mapping[str, Tensor | None]) -> None:
+    """Require equal dtypes of all tensors that are there.
+
+    Raises:
+        FileFormatError: the dtypes differ.
+    """
+    kinds = {str(tensor.dtype)[6:] for tensor in tensors.values() if tensor is not None}
+    if len(kinds) != 1:
+        raise FileFormatError(
+            f"motion: expected the dtype of means, got {', '.join(sorted(kinds))}"
+        )

@@ -11,6 +11,8 @@ threads do. The exponent is e = log2 o - u² - v², and lanes collect ∂/∂ln 
 column of blocks before they are weighted with u, which is the same for all of them.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from diff4splat.kernels.jit import contracted
@@ -44,11 +46,37 @@ from diff4splat.render.raster.blending.blend import (
     start_column,
 )
 from diff4splat.render.raster.jit import kernel
-from diff4splat.render.raster.tables import MOMENTS, WHITEN_Y
+from diff4splat.render.raster.tables import MOMENTS, WHITEN_Y, Doubles, Floats, Grid
 
 _AHEAD = 8
 _LIGHT, _STOP, _BEHIND, _GRADIENT = range(4)
 """Planes of a tile's state; one gradient plane per channel from the last on."""
+
+
+class _Tile(NamedTuple):
+    """A tile, and what is kept of it while its list is worked through."""
+
+    grid: Grid
+    left: int
+    top: int
+    state: Floats
+    sums: Floats
+    """Gradients of the channels after the first three, by lane."""
+
+
+class _Pair(NamedTuple):
+    """A Gaussian in the list of a tile."""
+
+    index: int
+    rank: int
+    slot: int
+
+
+class _Splats(NamedTuple):
+    """All Gaussians: footprints and channels."""
+
+    prints: Doubles
+    values: Floats
 
 
 @kernel
@@ -59,19 +87,22 @@ def blend_backward(tiles, grid, lists, prints, values, rules, light, stops, grad
     """
     size, channels = plane_stride(grid), values.shape[1]
     state = aligned_floats((_GRADIENT + channels) * size)
-    sums = aligned_floats(channels * LANES)
+    sums, splats = aligned_floats(channels * LANES), _Splats(prints, values)
     for tile in tiles:
         first, last = lists.starts[tile], lists.starts[tile + 1]
         if first == last:
             continue
         seen = _begin(state, tile, grid, light, stops, grads)
+        left, top = corner(tile, grid)
+        area = _Tile(grid, left, top, state, sums)
         for position in range(last - 1, first - 1, -1):
             ahead = lists.members[max(position - _AHEAD, first)]
             prefetch(prints, ahead)
             prefetch(values, ahead)
-            index, slot, rank = lists.members[position], lists.slots[position], position - first
+            slot, rank = lists.slots[position], position - first
             if rank < seen:
-                _subtract(state, sums, tile, grid, prints, values, index, rules, rank, slots, slot)
+                pair = _Pair(lists.members[position], rank, slot)
+                _subtract(area, pair, splats, rules, slots)
             else:
                 for column in range(slots.shape[1]):
                     slots[slot, column] = 0
@@ -106,46 +137,35 @@ def _begin(state, tile, grid, light, stops, grads):
 
 
 @contracted
-def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, slot):
+def _subtract(tile, pair, splats, rules, slots):
     """Take one Gaussian out of the blocks its box touches, and write its gradient."""
-    left, top = corner(tile, grid)
-    x0, y0, x1, y1 = blocks_in_tile(prints, i, left, top, grid)
-    red, green, blue = fill(values[i, 0]), fill(values[i, 1]), fill(values[i, 2])
+    grid, state, i, prints = tile.grid, tile.state, pair.index, splats.prints
+    x0, y0, x1, y1 = blocks_in_tile(prints, i, tile.left, tile.top, grid)
+    color = _first_channels(splats.values, i)
     size = plane_stride(grid)
-    step = fill(2 * prints[i, WHITEN_Y])
-    none = fill(0.0)
+    step, none = fill(2 * prints[i, WHITEN_Y]), fill(0.0)
     e, eu, euu, ev, euv, evv = none, none, none, none, none, none
     to_red, to_green, to_blue = none, none, none
-    for channel in range(FIXED, values.shape[1]):
-        store(sums, channel * LANES, none)
+    _clear_sums(tile.sums, splats.values)
     for column in range(x0, x1 + 1):
-        exponent_at_v0, u, v = start_column(prints, i, left, top, column, y0)
+        exponent_at_v0, u, v = start_column(prints, i, tile.left, tile.top, column, y0)
         moment0, moment1, moment2 = none, none, none
         for block_row in range(y0, y1 + 1):
             place = (column * (grid.edge >> ROW_SHIFT) + block_row) * LANES
-            looked = load(state, _STOP * size + place) > np.float32(rank)
+            looked = load(state, _STOP * size + place) > np.float32(pair.rank)
             if any_of(looked):
                 exponent = less_product(exponent_at_v0, v, v)
-                on = (exponent >= rules.log2_cutoff) & looked
-                response = exp2(exponent)
-                free = on & (response <= rules.alpha_max)
-                alpha = select(on, minimum(response, rules.alpha_max), 0.0)
+                alpha, free = _opacity(exponent, looked, rules)
                 inverse = fill(1.0) / (fill(1.0) - alpha)
                 light = load(state, _LIGHT * size + place) * inverse
                 behind = load(state, _BEHIND * size + place)
                 weight = alpha * light
-                at = _GRADIENT * size + place
-                g_red, g_green = load(state, at), load(state, at + size)
-                g_blue = load(state, at + 2 * size)
-                worth = fma(red, g_red, fma(green, g_green, blue * g_blue))
-                for channel in range(FIXED, values.shape[1]):
-                    gradient = load(state, (_GRADIENT + channel) * size + place)
-                    worth = fma(gradient, values[i, channel], worth)
-                    at = channel * LANES
-                    store(sums, at, fma(weight, gradient, load(sums, at)))
-                to_red = fma(weight, g_red, to_red)
-                to_green = fma(weight, g_green, to_green)
-                to_blue = fma(weight, g_blue, to_blue)
+                red, green, blue = _first_gradients(state, place, size)
+                worth = fma(color[0], red, fma(color[1], green, color[2] * blue))
+                worth = _other_channels(tile, place, splats.values, i, weight, worth)
+                to_red = fma(weight, red, to_red)
+                to_green = fma(weight, green, to_green)
+                to_blue = fma(weight, blue, to_blue)
                 to_alpha = less_product(light * worth, behind, inverse)
                 store(state, _LIGHT * size + place, light)
                 store(state, _BEHIND * size + place, fma(weight, worth, behind))
@@ -156,9 +176,53 @@ def _subtract(state, sums, tile, grid, prints, values, i, rules, rank, slots, sl
             v = v + step
         e, ev, evv = e + moment0, ev + moment1, evv + moment2
         eu, euu, euv = fma(moment0, u, eu), fma(moment0 * u, u, euu), fma(moment1, u, euv)
-    moments = totals(e, eu, euu, ev, euv, evv, to_red, to_green)
-    store_eight(slots, slot * slots.shape[1], moments)
-    slots[slot, MOMENTS + 2] = total(to_blue)
+    store_eight(
+        slots, pair.slot * slots.shape[1], totals(e, eu, euu, ev, euv, evv, to_red, to_green)
+    )
+    slots[pair.slot, MOMENTS + 2] = total(to_blue)
+    _write_sums(tile.sums, splats.values, slots, pair.slot)
+
+
+@contracted
+def _first_channels(values, i):
+    return fill(values[i, 0]), fill(values[i, 1]), fill(values[i, 2])
+
+
+@contracted
+def _first_gradients(state, place, size):
+    at = _GRADIENT * size + place
+    return load(state, at), load(state, at + size), load(state, at + 2 * size)
+
+
+@contracted
+def _opacity(exponent, looked, rules):
+    """Opacity per lane, 0 below the cutoff; and where it is below its bound, and so has a slope."""
+    on = (exponent >= rules.log2_cutoff) & looked
+    response = exp2(exponent)
+    free = on & (response <= rules.alpha_max)
+    return select(on, minimum(response, rules.alpha_max), 0.0), free
+
+
+@contracted
+def _clear_sums(sums, values):
+    for channel in range(FIXED, values.shape[1]):
+        store(sums, channel * LANES, fill(0.0))
+
+
+@contracted
+def _other_channels(tile, place, values, i, weight, worth):
+    """Add the channels after the first three to ``worth``, and their gradients to the sums."""
+    size = plane_stride(tile.grid)
+    for channel in range(FIXED, values.shape[1]):
+        gradient = load(tile.state, (_GRADIENT + channel) * size + place)
+        worth = fma(gradient, values[i, channel], worth)
+        at = channel * LANES
+        store(tile.sums, at, fma(weight, gradient, load(tile.sums, at)))
+    return worth
+
+
+@contracted
+def _write_sums(sums, values, slots, slot):
     for channel in range(FIXED, values.shape[1]):
         slots[slot, MOMENTS + channel] = total(load(sums, channel * LANES))
 

@@ -14,7 +14,6 @@ _DIGIT_BITS = 11
 _BUCKETS = 1 << _DIGIT_BITS
 _INDEX_BITS = np.uint64(32)
 _INDEX_MASK = np.uint64((1 << 32) - 1)
-_ONE = np.uint64(1)
 _DIGIT_MASK = np.uint64(_BUCKETS - 1)
 
 

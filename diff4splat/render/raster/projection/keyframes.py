@@ -82,10 +82,10 @@ def _add_hermite(weights: Doubles, times: Doubles, lower: int, w: float) -> None
 
 
 @kernel
-def project_keyframed(
-    first, last, keys, moment, cloud, sh, view, rules, means, prints, depth, visible, unusable
-):
+def project_keyframed(first, last, keys, moment, means, inputs, outputs):
     """As ``project``, for moving Gaussians; writes their moved ``means``."""
+    cloud, sh, view, rules = inputs
+    prints, depth, visible, unusable = outputs
     count = 0
     for place in range(first, last):
         i = keys.moving[place]

@@ -13,7 +13,15 @@ from diff4splat.render.raster.forward import list_visible
 from diff4splat.render.raster.projection.keyframes import keys_of, moment_at, project_keyframed
 from diff4splat.render.raster.projection.project import project
 from diff4splat.render.raster.raster_settings import RasterSettings
-from diff4splat.render.raster.tables import Cloud, Doubles, Floats, Integers, View
+from diff4splat.render.raster.tables import (
+    Cloud,
+    Doubles,
+    Floats,
+    Integers,
+    ProjectionInputs,
+    ProjectionOutputs,
+    View,
+)
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.scene import Scene
@@ -54,20 +62,19 @@ class Moving:
         numbers = self.sh.reshape(len(self.sh), self.sh.shape[1] * 3)
         if self._keys is not None:
             moment = moment_at(self._scene.motion, time_s)
+            inputs = ProjectionInputs(self._canonical, numbers, view, plan.rules)
 
             def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
-                return project_keyframed(
-                    first, last, self._keys, moment, self._canonical, numbers, view, plan.rules,
-                    self.cloud.means, prints, depth, visible, faults,
-                )  # fmt: skip
+                outputs = ProjectionOutputs(prints, depth, visible, faults)
+                means = self.cloud.means
+                return project_keyframed(first, last, self._keys, moment, means, inputs, outputs)
         else:
             self._copy_state(self._scene.state_at(time_s))
+            inputs = ProjectionInputs(self.cloud, numbers, view, plan.rules)
 
             def work(first: int, last: int, visible: Integers, faults: NDArray[np.int64]) -> int:
-                return project(
-                    first, last, self.index, self.cloud, numbers, view, plan.rules, prints, depth,
-                    visible, faults,
-                )  # fmt: skip
+                outputs = ProjectionOutputs(prints, depth, visible, faults)
+                return project(first, last, self.index, inputs, outputs)
 
         return list_visible(len(self.index), work, unusable)
 

@@ -43,12 +43,13 @@ MEANS, QUATS, SCALES, OPACITIES, SH = range(5)
 
 
 @kernel
-def project(first, last, candidates, cloud, sh, view, rules, prints, depth, visible, unusable):
-    """Fill ``prints`` and ``depth`` of the visible ``candidates``.
+def project(first, last, candidates, inputs, outputs):
+    """Fill the footprint and depth of the visible ``candidates``; returns how many there are.
 
-    They are listed in ``visible`` from ``first`` on. ``unusable`` counts Gaussians by their first
-    unusable parameter. Returns how many are listed.
+    They are listed in ``outputs.visible`` from ``first`` on.
     """
+    cloud, sh, view, rules = inputs
+    prints, depth, visible, unusable = outputs
     count = 0
     for place in range(first, last):
         i = candidates[place]

@@ -44,7 +44,7 @@ class Layer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecoderSize:
-    """How large the network is and what it tells."""
+    """How large the network is and what it predicts."""
 
     width: int = 64
     depth: int = 1
@@ -91,7 +91,7 @@ class MotionDecoder:
 
     def residuals(self, features: Float[Tensor, "*b f"]) -> dict[str, Tensor]:
         """What each head adds, ``*b k``."""
-        # Rows, because changing a view in place would copy it on the way back.
+        # Rows, because changing a view in place would copy it on the backward pass.
         values = self.trunk[0](features.flatten(0, -2))
         for layer in self.trunk[1:]:
             values = layer(relu_(values))
@@ -101,8 +101,8 @@ class MotionDecoder:
         first, last = zip(*self.heads.values(), strict=True)
         hidden = relu_(_stacked(first, torch.cat)(relu_(values)))
         sizes = [layer.bias.shape[0] for layer in last]
-        told = _stacked(last, lambda weights: torch.block_diag(*weights))(hidden)
-        parts = told.unflatten(0, features.shape[:-1]).split(sizes, -1)
+        predicted = _stacked(last, lambda weights: torch.block_diag(*weights))(hidden)
+        parts = predicted.unflatten(0, features.shape[:-1]).split(sizes, -1)
         return dict(zip(self.heads, parts, strict=True))
 
     def to(self, target: torch.device | torch.dtype) -> "MotionDecoder":
@@ -119,7 +119,7 @@ def make_decoder(
 ) -> MotionDecoder:
     """A float32 network at its start: Xavier-uniform weights, and last layers of zero.
 
-    ``zero_heads=False`` draws the last layers too, as 4DGaussians does: then nothing stands still.
+    ``zero_heads=False`` draws the last layers too, as 4DGaussians does: then nothing is static.
     """
     inputs = [features] + [size.width] * (size.depth - 1)
     trunk = tuple(_draw(count, size.width, generator) for count in inputs)

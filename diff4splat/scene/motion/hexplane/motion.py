@@ -18,6 +18,7 @@ from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.hexplane import residuals
 from diff4splat.scene.motion.hexplane.decoder import Layer, MotionDecoder
 from diff4splat.scene.motion.hexplane.planes import PLANE_NAMES, HexPlanes
+from diff4splat.scene.motion.times import require_time_s
 
 _CHANGED_BY = {
     "means": "position",
@@ -31,7 +32,7 @@ _CHANGED_BY = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HexPlaneMotion:
-    """Deformation of the Gaussians at ``moving_index`` by a field; all others stand still."""
+    """Deformation of the Gaussians at ``moving_index`` by a field; all others are static."""
 
     planes: HexPlanes
     decoder: MotionDecoder
@@ -59,19 +60,24 @@ class HexPlaneMotion:
 
     def state_at(self, gaussians: Gaussians, time_s: float) -> Gaussians:
         """The Gaussians at ``time_s``; static ones are passed through untouched."""
+        require_time_s(time_s)
         return self.states_at(gaussians, (time_s,))[0]
 
     def states_at(self, gaussians: Gaussians, times_s: Sequence[float]) -> list[Gaussians]:
         """The Gaussians at several times, for less than one call per time."""
+        for time_s in times_s:
+            require_time_s(time_s)
         if len(self.moving_index) == 0:
             return [gaussians for _ in times_s]
         whole = len(self.moving_index) == len(gaussians)
         moving = gaussians if whole else gaussians.select(self.moving_index)
         features = self.planes.features_at_times(moving.means, times_s)
-        told = self.decoder.residuals(features)
-        at_times = [{name: values[k] for name, values in told.items()} for k in range(len(times_s))]
+        predicted = self.decoder.residuals(features)
+        at_times = [
+            {name: rows[k] for name, rows in predicted.items()} for k in range(len(times_s))
+        ]
         moved = [residuals.apply(moving, one, self.rotation) for one in at_times]
-        return [self._placed(gaussians, state, told) for state in moved]
+        return [self._placed(gaussians, state, predicted) for state in moved]
 
     def select(self, keep: Bool[Tensor, " n"]) -> "HexPlaneMotion":
         """Keep the moving Gaussians where ``keep`` is true, with indices into the smaller set."""
@@ -126,13 +132,13 @@ class HexPlaneMotion:
         return {"trunk": self.decoder.trunk, **self.decoder.heads}
 
     def _placed(
-        self, gaussians: Gaussians, moved: Gaussians, told: Mapping[str, Tensor]
+        self, gaussians: Gaussians, moved: Gaussians, predicted: Mapping[str, Tensor]
     ) -> Gaussians:
-        """``moved`` back among those that stand still."""
+        """``moved`` back among the static ones."""
         changed = {}
         for field in fields(gaussians):
             before, after = getattr(gaussians, field.name), getattr(moved, field.name)
-            if _CHANGED_BY[field.name] in told:
+            if _CHANGED_BY[field.name] in predicted:
                 whole = len(self.moving_index) == len(gaussians)
                 index = self.moving_index
                 changed[field.name] = after if whole else before.index_copy(0, index, after)

@@ -70,11 +70,11 @@ def shifted(opacities: Float[Tensor, " m"], logit: Float[Tensor, " m"]) -> Float
 
 
 def _as_harmonics(residual: Float[Tensor, "m o"], gaussians: Gaussians) -> Tensor:
-    """The lowest harmonics that the head tells; it may leave the higher ones as they are."""
-    told, want = residual.shape[1], 3 * gaussians.sh.shape[1]
-    if told > want or told % 3:
+    """The lowest harmonics that the head predicts; it may leave the higher ones as they are."""
+    channels, want = residual.shape[1], 3 * gaussians.sh.shape[1]
+    if channels > want or channels % 3:
         raise ShapeError(
             f"colour head: expected at most {want} outputs for harmonics of degree "
-            f"{gaussians.degree}, got {told}"
+            f"{gaussians.degree}, got {channels}"
         )
-    return torch.nn.functional.pad(residual, (0, want - told)).unflatten(1, (-1, 3))
+    return torch.nn.functional.pad(residual, (0, want - channels)).unflatten(1, (-1, 3))

@@ -94,7 +94,7 @@ def test_focal_lengths_are_above_0(capture: Capture, value: float) -> None:
 def test_one_place_is_enough_with_depth_alone() -> None:
     angles, times_s = [0, 0, 0], [0, 1, 2]
     require_valid_capture(small_capture(angles, times_s, [0, 0, 1], [0, 0, 0], depth=True))
-    with pytest.raises(InputError, match="got one standing camera and no depth; move the camera"):
+    with pytest.raises(InputError, match="got one static camera and no depth; move the camera"):
         require_valid_capture(small_capture(angles, times_s, [0, 0, 1], [0, 0, 0]))
 
 

@@ -3,12 +3,16 @@ import pytest
 
 from diff4splat.data_prep.synthetic.materials import ROLES
 from diff4splat.data_prep.synthetic.rng import Rng
-from diff4splat.data_prep.synthetic.shapes.facets import box, ear_clipped, extruded
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
-from diff4splat.data_prep.synthetic.shapes.revolve import ball, rod, superquadric
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
-from diff4splat.data_prep.synthetic.shapes.surface import Surface, signed_volume, vertex_normals
-from diff4splat.data_prep.synthetic.shapes.sweep import lump, torus, tube
+from diff4splat.data_prep.synthetic.shapes.surfaces.facets import box, ear_clipped, extruded
+from diff4splat.data_prep.synthetic.shapes.surfaces.revolve import ball, rod, superquadric
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import (
+    Surface,
+    signed_volume,
+    vertex_normals,
+)
+from diff4splat.data_prep.synthetic.shapes.surfaces.sweep import lump, torus, tube
 
 OPEN_ROLES = {"leaf", "grass", "petal", "needle"}
 """Leaves and blades are single polygons."""

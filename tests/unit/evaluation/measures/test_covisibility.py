@@ -12,13 +12,18 @@ from oracles_evaluation import FRAMES, SIZE, Fixed, filmed, tiny_protocol, wall_
 
 from diff4splat.evaluation.columns import SYSTEM
 from diff4splat.evaluation.measure_item import Setup, measure_item
-from diff4splat.evaluation.measures.covisibility import covisible_masks, static_instances
-from diff4splat.evaluation.measures.images import covisible_psnr
+from diff4splat.evaluation.measures.covisibility import (
+    covisible_masks,
+    hidden_masks,
+    static_instances,
+)
+from diff4splat.evaluation.measures.regions import ComparedImages, masked_psnr, region_entries
 from diff4splat.evaluation.protocols.protocol import Targets, Task
 from diff4splat.evaluation.protocols.sample import EvalSample, make_sample
 from diff4splat.evaluation.systems.baselines import BEST_PLANE, MEAN_PLANE, NEAREST, ZERO_MOTION
+from diff4splat.metrics.features.load import load_features
 
-KEYS = ("covisible_psnr", "covisible_share")
+KEYS = ("covisible_psnr", "covisible_share", "hidden_psnr")
 
 
 def made_case(task: Task, stride: int, **changes: object) -> EvalSample:
@@ -140,15 +145,15 @@ def test_errors_outside_the_mask_do_not_count() -> None:
     rgb[:, 4:] = math.nan
     seen = torch.zeros(1, 8, 8, dtype=torch.bool)
     seen[:, :4] = True
-    assert float(covisible_psnr(rgb, truth, seen)) == pytest.approx(20, abs=1e-4)
-    assert float(covisible_psnr(truth, truth, seen)) == 100
+    assert float(masked_psnr(rgb, truth, seen)) == pytest.approx(20, abs=1e-4)
+    assert float(masked_psnr(truth, truth, seen)) == 100
 
 
 def test_too_few_pixels_say_nothing() -> None:
     truth, seen = torch.zeros(2, 8, 8, 3), torch.zeros(2, 8, 8, dtype=torch.bool)
     seen[0].view(-1)[:15] = True
     seen[1].view(-1)[:16] = True
-    found = covisible_psnr(truth + 0.1, truth, seen)
+    found = masked_psnr(truth + 0.1, truth, seen)
     assert math.isnan(found[0])
     assert float(found[1]) == pytest.approx(20, abs=1e-4)
 
@@ -190,4 +195,30 @@ def test_clips_without_depth_are_counted() -> None:
     setup = Setup(protocol=tiny_protocol(), task="generation", system=Fixed(scene))
     result = measure_item(0, replace(clip, views=views), setup)
     why = {skip.key: skip.why for skip in result.skips if skip.row == SYSTEM}
-    assert [why[key] for key in KEYS] == ["the clip has no depth"] * 2
+    assert [why[key] for key in KEYS] == ["the clip has no depth"] * len(KEYS)
+
+
+def test_hidden_pixels_have_a_surface_that_the_input_does_not_show() -> None:
+    case = flat_case()
+    covisible = covisible_masks(case)
+    hidden = hidden_masks(case, covisible)
+    assert not (hidden & covisible).any()
+    depth = torch.stack([case.true_depth(pair) for pair in case.targets.pairs])
+    assert torch.equal(hidden | covisible, depth > 0)
+
+
+def test_errors_of_seen_pixels_leave_the_hidden_ones_alone() -> None:
+    truth = torch.rand(1, 16, 16, 3, generator=torch.Generator().manual_seed(0))
+    covisible = torch.zeros(1, 16, 16, dtype=torch.bool)
+    covisible[:, :8] = True
+    rgb = torch.where(covisible[..., None], 1 - truth, truth)
+    images = ComparedImages(rgb=rgb, truth=truth, covisible=covisible, hidden=~covisible)
+    features = load_features()
+    values = {one.key: one.value for one in region_entries("row", images, features)}
+    assert values["hidden_psnr"] == 100
+    assert values["hidden_perceptual"] == pytest.approx(0, abs=1e-6)
+    assert values["covisible_psnr"] < 20
+    swapped = replace(images, covisible=~covisible, hidden=covisible)
+    values = {one.key: one.value for one in region_entries("row", swapped, features)}
+    assert values["hidden_psnr"] < 20 < values["covisible_psnr"]
+    assert values["hidden_perceptual"] > 0.01

@@ -81,7 +81,7 @@ def test_where_the_image_is_shown_it_is_larger_than_what_networks_see(
 ) -> None:
     config = small_size()
     plan = image_plan(config, trained)
-    assert default_side_px(config, plan) == DEFAULT_SIDE_PX == 256
+    assert default_side_px(config, plan) == DEFAULT_SIDE_PX == 512
     assert factor((256, 256), trained) == 4
 
 
@@ -91,19 +91,30 @@ def test_sides_are_multiples_of_whole_tokens_of_the_smaller_copy(
     tmp_path: Path, fill: Fill | None, side_px: int, multiple_px: int
 ) -> None:
     folder = folder_of(tmp_path / "whole", small_size(), *PARTS)
-    assert find_image_size(folder, fill=fill) == (256, 64)
+    assert find_image_size(folder, fill=fill, photo_px=(256, 256)) == (256, 64)
     assert find_image_size(folder, side_px, fill) == (side_px, multiple_px)
     assert multiple_px == 16 * factor((side_px, side_px), fill=fill)
 
 
 def test_a_size_is_decided_without_weights(tmp_path: Path) -> None:
     assert find_image_size("test") == (32, 16)
-    assert find_image_size("test", fill="none") == (256, 128)
+    assert find_image_size("test", fill="none") == (512, 256)
     filling = replace(small_size(), default_fill="video")
     partly = folder_of(tmp_path / "partly", filling, "vae", "ldrm", "deformation")
-    assert find_image_size(partly) == (256, 64)
+    assert find_image_size(partly) == (512, 128)
     with pytest.raises(ConfigError, match="--fill video"):
         find_image_size(partly, fill="video")
+
+
+@pytest.mark.parametrize(
+    ("photo_px", "side_px"),
+    [(None, 512), ((3000, 4000), 512), ((400, 400), 400), ((100, 90), 256), ((300, 400), 346)],
+)
+def test_small_photographs_are_hardly_enlarged(
+    photo_px: tuple[int, int] | None, side_px: int
+) -> None:
+    config = small_size()
+    assert default_side_px(config, image_plan(config, PARTS), photo_px) == side_px
 
 
 def photo() -> InputImage:

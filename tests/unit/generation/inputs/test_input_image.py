@@ -90,3 +90,33 @@ def test_a_crop_is_announced_and_a_whole_image_is_not() -> None:
     notes = prepare_image(torch.rand(300, 451, 3), focal, 256, 64).notes
     assert len(notes) == 1 and notes[0].startswith("cropped by ") and "320×192" in notes[0]
     assert prepare_image(torch.rand(64, 64, 3), focal, 64, 16).notes == ()
+
+
+@given(st.integers(20, 90), st.integers(20, 90), st.sampled_from([32, 48]))
+@settings(max_examples=30)
+def test_padding_keeps_every_pixel_and_the_lens(height: int, width: int, side: int) -> None:
+    if not 0.4 < height / width < 2.5:
+        return
+    focal = FocalChoice(focal_px=60.0, source="test")
+    image = prepare_image(torch.rand(height, width, 3), focal, side, fit="pad")
+    corners = torch.tensor([[0.0, 0.0], [width, height]]) - torch.tensor([width / 2, height / 2])
+    # Where the corners of the photograph fall, by the camera of the padded image.
+    shown = corners / focal.focal_px * image.camera.focal_px + image.camera.center_px
+    size = torch.tensor([image.camera.size_px[1], image.camera.size_px[0]])
+    assert bool((shown >= -0.6).all())
+    assert bool((shown <= size + 0.6).all())
+    touches = (shown[0] < 0.6) & (shown[1] > size - 0.6)
+    assert bool(touches.any()), "no more is added than needed"
+
+
+def test_padding_continues_the_edge_and_says_so() -> None:
+    rgb = torch.full((60, 130, 3), 0.25)
+    rgb[0], rgb[-1] = 0.75, 1.0
+    focal = FocalChoice(focal_px=80.0, source="test")
+    image = prepare_image(rgb, focal, 64, 16, "pad")
+    assert image.notes[0].startswith("padded by ")
+    assert "with the colours of the edge" in image.notes[0]
+    cropped = prepare_image(rgb, focal, 64, 16)
+    assert cropped.notes[0].endswith("; --fit pad keeps everything")
+    assert cropped.rgb.shape == image.rgb.shape
+    assert float(image.camera.focal_px[0]) < float(cropped.camera.focal_px[0])

@@ -107,3 +107,17 @@ def test_any_mask_at_any_depth_is_finite_and_moves_no_other_pixel(bits: int, uni
     result = rigid_component_offsets(field(), moving, unit * depth())
     assert bool(result.isfinite().all()) and not result[:, ~moving].any()
     assert bool(result[:, moving].any(-1).all())
+
+
+def test_the_mean_over_samples_decides_what_moves_and_the_sample_how_far() -> None:
+    little, much = (rightwards(share * MIN_RELATIVE_DISPLACEMENT) for share in (0.5, 2.0))
+    moving = two_components()
+    alone = rigid_component_offsets(little, moving, depth())
+    assert not alone.any(), "a sample alone may be too short to count as motion"
+    offsets = rigid_component_offsets(little, moving, depth(), much)
+    assert bool((offsets[1][moving][:, 0] > 0).all())
+    assert not offsets[:, ~moving].any()
+    torch.testing.assert_close(
+        offsets, rigid_component_offsets(much, moving, depth()) / 4, rtol=1e-4, atol=1e-6
+    )
+    assert not rigid_component_offsets(much, moving, depth(), little).any()

@@ -45,7 +45,8 @@ def grid(depth: Tensor, step: float = 0.0) -> FillGrid:
 
 
 def shown(valid: Tensor, depth: Tensor) -> RenderedImage:
-    return RenderedImage(rgb=torch.rand(*depth.shape, 3), valid=valid, depth=depth)
+    rgb = torch.rand(*depth.shape, 3)
+    return RenderedImage(rgb=rgb, valid=valid, depth=depth, surface_depth=depth)
 
 
 def depths(seed: int = 0) -> Tensor:
@@ -138,10 +139,15 @@ def test_hidden_cells_in_front_of_the_image_are_not_filled() -> None:
 
 
 def test_the_render_is_taken_at_frames_and_cells() -> None:
+    depth, surface_depth = torch.rand(2, 5, 8, 12)
     rendered = RenderedImage(
-        rgb=torch.rand(5, 8, 12, 3), valid=torch.rand(5, 8, 12) < 0.5, depth=torch.rand(5, 8, 12)
+        rgb=torch.rand(5, 8, 12, 3),
+        valid=torch.rand(5, 8, 12) < 0.5,
+        depth=depth,
+        surface_depth=surface_depth,
     )
     cells = at_grid(rendered, torch.tensor([0, 4]), 2)
     assert torch.equal(cells.rgb, rendered.rgb[::4, ::2, ::2])
     assert torch.equal(cells.valid, rendered.valid[::4, ::2, ::2])
     assert torch.equal(cells.depth, rendered.depth[::4, ::2, ::2])
+    assert torch.equal(cells.surface_depth, rendered.surface_depth[::4, ::2, ::2])

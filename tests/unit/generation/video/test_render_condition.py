@@ -41,7 +41,7 @@ def plane(displacement: Tensor | None = None, rgb: Tensor | None = None) -> Laye
 
 def along(image: LayeredImage, frames: int, step: float = 0.0) -> RenderedImage:
     path = sliding_path(image.layers[0].camera, frames, (step, 0.0, 0.0))
-    return render_layered_image(image, path)
+    return render_layered_image(image, path, path.times_s)
 
 
 @pytest.mark.parametrize("frames", [1, 5])
@@ -84,7 +84,7 @@ def test_a_pixel_is_valid_exactly_where_the_image_covers_it() -> None:
 def test_validity_counts_layers_of_the_image_alone() -> None:
     image = plane()
     path = sliding_path(image.layers[0].camera, 2, (2 * STEP, 0.0, 0.0))
-    rendered = render_layered_image(image, path)
+    rendered = render_layered_image(image, path, path.times_s)
     shown = [layer for layer in image.layers if layer.in_image]
     views = [
         render(layer_gaussians(each), path.cameras[1], outputs=("alpha",), settings=UNDILATED)

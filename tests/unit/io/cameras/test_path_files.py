@@ -195,9 +195,9 @@ def test_any_bytes_are_read_or_refused(folder: Path, content: bytes) -> None:
 
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"expected a camera path file, but: No such file"):
+    with pytest.raises(InputError, match=r"expected camera poses, got no such file"):
         read_path(tmp_path / "none.json", VIEW)
-    with pytest.raises(InputError, match=r"expected a camera path file, but: Is a directory"):
+    with pytest.raises(InputError, match=r"expected camera poses, got a folder"):
         read_path(tmp_path, VIEW)
 
 
@@ -205,7 +205,7 @@ def test_huge_files_are_refused_unread(tmp_path: Path) -> None:
     file = tmp_path / "huge.txt"
     with file.open("wb") as handle:
         os.truncate(handle.fileno(), path_files.MAX_BYTES + 1)
-    with pytest.raises(FileFormatError, match="expected at most 64 MiB, got more"):
+    with pytest.raises(FileFormatError, match="of at most 64 MiB, got more"):
         read_path(file, VIEW)
 
 

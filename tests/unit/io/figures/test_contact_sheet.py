@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from diff4splat.errors import InputError, ShapeError
+from diff4splat.io.figures import fonts
 from diff4splat.io.figures.contact_sheet import SheetContent, contact_sheet
 from diff4splat.io.figures.depth_colors import color_bar, colorize, robust_range
 from diff4splat.io.figures.page_layout import BACKGROUND, NOTE_PAPER, Style, text_width, wrap
@@ -45,7 +46,7 @@ def test_photograph_and_frames_are_there(frames: int, shown: int) -> None:
 
 @pytest.mark.parametrize("size", [(30, 40), (300, 4), (4, 300), (1, 1)])
 @pytest.mark.parametrize("alpha", [False, True])
-@pytest.mark.parametrize("note", [None, "untrained: the photograph itself standing in space"])
+@pytest.mark.parametrize("note", [None, "untrained: the photograph itself on a plane"])
 def test_nothing_touches_the_margin(size: tuple[int, int], alpha: bool, note: str | None) -> None:
     page = content(5, *size, note=note, facts=(("Prompt", "word " * 60), ("Seed", "x" * 300)))
     page = replace(page, alpha=torch.ones(5, *size) if alpha else None)
@@ -104,7 +105,7 @@ def test_the_range_ignores_strays_and_gaps() -> None:
 
 
 def test_near_is_warm_far_is_cold_and_nothing_is_grey() -> None:
-    got = colorize(torch.tensor([[1.0, 3.0, 2.0, 0.0, 9.0, 0.5]]), (1.0, 3.0))[0]
+    got = colorize(torch.tensor([[1.0, 3.0, 1.5, 0.0, 9.0, 0.5]]), (1.0, 3.0))[0]
     table = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_TURBO)
     turbo = torch.from_numpy(table[:, 0, ::-1] / 255).float()
     torch.testing.assert_close(got[0], turbo[255])
@@ -126,3 +127,40 @@ def test_wrapped_lines_fit_and_lose_nothing(text: str, width: int) -> None:
     lines = wrap(text, Style(size_px=16), width)
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
     assert all(text_width(line, Style(size_px=16)) <= width for line in lines)
+
+
+def test_a_far_sky_leaves_colours_to_what_is_near() -> None:
+    depth = torch.cat([torch.linspace(2, 6, 500), torch.full((500,), 400.0)])[None]
+    near = colorize(depth, robust_range(depth))[0, :500]
+    levels = (near * 255).round().long().unique(dim=0)
+    assert len(levels) > 150, "a linear map leaves three"
+    bar = color_bar(9, 2, (2.0, 400.0))[0]
+    at_middle = torch.tensor([[2 / (1 / 2.0 + 1 / 400.0)]])
+    torch.testing.assert_close(bar[4], colorize(at_middle, (2.0, 400.0))[0, 0], atol=0.02, rtol=0)
+
+
+def test_noise_of_flat_depth_is_no_shape() -> None:
+    depth = 4 + 0.01 * torch.rand(20, 30)
+    assert len(colorize(depth, robust_range(depth)).reshape(-1, 3).unique(dim=0)) == 1
+    assert len(colorize(4 * depth**8, robust_range(4 * depth**8)).reshape(-1, 3).unique(dim=0)) > 50
+
+
+@pytest.mark.parametrize("text", ["猫が左へ歩く", "\U0001f697\U0001f44d", "\u05d0\u0e01"])
+def test_characters_without_a_font_are_visible_boxes(
+    text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fonts, "_font_files", lambda: ())
+    for cached in (fonts.fonts, fonts._system_fonts, fonts._font_of):
+        cached.cache_clear()
+    page = contact_sheet(content(facts=(("Prompt", text),)))
+    plain = contact_sheet(content(facts=(("Prompt", " "),)))
+    assert int((page != plain).any(-1).sum()) > 30 * len(text)
+    assert text_width(text, Style()) >= 10 * len(text)
+    assert all(font is None for font, _ in fonts.runs(text, 20))
+    for cached in (fonts.fonts, fonts._system_fonts, fonts._font_of):
+        cached.cache_clear()
+
+
+def test_joined_emoji_are_no_boxes_for_their_joints() -> None:
+    parts = "".join(part for _, part in fonts.runs("a\u200db\ufe0f", 20))
+    assert parts == "ab"

@@ -185,7 +185,7 @@ def test_indices_are_in_range_and_order(file: Path, index: list[int]) -> None:
         ("period_s", ..., "'period_s': expected a finite number, got nothing"),
         ("period_s", 0, "'period_s': expected a number above 0, got 0.0"),
         ("period_s", math.inf, "'period_s': expected a finite number, got inf"),
-        ("period_s", 10**400, "'period_s': expected a finite number, got 1000"),
+        ("period_s", 10**400, "'period_s': expected a finite number, got inf"),
         ("time_range_s", [2.0, 0.0], "'time_range_s': expected first ≤ last"),
         ("time_range_s", ..., "'time_range_s': expected a list, got nothing"),
     ],

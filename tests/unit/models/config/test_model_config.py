@@ -135,6 +135,8 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
     [
         (DitConfig, {"heads": 5}, "DitConfig.heads: expected a divisor of width 24"),
         (DitConfig, {"heads": 6}, "DitConfig.heads: expected even heads of at least 6"),
+        (DitConfig, {"blocks": 2**40}, "DitConfig.blocks: expected a whole number of at least 1"),
+        (DitConfig, {"width": 2**62}, "DitConfig.width: expected a whole number of at least 1"),
         (DitConfig, {"width": 0}, "DitConfig.width: expected a whole number of at least 1"),
         (DitConfig, {"width": "24"}, "DitConfig.width: expected a whole number"),
         (DitConfig, {"blocks": True}, "DitConfig.blocks: expected a whole number"),

@@ -4,9 +4,10 @@ import oracles_models as oracle
 import pytest
 import torch
 
+from diff4splat.models.blocks.resize import upsample_bilinear
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.deformation.network import DeformationNetwork, upsample_bilinear
+from diff4splat.models.deformation.network import DeformationNetwork
 
 
 def with_stride(stride: int) -> ModelConfig:

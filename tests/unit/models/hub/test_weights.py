@@ -185,7 +185,7 @@ def test_unknown_setting_in_the_configuration(folder: Path) -> None:
 
 def test_configuration_that_is_not_text(folder: Path) -> None:
     (folder / "config.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileFormatError, match="expected JSON in UTF-8"):
+    with pytest.raises(FileFormatError, match="text in UTF-8"):
         load_config(folder)
 
 

@@ -209,6 +209,8 @@ def test_pixel_areas_are_averaged() -> None:
 
 def test_a_scene_is_widened_as_it_asks_unless_something_else_is_asked_for() -> None:
     scene = replace(drifting(CLOUD, (0, 0, 0)), dilation_px2=0.7)
+    own_size = replace(scene.path, cameras=scene.path.cameras.resized((5, 5)))
+    scene = replace(scene, path=own_size)
     taken = {
         (told, subject.__class__.__name__): shot(
             subject, camera_of((5, 5)), LENS, PhotoSettings(samples=4, smoothing_px2=told)

@@ -141,7 +141,7 @@ def test_a_file_with_other_text_is_named(tmp_path: Path, change: dict) -> None:
     metadata = read_metadata(file) | change
     metadata = {key: value for key, value in metadata.items() if value is not None}
     write_tensors(TensorFile(tensors=read_tensors(file), metadata=metadata), file)
-    with pytest.raises(FileFormatError, match=rf"{FILE}: expected .* got a file without"):
+    with pytest.raises(FileFormatError, match=rf"{FILE}: expected .* got others"):
         read_packs(tmp_path)
 
 
@@ -192,3 +192,35 @@ def test_captions_may_hold_any_letters(tmp_path: Path) -> None:
     file = latent_folder(tmp_path, pack) / FILE
     assert read_packs(tmp_path).captions == captions
     assert json.loads(read_metadata(file)["size_px"]) == [24, 24]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"latent": torch.zeros(1, 4, 2, 3)},
+        {"latent": torch.zeros(1, 4, 2, 3, 3, dtype=torch.float64)},
+        {"latent": torch.full((1, 4, 2, 3, 3), float("nan"))},
+        {"focal_px": torch.ones(1, 7, 2)},
+        {"pose": torch.zeros(1, 5, 4, 3)},
+        {"validity": torch.full((1, 1, 5, 24, 24), 7, dtype=torch.uint8)},
+        {"validity": torch.ones(1, 1, 5, 24, 24)},
+        {"is_static": torch.tensor([3])},
+    ],
+)
+def test_tensors_that_no_encoder_writes_are_refused(tmp_path: Path, change: dict) -> None:
+    file = latent_folder(tmp_path, make_pack([True])) / FILE
+    tensors, metadata = read_tensors(file) | change, read_metadata(file)
+    write_tensors(TensorFile(tensors=tensors, metadata=metadata), file)
+    with pytest.raises(FileFormatError, match=rf"{FILE}: expected .*{next(iter(change))}"):
+        read_packs(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["9" * 5000, "[" * 100_000, "[1e400, 24]", "[0, 24]", "-1"])
+def test_metadata_beyond_any_clip_is_refused(tmp_path: Path, text: str) -> None:
+    file = latent_folder(tmp_path, make_pack([True])) / FILE
+    for key in ("size_px", "versions", "captions"):
+        metadata = read_metadata(file) | {key: text}
+        write_tensors(TensorFile(tensors=read_tensors(file), metadata=metadata), file)
+        with pytest.raises(FileFormatError, match=FILE):
+            read_packs(tmp_path)
+        latent_folder(tmp_path, make_pack([True]))

@@ -1,6 +1,8 @@
 """What lets the next stage begin, and what people are told when nothing does."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from toy_training import Toy
@@ -13,6 +15,7 @@ from diff4splat.training.trainer.gates import (
     stage_may_start,
     write_result,
 )
+from diff4splat.training.trainer.logs.run_files import RESULT_FILE
 
 RESULT = StoredResult(
     stage="toy", finished=True, step=6, checkpoint="c", measures={"psnr": 20.0, "error_px": 1.5}
@@ -72,3 +75,19 @@ def test_a_damaged_result_is_named(tmp_path, text: str) -> None:
     (tmp_path / "result.json").write_text(text)
     with pytest.raises(FileFormatError, match="expected the result of a stage"):
         stage_may_start(RECIPE, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({"step": "6"}, {"step": True}, {"finished": 1}, {"stage": None}, {"other": 1}),
+        *({"checkpoint": "../a"}, {"checkpoint": "a" * 300}, {"checkpoint": ""}),
+        *({"measures": {"psnr": "20"}}, {"measures": {"psnr": 10**400}}, {"measures": []}),
+    ],
+)
+def test_a_result_of_other_values_is_refused(tmp_path: Path, change: dict) -> None:
+    write_result(tmp_path, RESULT)
+    file = tmp_path / RESULT_FILE
+    file.write_text(json.dumps(json.loads(file.read_text()) | change))
+    with pytest.raises(FileFormatError, match="expected the result of a stage"):
+        read_result(tmp_path)

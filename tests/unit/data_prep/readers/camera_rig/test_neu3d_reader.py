@@ -182,7 +182,7 @@ def test_videos_of_several_rates_need_a_rate(tmp_path: Path) -> None:
         (lambda rows: rows * np.where(np.arange(17) == 14, -1, 1), "focal length above 0"),
         (lambda rows: rows * np.where(np.arange(17) % 5 == 0, -1, 1), "got determinant -1"),
         (lambda rows: rows * np.where(np.arange(17) == 4, 2, 1), "shaped as its camera, 72 x 96"),
-        (lambda rows: rows.astype(object), "expected a whole NumPy file of numbers"),
+        (lambda rows: rows.astype(object), "expected the header of an array of numbers"),
     ],
 )
 def test_arrays_that_make_no_sense_are_refused(tmp_path: Path, change, message: str) -> None:

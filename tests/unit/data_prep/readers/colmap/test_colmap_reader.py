@@ -248,5 +248,5 @@ def test_points_that_are_not_finite_are_dropped(tmp_path: Path) -> None:
 
 def test_one_camera_alone_is_refused(tmp_path: Path) -> None:
     write_rig(tmp_path, count=1, frames=10)
-    with pytest.raises(InputError, match="at least two places, got one standing camera"):
+    with pytest.raises(InputError, match="at least two places, got one static camera"):
         read_capture(tmp_path)

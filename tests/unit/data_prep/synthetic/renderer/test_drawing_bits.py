@@ -15,7 +15,7 @@ from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 
 SETTINGS = {"samples_per_side": 4, "tracks": 30, "shadow_px": 64}
 GOLDEN = "e9d6e5c8ea46a2b8"
-SUPPORT = Path(__file__).parents[3] / "support"
+SUPPORT = Path(__file__).parents[4] / "support"
 SCRIPT = """
 import sys
 sys.path[:0] = [{support!r}, {here!r}]

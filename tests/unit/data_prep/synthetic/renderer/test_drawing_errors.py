@@ -9,7 +9,7 @@ import torch
 
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
-from diff4splat.data_prep.synthetic.renderer.tone import byte_thresholds
+from diff4splat.data_prep.synthetic.renderer.shading.tone import byte_thresholds
 from diff4splat.errors import ConfigError, InputError
 
 SETTINGS = DrawSettings(samples_per_side=2, tracks=5, shadow_px=16)

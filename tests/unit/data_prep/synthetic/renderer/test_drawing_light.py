@@ -8,11 +8,11 @@ import pytest
 
 from diff4splat.data_prep.synthetic.renderer.cameras import render_camera
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+from diff4splat.data_prep.synthetic.renderer.ground_truth.occlusion import visible_points
 from diff4splat.data_prep.synthetic.renderer.jit import GROUP, kernel
-from diff4splat.data_prep.synthetic.renderer.occlusion import visible_points
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
-from diff4splat.data_prep.synthetic.renderer.shadows import Chart, lit
-from diff4splat.data_prep.synthetic.renderer.tone import byte_thresholds, encoded
+from diff4splat.data_prep.synthetic.renderer.shading.shadows import Chart, lit
+from diff4splat.data_prep.synthetic.renderer.shading.tone import byte_thresholds, encoded
 
 SETTINGS = DrawSettings(samples_per_side=1, tracks=0, flow=False, shadow_px=16)
 

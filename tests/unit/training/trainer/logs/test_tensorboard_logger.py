@@ -48,3 +48,13 @@ def test_a_folder_that_cannot_be_made_too(monkeypatch: pytest.MonkeyPatch) -> No
     notes: list[str] = []
     board(monkeypatch, refuse, notes).scalars(0, {"a": 1.0})
     assert len(notes) == 1 and "(File exists)" in notes[0]
+
+
+def without_threads(folder: str) -> None:
+    raise RuntimeError("can't start new thread")
+
+
+def test_a_machine_without_threads_to_spare_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    notes: list[str] = []
+    board(monkeypatch, without_threads, notes).scalars(0, {"a": 1.0})
+    assert len(notes) == 1 and "(can't start new thread)" in notes[0]

@@ -1,0 +1,1 @@
+"""How long renderers take, and what the machine can do at most."""

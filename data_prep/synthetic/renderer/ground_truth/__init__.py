@@ -1,0 +1,1 @@
+"""Depth, instances, flow and point tracks that follow from the triangles."""

@@ -1,0 +1,1 @@
+"""Colours of images: light, shadow, sky and tone."""

@@ -1,0 +1,1 @@
+"""Object families, one module for each kind: animals, buildings, plants."""

@@ -1,0 +1,1 @@
+"""Pieces of triangle mesh: flat faces, revolved profiles, tubes along a path."""

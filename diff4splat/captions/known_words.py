@@ -1,0 +1,93 @@
+"""The words of a prompt that the motion prior knows: those of its training captions.
+
+A prompt moves something if it has a word for an object (a noun or a colour) and one for a motion (a
+verb or a direction). Endings do not count: ``moving`` is ``moves``.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+
+from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
+
+NO_OBJECT = "the prompt names no object or colour that the model knows"
+NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
+STATIC = "nothing moves"
+_ENDINGS = ("ing", "ed", "es", "s", "e")
+_LEAST_STEM = 3
+_FUNCTION_WORDS = frozenset(
+    [
+        *("a", "an", "and", "are", "at", "by", "for", "from", "has", "in", "into", "is", "it"),
+        *("its", "of", "off", "on", "onto", "out", "over", "the", "then", "to", "with"),
+        *("above", "around", "beside", "camera", "gets", "its", "joints", "like", "way"),
+    ]
+)
+"""Words that neither name an object nor a motion."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PromptWords:
+    """The words of one prompt, by what the motion prior takes them for."""
+
+    objects: tuple[str, ...]
+    motions: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+
+def known_words() -> dict[str, tuple[str, ...]]:
+    """Every phrase, by kind."""
+    return {
+        "objects": NOUNS,
+        "colours": COLOR_NAMES,
+        "motions": tuple(phrase for phrases in VERBS.values() for phrase in phrases),
+        "directions": tuple(DIRECTIONS.values()),
+        "places": tuple(PLACES.values()),
+        "nothing": (STATIC,),
+    }
+
+
+def read_prompt(prompt: str) -> PromptWords:
+    """Sort the words of ``prompt``; function words and places are left out."""
+    objects, motions, others = _stems()
+    words = re.findall(r"[^\W\d_]+", prompt.casefold())
+    return PromptWords(
+        objects=tuple(word for word in words if stem(word) in objects),
+        motions=tuple(word for word in words if stem(word) in motions),
+        unknown=tuple(word for word in words if stem(word) not in objects | motions | others),
+    )
+
+
+def why_static(prompt: str) -> str:
+    """Why ``prompt`` moves nothing; empty where it may."""
+    words = read_prompt(prompt)
+    if not words.objects:
+        return NO_OBJECT
+    return "" if words.motions else NO_MOTION_WORD
+
+
+def stem(word: str) -> str:
+    """The word without its ending: ``spins`` and ``spinning`` are one."""
+    for ending in _ENDINGS:
+        if word.endswith(ending) and len(word) - len(ending) >= _LEAST_STEM:
+            word = word.removesuffix(ending)
+            break
+    if len(word) > _LEAST_STEM and word[-1] == word[-2]:
+        word = word[:-1]
+    return word[:-1] + "y" if word.endswith("i") else word
+
+
+@cache
+def _stems() -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
+    """Of objects, motions, and all other words of captions."""
+    words, camera = known_words(), [phrase for one in CAMERA_MOVES.values() for phrase in one]
+    functions = _of(_FUNCTION_WORDS)
+    # Of names in several words the last one is the object: tree of "fir tree".
+    objects = _of((*(noun.split()[-1] for noun in NOUNS), *COLOR_NAMES, "nothing"))
+    motions = _of((*words["motions"], *words["directions"])) - functions
+    return objects, motions, functions | _of((*NOUNS, *words["places"], *camera))
+
+
+def _of(phrases: Iterable[str]) -> frozenset[str]:
+    return frozenset(stem(word) for phrase in phrases for word in re.findall(r"[^\W\d_]+", phrase))

@@ -1,0 +1,58 @@
+"""The argument parser: every command and subcommand as types."""
+
+from typing import Annotated
+
+import tyro
+
+from diff4splat.cli.doctor import Doctor
+from diff4splat.cli.evaluate import Evaluate
+from diff4splat.cli.fit import Fit
+from diff4splat.cli.generate import Generate
+from diff4splat.cli.inspect import Inspect
+from diff4splat.cli.pack import Pack
+from diff4splat.cli.paths import ListPaths, PreviewPath
+from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
+from diff4splat.cli.report import ErrorTime, ListKnobs
+from diff4splat.cli.scenes.bake import Bake
+from diff4splat.cli.scenes.convert import Convert
+from diff4splat.cli.scenes.export import Export, View
+from diff4splat.cli.scenes.render import Render
+from diff4splat.cli.train import Train
+
+subcommand = tyro.conf.subcommand
+Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
+Prepare = (
+    Annotated[PrepareSynthetic, subcommand("synth")]
+    | Annotated[PrepareLatents, subcommand("latents")]
+    | Annotated[PrepareCheck, subcommand("check")]
+)
+Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
+Command = (
+    Annotated[Generate, subcommand("generate")]
+    | Annotated[Fit, subcommand("fit")]
+    | Annotated[Render, subcommand("render")]
+    | Annotated[Bake, subcommand("bake")]
+    | Annotated[Convert, subcommand("convert")]
+    | Annotated[Export, subcommand("export")]
+    | Annotated[View, subcommand("view")]
+    | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
+    | Annotated[Inspect, subcommand("inspect")]
+    | Annotated[Report, subcommand("report", description="Error against run time.")]
+    | Annotated[Prepare, subcommand("prepare", description="Training clips: make, encode, check.")]
+    | Annotated[Train, subcommand("train")]
+    | Annotated[Pack, subcommand("pack")]
+    | Annotated[Evaluate, subcommand("eval")]
+    | Annotated[Doctor, subcommand("doctor")]
+)
+
+
+def parse(arguments: list[str]) -> Command:
+    """The command that ``arguments`` name, with its options; help and bad usage exit."""
+    return tyro.cli(
+        Command,
+        prog="diff4splat",
+        description="One image, a camera path and optional text to an explicit 4D Gaussian scene. "
+        "`diff4splat --version` prints the version.",
+        args=arguments,
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
+    )

@@ -1,0 +1,56 @@
+"""``--model``, ``--prompt`` and ``--features``, checked before torch is loaded."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from diff4splat.cli.options.constraints import InputPath
+from diff4splat.errors import ConfigError
+
+FEATURE_NETWORKS = ("vgg", "alex")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelName:
+    """A model folder, or the name of a size."""
+
+    def check(self, option: str, value: str) -> None:
+        """Refuse what is neither."""
+        from diff4splat.models.config.sizes import size_by_name
+
+        del option
+        try:
+            is_folder = Path(value).is_dir()
+        except OSError:
+            is_folder = False  # longer than any name
+        if not is_folder:
+            size_by_name(value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeatureFiles:
+    """Weights of a perceptual distance: ``vgg:FILE`` or ``alex:BACKBONE,HEADS``."""
+
+    def check(self, option: str, value: str) -> None:
+        """Refuse other forms, and files that are not there."""
+        network, _, rest = value.partition(":")
+        files = rest.split(",")
+        if network not in FEATURE_NETWORKS or not all(files) or len(files) > 2:
+            raise ConfigError(
+                f"{option}: expected {' or '.join(f'{name}:FILE' for name in FEATURE_NETWORKS)}, "
+                f"or two files joined by a comma, got {value!r}"
+            )
+        for file in files:
+            InputPath(what="a file of weights", folder=False).check(option, Path(file))
+
+
+def require_prompt_for(model: str, prompt: str) -> None:
+    """Check a prompt for a model; only the model itself knows the limit if it is a folder.
+
+    Raises:
+        InputError: empty, not text, or too long.
+    """
+    from diff4splat.models.config.sizes import SIZES
+    from diff4splat.models.text_encoder.prompt import require_prompt
+
+    require_prompt(prompt, SIZES[model]().text.max_bytes if model in SIZES else sys.maxsize)

@@ -1,0 +1,1 @@
+"""Commands that read a scene: render, bake, convert, export, view."""

@@ -1,0 +1,88 @@
+"""``diff4splat export html`` and ``diff4splat view``: a scene as a page that any browser plays."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from diff4splat.cli.options.constraints import InputPath, OutputFile, require_writable
+from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
+
+PAGE_SUFFIXES = (".html", ".htm")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export:
+    """Write a scene as one HTML page that plays it, without a server or a network."""
+
+    format: Annotated[Literal["html"], tyro.conf.Positional]
+    """What to write."""
+    scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene or checkpoint")]
+    """A scene file, a folder with one, a 4DGaussians model folder, or a checkpoint (.pth) of native
+    4D Gaussians."""
+    out: Annotated[
+        Path | None, OutputFile(suffixes=PAGE_SUFFIXES), tyro.conf.arg(aliases=("-o",))
+    ] = None
+    """The page. Default: the scene's name with .html beside it."""
+
+    @property
+    def file(self) -> Path:
+        """The page."""
+        return self.out or scene_source(self.scene).with_suffix(".html")
+
+    def check(self) -> None:
+        """Require a place that can be written and is not the input."""
+        require_inputs_not_overwritten((scene_source(self.scene),), (self.file,))
+        require_writable(self.file, is_folder=False)
+
+    def run(self) -> None:
+        """Read, write the page, say what it could not keep."""
+        export_page(scene_source(self.scene), self.file)
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """Open a scene in the browser of this machine: orbit, play, step through time."""
+
+    scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene or checkpoint")]
+    """As for `export html`."""
+
+    def run(self) -> None:
+        """Write a temporary page and open it."""
+        import webbrowser
+
+        from diff4splat.cli.common.console import note
+
+        source = scene_source(self.scene)
+        folder = Path(tempfile.mkdtemp(prefix="diff4splat-view-"))
+        file = folder / f"{source.stem or 'scene'}.html"
+        export_page(source, file)
+        if not webbrowser.open(file.as_uri()):
+            note(f"no browser was found; open {file} in one")
+
+
+def scene_source(given: Path) -> Path:
+    """The scene file of a folder that `generate` or `fit` wrote; anything else as it is."""
+    inside = given / "scene.safetensors"
+    return inside if inside.is_file() else given
+
+
+def export_page(source: Path, file: Path) -> None:
+    """Write the page of any scene that can be read.
+
+    Raises:
+        InputError, FileFormatError: the scene cannot be read.
+        OutputError: the page cannot be written.
+    """
+    from diff4splat.cli.common.console import ConsolePhases, note
+    from diff4splat.io.checkpoints.import_scene import import_scene
+    from diff4splat.viewer.page import write_page
+
+    imported = import_scene(source)
+    with ConsolePhases().phase("write page"):
+        written = write_page(imported.scene, file)
+    for line in (*imported.notes, *written.notes):
+        note(line)
+    note(f"wrote {file} ({file.stat().st_size / 1e6:.1f} MB)")

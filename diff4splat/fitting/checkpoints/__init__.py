@@ -1,0 +1,1 @@
+"""What a fit saves between steps, and how a run is recognised as the same one."""

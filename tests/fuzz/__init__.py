@@ -1,0 +1,1 @@
+"""Damaged files for every reader, drawn by seed; ``make fuzz`` prints what becomes of them."""

@@ -1,0 +1,1 @@
+"""Edits of contents and of whole files, by what they know of the format."""

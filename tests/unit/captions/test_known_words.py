@@ -1,0 +1,88 @@
+"""Prompts with and without words that the motion prior knows, and what the plan makes of them."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.grammar import CaptionFacts, Event, NamedObject, describe
+from diff4splat.captions.known_words import (
+    NO_MOTION_WORD,
+    NO_OBJECT,
+    known_words,
+    read_prompt,
+    stem,
+    why_static,
+)
+from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
+from diff4splat.cli.generate import Generate
+from diff4splat.cli.main import run
+
+OBJECTS = st.tuples(st.sampled_from(COLOR_NAMES), st.sampled_from(NOUNS))
+EVENTS = st.tuples(OBJECTS, st.sampled_from(sorted(VERBS)), st.sampled_from(["", *DIRECTIONS]))
+MOVES = st.lists(st.sampled_from(sorted(CAMERA_MOVES)), max_size=2)
+
+
+@given(st.lists(EVENTS, max_size=2), st.sampled_from(["", *PLACES]), MOVES, st.integers(0, 5))
+def test_every_training_caption_is_known_word_by_word(
+    events: list, place: str, moves: list, variant: int
+) -> None:
+    named = [
+        Event(subject=NamedObject(*subject), motion=motion, direction=direction)
+        for subject, motion, direction in events
+    ]
+    facts = CaptionFacts(place=place, events=tuple(named), camera=tuple(moves))
+    caption = describe(facts, variant)
+    assert why_static(caption) == ""
+    assert read_prompt(caption).unknown == ()
+    assert why_static(caption.upper()) == ""
+
+
+@pytest.mark.parametrize(
+    ("prompt", "reason"),
+    [
+        ("a cat moves to the left", NO_OBJECT),
+        ("der Hund läuft nach links", NO_OBJECT),
+        ("猫が歩く", NO_OBJECT),
+        ("🚗💨", NO_OBJECT),
+        ("12345", NO_OBJECT),
+        ("the camera moves to the left", NO_OBJECT),
+        ("a quiet house", NO_MOTION_WORD),
+        ("the red car zooms off", NO_MOTION_WORD),
+        ("the red car", NO_MOTION_WORD),
+        ("moving cars", ""),
+        ("a gear is spinning", ""),
+        ("nothing moves", ""),
+        ("the blue cat walks", ""),
+    ],
+)
+def test_a_prompt_needs_an_object_and_a_motion(prompt: str, reason: str) -> None:
+    assert why_static(prompt) == reason
+
+
+@pytest.mark.parametrize(
+    "forms", ["move moves moving moved", "spin spins spinning", "fly flies flying", "box boxes"]
+)
+def test_endings_do_not_count(forms: str) -> None:
+    assert len({stem(word) for word in forms.split()}) == 1
+
+
+def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
+    def notes(prompt: str | None, model: str = "small") -> list[str]:
+        return Generate(images=(Path("photo.jpg"),), prompt=prompt, model=model).prompt_notes()
+
+    (line,) = notes("a cat purrs")
+    assert "nothing moves: the prompt names no object" in line
+    assert "diff4splat inspect words" in line
+    assert notes("the red cat moves") == ["words of the prompt that the model does not know: cat"]
+    assert notes("the red car moves to the left") == notes(None) == []
+    assert notes("a cat purrs", "test") == []
+
+
+def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:
+    assert run(["inspect", "words"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    for words in known_words().values():
+        assert all(word in text for word in words)
