@@ -36,7 +36,7 @@ class PrepareSynthetic:
     """Frames per clip, 1 + 4 k for training."""
     fps: Annotated[float, Number(least=0.1, most=1000)] = 8.0
     """Frames per second; the motion network is trained on 3 frames at 1 fps."""
-    views: Annotated[int, Number(least=1, most=64)] = 3
+    views: Annotated[int, Number()] = 3
     """Cameras per clip; the first is the input."""
     rig: bool = False
     """Place cameras all around the scene, for per-scene fitting; hold out the last two."""

@@ -29,6 +29,7 @@ from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
 from diff4splat.generation.video.video_fill import FillRequest, fill_hidden
+from diff4splat.generation.visible_fill import without_visible
 from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
@@ -146,6 +147,7 @@ class Diff4SplatPipeline:
         if fill is None:
             log.record_unused(FILL_PARTS, "the image shows all that the path sees")
             return image
+        fill = without_visible(fill, image, request.image.camera)
         return combine(image, visible_count, fill)
 
     def _image_gaussians(

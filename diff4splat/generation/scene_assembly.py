@@ -27,12 +27,7 @@ def combine(image: GaussianSet, visible_count: int, fill: VideoFill) -> Gaussian
     guesses = image.gaussians.means[visible_count:]
     kept = torch.ones(len(image.gaussians), dtype=torch.bool, device=guesses.device)
     kept[visible_count:] = ~hides_fill(guesses, fill.grid)
-    first = GaussianSet(
-        gaussians=image.gaussians.select(kept),
-        motion=image.motion.select(kept),
-        pixel_index=image.pixel_index[kept],
-    )
-    return joined(first, fill.gaussians)
+    return joined(image.select(kept), fill.gaussians)
 
 
 def joined(first: GaussianSet, second: GaussianSet) -> GaussianSet:

@@ -18,7 +18,8 @@ from diff4splat.models.hub.model import load_model
 from diff4splat.outputs import filming
 from diff4splat.render.api import render, render_video
 
-FILES = {"scene.safetensors", "video.webm", "depth.exr", "preview.png", "card.json"}
+IMAGES = {"video.webm", "depth.exr", "preview.png"}
+FILES = {"scene.safetensors", "scene.html", "card.json"} | IMAGES
 
 
 @pytest.fixture(scope="module")

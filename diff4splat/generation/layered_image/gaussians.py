@@ -7,7 +7,7 @@ ones. Gaussians keep the order of the layers, and within a layer that of its row
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
@@ -29,6 +29,14 @@ class GaussianSet:
     motion: Motion
     pixel_index: Int[Tensor, " n"]
     """``NO_PIXEL`` for those whose colour no pixel decides."""
+
+    def select(self, chosen: Bool[Tensor, " n"]) -> "GaussianSet":
+        """The chosen ones, in order."""
+        return GaussianSet(
+            gaussians=self.gaussians.select(chosen),
+            motion=self.motion.select(chosen),
+            pixel_index=self.pixel_index[chosen],
+        )
 
 
 def layer_gaussians(layer: ImageLayer) -> Gaussians:

@@ -12,7 +12,7 @@ every cell of every frame of the whole path, which is the paper's way.
 from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
@@ -76,6 +76,8 @@ class VideoFill:
     """Gaussians of the filled cells, and where these lie."""
 
     gaussians: GaussianSet
+    cell_index: Int[Tensor, " n"]
+    """The cell of the grid that each one fills."""
     grid: FillGrid
 
 
@@ -113,7 +115,8 @@ def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill | 
     if not len(canonical.gaussians):
         why = "no key frame of this path sees what the image hides"
         log.record_skipped("filled Gaussians", why, "their place in the scene")
-    return VideoFill(gaussians=_with_motion(model, request, canonical, log), grid=grid)
+    gaussians = _with_motion(model, request, canonical, log)
+    return VideoFill(gaussians=gaussians, cell_index=canonical.cell_index, grid=grid)
 
 
 def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:

@@ -102,6 +102,12 @@ def test_points_that_are_nowhere_hide_nothing() -> None:
     assert len(hides_fill(means[:0], grid(everything))) == 0
 
 
+def filling(gaussians: GaussianSet, filled: Tensor) -> VideoFill:
+    """The Gaussians of the filled cells."""
+    cell_index = filled.flatten().nonzero()[:, 0]
+    return VideoFill(gaussians=gaussians, cell_index=cell_index, grid=grid(filled))
+
+
 def test_guesses_in_front_go_and_what_the_image_shows_stays() -> None:
     means = torch.tensor([point(1, 4, 2.0), point(0, 0, 2.0), point(1, 4, 2.0), point(1, 4, 9.0)])
     image = some(means, moving=(0, 2, 3))
@@ -109,7 +115,7 @@ def test_guesses_in_front_go_and_what_the_image_shows_stays() -> None:
     fill = GaussianSet(
         gaussians=fill.gaussians, motion=fill.motion, pixel_index=torch.tensor([NO_PIXEL])
     )
-    both = combine(image, 2, VideoFill(gaussians=fill, grid=grid(one_cell())))
+    both = combine(image, 2, filling(fill, one_cell()))
     kept = torch.tensor([0, 1, 3])
     wanted = torch.cat([means[kept], fill.gaussians.means])
     assert torch.equal(both.gaussians.means, wanted)
@@ -120,7 +126,7 @@ def test_guesses_in_front_go_and_what_the_image_shows_stays() -> None:
 
 def test_an_empty_fill_changes_nothing() -> None:
     image = some(torch.tensor([point(1, 4, 2.0), point(1, 4, 9.0)]), moving=(1,))
-    nothing = VideoFill(gaussians=some(torch.zeros(0, 3)), grid=grid(one_cell() & False))
+    nothing = filling(some(torch.zeros(0, 3)), one_cell() & False)
     both = combine(image, 0, nothing)
     assert torch.equal(both.gaussians.means, image.gaussians.means)
     assert torch.equal(both.motion.moving_index, image.motion.moving_index)

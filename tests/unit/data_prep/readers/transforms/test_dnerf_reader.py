@@ -174,5 +174,5 @@ def test_one_standing_camera_is_refused(tmp_path: Path) -> None:
         write_image(tmp_path / f"{index}.png", np.zeros((24, 36, 3), np.uint8))
         frames.append({"file_path": str(index), "time": index / 3, "transform_matrix": pose})
     write_json(tmp_path / "transforms_train.json", {"camera_angle_x": 1.0, "frames": frames})
-    with pytest.raises(InputError, match="images from at least two places, got one standing"):
+    with pytest.raises(InputError, match="images from at least two places, got one static"):
         read_capture(tmp_path)
