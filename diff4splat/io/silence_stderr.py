@@ -6,16 +6,25 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+_LOCK = threading.RLock()
+"""Two blocks at a time would restore each other's redirection."""
+
 
 @contextmanager
-def silence_native_stderr() -> Iterator[None]:
+def silence_native_stderr(brief: bool = False) -> Iterator[None]:
     """Redirect file descriptor 2 to the null device inside the block.
 
-    Other threads leave it as it is: they would silence progress bars of the main thread too.
+    Other threads than the main one do so only for a ``brief`` block, in which at most one refresh
+    of a progress bar is lost.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not brief and threading.current_thread() is not threading.main_thread():
         yield
         return
+    with _LOCK:
+        yield from _redirected()
+
+
+def _redirected() -> Iterator[None]:
     try:
         saved = os.dup(2)
     except OSError:  # a service may run with no stderr at all

@@ -3,7 +3,7 @@
 | name | format |
 |---|---|
 | ``.mp4`` | H.264 where ffmpeg is installed, else VP9, which QuickTime does not play |
-| ``.webm`` | VP9 |
+| ``.webm`` | VP8 |
 | ``.gif``, ``.webp`` | animations that repeat |
 | ``%04d.png`` | numbered images |
 """
