@@ -23,6 +23,7 @@ from diff4splat.generation.inputs.request import Request, UserInput, prepare_req
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.motion_sampling import MotionRequest
+from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
 from diff4splat.generation.priors import image_maps
 from diff4splat.generation.scene_assembly import combine
@@ -110,10 +111,11 @@ class Diff4SplatPipeline:
 
     def _generate(self, request: Request, log: RunLog) -> Scene:
         model, small = self._running(request.plan), request.small
-        text = self._text_states(request, log)
-        motion = MotionRequest(text=text, seed=request.seed, settings=request.settings)
         frames = model.config.latent_grid(len(request.small_path), small.camera.size_px)[0]
-        maps = image_maps(model, small, frames, motion, log)
+        with one_thread():
+            text = self._text_states(request, log)
+            motion = MotionRequest(text=text, seed=request.seed, settings=request.settings)
+            maps = image_maps(model, small, frames, motion, log)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(
             gaussians=gaussians.gaussians,

@@ -29,7 +29,7 @@ from diff4splat.render.settings import (
     require_outputs,
     stack_outputs,
 )
-from diff4splat.render.support import renderable_gaussians
+from diff4splat.render.support import renderable_gaussians, require_finite_camera
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
@@ -277,7 +277,5 @@ def _usable(camera: Camera, gaussians: Gaussians) -> Camera:
         raise ShapeError(
             f"settings.flow_camera: expected one camera, got a batch of shape {camera.batch_shape}"
         )
-    numbers = [camera.world_from_camera.flatten(), camera.focal_px, camera.center_px]
-    if not bool(torch.isfinite(torch.cat(numbers)).all() and (camera.focal_px > 0).all()):
-        raise InputError("camera: expected finite pose and intrinsics and focal lengths above 0")
+    require_finite_camera(camera)
     return camera.to(gaussians.means.dtype).to(gaussians.means.device)

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.render.projection import camera_space, to_pixels
+from diff4splat.render.projection import pixels_in_front
 from diff4splat.render.settings import RenderJob, RenderOutput
 
 
@@ -73,11 +73,8 @@ def _displacements(
     job: RenderJob, start_px: Float[Tensor, "n 2"], moved: Float[Tensor, "n 3"]
 ) -> Float[Tensor, "n 3"]:
     """How far means move on the image, and 1; zeros for those the other view cannot see."""
-    finite = torch.isfinite(moved).all(-1, keepdim=True)
-    local = camera_space(job.flow_camera, torch.where(finite, moved, 0.0))
-    seen = finite & (local[:, 2:] > job.settings.near_depth)
-    local = torch.where(seen, local, 1.0)
-    shift = torch.where(seen, to_pixels(job.flow_camera, local) - start_px, 0.0)
+    end_px, _, seen = pixels_in_front(job.flow_camera, moved, job.settings.near_depth)
+    shift = torch.where(seen, end_px - start_px, 0.0)
     return torch.cat([shift, seen.to(shift)], -1)
 
 

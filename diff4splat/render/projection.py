@@ -13,7 +13,7 @@ Mahalanobis distance is q = u² + v² with u = Δx / σ_x and v = (Δy - slope �
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.geometry import quaternion
@@ -23,6 +23,10 @@ from diff4splat.scene.gaussians import Gaussians
 
 GUARD_BAND = 0.15
 """How far beyond the image J follows the mean, in image sizes: to 1.3 tan(fov / 2)."""
+
+
+TOO_LARGE = 1e31
+"""Numbers of cameras and rays from which products overflow in float32."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +53,31 @@ def camera_space(camera: Camera, points: Float[Tensor, "n 3"]) -> Float[Tensor, 
 def to_pixels(camera: Camera, local: Float[Tensor, "n 3"]) -> Float[Tensor, "n 2"]:
     """Pixel coordinates of camera-space points with z ≠ 0."""
     return camera.focal_px * local[:, :2] / local[:, 2:] + camera.center_px
+
+
+def pixels_in_front(
+    camera: Camera, points: Float[Tensor, "n 3"], near_depth: float
+) -> tuple[Float[Tensor, "n 2"], Float[Tensor, " n"], Bool[Tensor, "n 1"]]:
+    """Pixels and z of world points beyond ``near_depth``, and which points that are.
+
+    The others have any finite numbers: where a number overflows, its gradient is NaN even if the
+    number is not used.
+    """
+    usable = _below_limit(points)
+    local = camera_space(camera, torch.where(usable, points, 0.0))
+    front = usable & (local[:, 2:] > near_depth)
+    local = torch.where(front, local, 1.0)
+    front = front & _below_limit(to_pixels(camera, local.detach()))
+    return to_pixels(camera, torch.where(front, local, 1.0)), local[:, 2], front
+
+
+def _below_limit(values: Float[Tensor, "n d"]) -> Bool[Tensor, "n 1"]:
+    return (values.detach().abs() < largest_number(values)).all(-1, keepdim=True)
+
+
+def largest_number(values: Tensor) -> float:
+    """The first one whose square overflows in the arithmetic of ``values``."""
+    return torch.finfo(values.dtype).max ** 0.5
 
 
 def footprints(gaussians: Gaussians, camera: Camera, settings: RenderSettings) -> Footprints:

@@ -9,13 +9,17 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.errors import ConfigError
 from diff4splat.render.channels import extra_channels, name_outputs
 from diff4splat.render.compositing import composite
-from diff4splat.render.projection import footprints
+from diff4splat.render.projection import Footprints, footprints
 from diff4splat.render.settings import RenderJob, RenderOutput
-from diff4splat.render.support import visible_order
+from diff4splat.render.support import pixel_boxes, visible_order
 from diff4splat.scene import harmonics
 from diff4splat.scene.gaussians import Gaussians
+
+MOST_PAIRS, MOST_PAIRS_WITH_GRADIENT = 1e9, 2e8
+"""Of a Gaussian and a pixel: some 15 seconds on two cores, and 3 GB with a gradient."""
 
 
 def unsupported_reason(job: RenderJob) -> str | None:
@@ -29,6 +33,7 @@ def render(job: RenderJob) -> RenderOutput:
         order, dropped = visible_order(job.gaussians, job.camera, job.settings)
         visible = job.gaussians.select(order)
         prints = footprints(visible, job.camera, job.settings)
+        require_few_pairs(prints, job)
         features = job.settings.features
         channels = extra_channels(
             job,
@@ -43,6 +48,22 @@ def render(job: RenderJob) -> RenderOutput:
         image = composite(prints, channels, job.camera.size_px, job.settings, medians)
         median_depth = image.median_depth if medians else None
         return name_outputs(job, image.blended, image.light, median_depth, dropped)
+
+
+def require_few_pairs(prints: Footprints, job: RenderJob) -> None:
+    """Refuse images that would take minutes or gigabytes.
+
+    Raises:
+        ConfigError: too many pairs of a Gaussian and a pixel of its box.
+    """
+    boxes = pixel_boxes(prints, job.camera.size_px, job.settings.alpha_cutoff).double()
+    pairs = float((boxes[:, 2:] - boxes[:, :2]).clamp_min(0).prod(1).sum())
+    most = MOST_PAIRS_WITH_GRADIENT if prints.center_px.requires_grad else MOST_PAIRS
+    if pairs > most:
+        raise ConfigError(
+            f"backend 'reference': expected at most {most:.1g} pairs of a Gaussian and a "
+            f"pixel, got {pairs:.1g}; use backend='raster' (float32 on a CPU) or a smaller image"
+        )
 
 
 def _colors(job: RenderJob, visible: Gaussians) -> Float[Tensor, "n 3"]:

@@ -11,8 +11,15 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
-from diff4splat.render.projection import Footprints, camera_space, footprints
+from diff4splat.render.projection import (
+    TOO_LARGE,
+    Footprints,
+    camera_space,
+    footprints,
+    largest_number,
+)
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
@@ -59,13 +66,29 @@ def pixel_boxes(
     return torch.where(reachable[:, None], torch.cat([start, stop], -1), 0).nan_to_num().long()
 
 
+def require_finite_camera(camera: Camera) -> None:
+    """Require numbers with which images can be computed.
+
+    Raises:
+        InputError: NaN, infinity, numbers of ``TOO_LARGE`` or more, or a focal length of 0 or less.
+    """
+    focal_px = camera.focal_px.detach()
+    values = (camera.world_from_camera.detach(), focal_px, camera.center_px.detach())
+    numbers = torch.cat([value.flatten() for value in values])
+    if not bool((numbers.abs() < TOO_LARGE).all() & (focal_px > 0).all()):
+        raise InputError(
+            "camera: expected finite pose and intrinsics and focal lengths above 0, "
+            f"all below {TOO_LARGE:g}"
+        )
+
+
 @torch.no_grad()
 def renderable_gaussians(gaussians: Gaussians) -> tuple[Bool[Tensor, " n"], dict[str, int]]:
     """Those whose parameters are finite and can be squared, and what was wrong with the others.
 
     The counts go by the first such parameter, so that they add up to the Gaussians left out.
     """
-    largest = torch.finfo(gaussians.means.dtype).max ** 0.5
+    largest = largest_number(gaussians.means)
     usable = torch.ones(len(gaussians), dtype=torch.bool, device=gaussians.means.device)
     dropped = {}
     for field in fields(gaussians):

@@ -6,25 +6,15 @@ import sys
 from pathlib import Path
 
 import pytest
-import torch
+from wave_images import waves
 
 from diff4splat.cli.main import run
-from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.geometry.camera import pinhole
 from diff4splat.metrics.image import psnr
 from diff4splat.render.api import render
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "make_world_picture.py"
-
-
-def waves(side_px: int) -> InputImage:
-    """Colours that no surface ends with, some as bright and dark as there are."""
-    y, x = torch.meshgrid(*(torch.linspace(0, 9, side_px),) * 2, indexing="ij")
-    rgb = torch.stack([x.sin(), (x + y).cos(), (y * 2).sin()], -1) * 0.55 + 0.5
-    camera = pinhole(1.2 * side_px, (side_px, side_px))
-    return InputImage(rgb=rgb.clamp(0, 1), camera=camera, focal_source="test")
 
 
 @pytest.mark.parametrize("side_px", [64, 256])

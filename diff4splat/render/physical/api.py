@@ -8,8 +8,6 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 
-import torch
-
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.physical_camera import PhysicalCamera
@@ -19,6 +17,7 @@ from diff4splat.render.physical.pinhole import rasterize_pinhole
 from diff4splat.render.physical.settings import OUTPUTS, Photograph, PhotoSettings
 from diff4splat.render.resolution import scene_dilation_px2
 from diff4splat.render.settings import require_outputs
+from diff4splat.render.support import require_finite_camera
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import DILATION_PX2, Scene
 
@@ -79,12 +78,7 @@ def _valid_camera(camera: PhysicalCamera, time_s: float) -> PhysicalCamera:
     Raises:
         InputError: a number is not finite, or a focal length is 0 or less.
     """
-    pinhole = camera.camera
-    numbers = torch.cat(
-        [pinhole.world_from_camera.flatten(), pinhole.focal_px, pinhole.center_px]
-    ).detach()
-    if not bool(torch.isfinite(numbers).all() and (pinhole.focal_px > 0).all()):
-        raise InputError("camera: expected finite pose and intrinsics and focal lengths above 0")
+    require_finite_camera(camera.camera)
     if not math.isfinite(time_s):
         raise InputError(f"time_s: expected a finite number, got {time_s}")
     return camera

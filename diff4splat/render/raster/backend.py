@@ -14,7 +14,7 @@ from torch import Tensor
 
 from diff4splat.geometry.camera import Camera
 from diff4splat.render.channels import extra_channels, name_outputs
-from diff4splat.render.projection import camera_space, to_pixels
+from diff4splat.render.projection import pixels_in_front
 from diff4splat.render.raster.raster_settings import TILE_SIZES_PX, make_raster_settings
 from diff4splat.render.settings import RenderJob, RenderOutput
 from diff4splat.scene.gaussians import Gaussians
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from diff4splat.render.raster.function import Raster
 
 _SHARED_OUTPUTS = {"rgb", "alpha", "depth", "median_depth"}
-_LARGEST = torch.finfo(torch.float32).max ** 0.5
 _MOST_GAUSSIANS = 1 << 24
 """Beyond it float32 cannot number the entries of a list."""
 
@@ -116,18 +115,11 @@ def _depth_and_extras(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor
     means = job.gaussians.means
     if job.outputs <= {"rgb", "alpha"}:
         return means.new_zeros(len(means)), means.new_zeros(len(means), 0)
-    depth, center_px = _centers(job)
+    # Who is near is decided in float64 by the kernel; here only the numbers shall be finite.
+    near_depth = 0.5 * job.settings.near_depth
+    center_px, depth, _ = pixels_in_front(job.camera, means, near_depth)
     moved, features = job.flow_gaussians.means, job.settings.features
     return depth, extra_channels(job, depth, center_px, moved, features)
-
-
-def _centers(job: RenderJob) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 2"]]:
-    """Z and pixel of the means; any finite numbers for those that are not drawn."""
-    means = job.gaussians.means
-    local = camera_space(job.camera, torch.where(means.abs() < _LARGEST, means, 0.0))
-    # Who is near is decided in float64 by the kernel; here only the division shall be finite.
-    z = local[:, 2:].clamp_min(0.5 * job.settings.near_depth)
-    return z[:, 0], to_pixels(job.camera, torch.cat([local[:, :2], z], 1))
 
 
 def _median_depth(

@@ -17,6 +17,7 @@ from diff4splat.render.raster.backward import Drawn, gradients
 from diff4splat.render.raster.padded_image import PaddedImage
 from diff4splat.render.raster.raster_settings import RasterSettings, make_view
 from diff4splat.render.raster.tables import Cloud
+from diff4splat.render.saturate import saturate_
 from diff4splat.scene.gaussians import Gaussians
 
 
@@ -98,13 +99,13 @@ class _Rasterize(torch.autograd.Function):
         incoming = torch.cat([planes.flatten(), light.flatten()]).numpy()
         made = gradients(ctx.drawn, cloud, sh, incoming)
         start = 3 if ctx.drawn.plan.colors else 0
-        camera = torch.from_numpy(made.camera).to(pose)
+        camera = saturate_(torch.from_numpy(made.camera).to(pose))
         to_pose = torch.zeros_like(pose)
         to_pose[:3, :3], to_pose[:3, 3] = camera[:9].view(3, 3), camera[9:12]
         return (
             None,
             None,
-            *map(torch.from_numpy, made.cloud),
+            *(saturate_(torch.from_numpy(array)) for array in made.cloud),
             torch.from_numpy(made.sh),
             torch.from_numpy(made.values[:, start : start + extras.shape[1]].copy()),
             to_pose,

@@ -13,6 +13,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from diff4splat.kernels.simd16 import LANES
+from diff4splat.render.saturate import saturate_
 from diff4splat.render.trace.backward import Gradients, gradients
 from diff4splat.render.trace.bvh.tree import NO_ORDER
 from diff4splat.render.trace.forward import make_inputs, make_rules, make_scene, shade_rays
@@ -103,12 +104,12 @@ class _Trace(torch.autograd.Function):
         grads = gradients(
             ctx.inputs, arrays.cloud, arrays.motion, table.contiguous().numpy(), ctx.memory_bytes
         )
-        to_rays = torch.from_numpy(grads.rays)
+        to_rays = saturate_(torch.from_numpy(grads.rays))
         return (
             *(None, None, None),
-            *map(torch.from_numpy, grads.cloud),
+            *(saturate_(torch.from_numpy(array)) for array in grads.cloud),
             _sh_gradient(arrays.sh, grads),
-            *map(torch.from_numpy, grads.motion),
+            *(saturate_(torch.from_numpy(array)) for array in grads.motion),
             to_rays[:, :3],
             to_rays[:, 3:6],
             to_rays[:, 6] if len(arrays.times) else None,

@@ -11,6 +11,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.errors import InputError, ShapeError
+from diff4splat.render.projection import TOO_LARGE
+from diff4splat.render.saturate import saturate_
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,7 +21,7 @@ class Rays:
 
     Raises:
         ShapeError: numbers of rays, dtypes or devices differ, or the dtype is half precision.
-        InputError: a valid ray is not finite or has a direction of zero.
+        InputError: a valid ray is not finite, starts too far away, or has a direction of zero.
     """
 
     origins: Float[Tensor, "r 3"]
@@ -41,6 +43,9 @@ class Rays:
         _require_finite(origins, directions, time_s)
         # Dividing by the largest entry first keeps tiny and huge ones from under- and overflowing.
         largest = directions.detach().abs().amax(1, keepdim=True)
+        if directions.requires_grad:
+            directions = directions.view_as(directions)  # hooks on leaves would stay there
+            directions.register_hook(_saturated)
         object.__setattr__(self, "origins", origins)
         object.__setattr__(
             self, "directions", torch.nn.functional.normalize(directions / largest, dim=1)
@@ -54,6 +59,10 @@ class Rays:
         """The rays under a mask or at indices."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return replace(self, **{k: None if v is None else v[index] for k, v in values.items()})
+
+
+def _saturated(gradient: Tensor | None) -> Tensor | None:
+    return None if gradient is None else saturate_(gradient.clone())
 
 
 def _require_shapes(rays: Rays) -> None:
@@ -78,6 +87,8 @@ def _require_finite(
     numbers = [origins, directions, *([] if time_s is None else [time_s[:, None]])]
     if not bool(torch.isfinite(torch.cat([tensor.detach() for tensor in numbers], 1)).all()):
         raise InputError("Rays: expected finite origins, directions and times of the valid rays")
+    if bool((origins.detach().abs() >= TOO_LARGE).any()):
+        raise InputError(f"Rays.origins: expected coordinates below {TOO_LARGE:g}, got larger ones")
     if bool((directions.detach() == 0).all(1).any()):
         raise InputError("Rays.directions: expected lengths above 0 in the valid rays, got 0")
 

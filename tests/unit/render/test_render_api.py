@@ -295,3 +295,19 @@ def test_a_back_end_that_refuses_says_why() -> None:
         ConfigError, match=r"backend 'picky': expected float32, got torch\.float64; use"
     ):
         render(random_gaussians(COUNT), CAMERA, backend="picky")
+
+
+@pytest.mark.parametrize("field", ["focal_px", "center_px", "world_from_camera"])
+def test_cameras_beyond_what_float32_multiplies_are_refused(field: str) -> None:
+    value = getattr(CAMERA, field).clone()
+    value.view(-1)[-2 if field == "world_from_camera" else 0] = 2e31
+    with pytest.raises(InputError, match="all below 1e"):
+        render(random_gaussians(COUNT), replace(CAMERA, **{field: value}))
+
+
+def test_the_reference_refuses_what_takes_minutes() -> None:
+    wall = random_gaussians(400)
+    large, opaque = torch.full_like(wall.scales, 1e3), torch.ones_like(wall.opacities)
+    wall = replace(wall, scales=large, opacities=opaque)
+    with pytest.raises(ConfigError, match="pairs of a Gaussian and a pixel"):
+        render(wall, pinhole(4e3, (4000, 4000)), backend="reference")
