@@ -70,8 +70,8 @@ class Intrinsics:
             )
         if not self._is_bounded():
             raise FileFormatError(
-                f"{where}: expected focal lengths above 0 and numbers up to {_LARGEST:.0e}, got "
-                "others; calibrate the camera again"
+                f"{where}: expected sides of 1 pixel or more, focal lengths above 0 and numbers "
+                f"up to {_LARGEST:.0e}, got others; calibrate the camera again"
             )
         across, along = new_width / width, new_height / height
         if abs(height * across - new_height) > _ROUNDING_PX:
@@ -88,6 +88,8 @@ class Intrinsics:
         )
 
     def _is_bounded(self) -> bool:
+        if min(self.size_px) < 1:
+            return False
         numbers = (*self.center_px, self.skew_px, *self.radial, *self.tangential, *self.fisheye)
         small = all(abs(number) <= _LARGEST for number in numbers)
         return small and all(0 < focal <= _LARGEST for focal in self.focal_px)

@@ -6,6 +6,7 @@ claims: strides of 0, sparse layouts and devices without memory stand for sizes 
 """
 
 import io
+import pickletools
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,7 @@ DTYPES = (
     *(torch.float64, torch.float32, torch.float16, torch.bfloat16, torch.bool),
     *(torch.int64, torch.int32, torch.int16, torch.int8, torch.uint8),
 )
+MOST_NAME_CHARACTERS = 200
 
 
 def load_torch_file(file: Path, what: str) -> object:
@@ -48,13 +50,23 @@ def load_torch_file(file: Path, what: str) -> object:
 
 
 def _require_stored(content: bytes) -> None:
-    """No entry of the archive may be larger than what the file holds of it."""
+    """No entry of the archive may be larger than what the file holds of it, and no name long."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         entries = archive.infolist()
-    if any(entry.compress_type != zipfile.ZIP_STORED for entry in entries):
-        raise ValueError("compressed entries")
-    if sum(entry.file_size for entry in entries) > len(content):
-        raise ValueError("entries that are larger than the file")
+        if any(entry.compress_type != zipfile.ZIP_STORED for entry in entries):
+            raise ValueError("compressed entries")
+        if sum(entry.file_size for entry in entries) > len(content):
+            raise ValueError("entries that are larger than the file")
+        for entry in entries:
+            if entry.filename.endswith(".pkl"):
+                _require_short_names(archive.read(entry))
+
+
+def _require_short_names(pickled: bytes) -> None:
+    """Torch searches its messages, which quote names, in a time that grows with their square."""
+    for opcode, argument, _ in pickletools.genops(pickled):
+        if opcode.name == "GLOBAL" and len(argument) > MOST_NAME_CHARACTERS:
+            raise ValueError("a name that is longer than any")
 
 
 def _tensors(value: object) -> Iterator[Tensor]:

@@ -30,6 +30,8 @@ STORED_DTYPES = tuple(_TYPE_NAMES.values())
 """What ``write_tensors`` writes, by the names of the format."""
 WEIGHT_DTYPES = ("F64", "F32", "F16", "BF16", "I64", "U8")
 """What weights of networks may be stored in."""
+MAX_AXES = 16
+"""Far above any tensor of ours; numpy and torch have limits of their own."""
 MAX_HEADER_BYTES = 100_000_000
 """The library's own limit; real headers have a few kilobytes."""
 
@@ -90,7 +92,12 @@ def read_tensors(file: Path, dtypes: Collection[str] = STORED_DTYPES) -> dict[st
     with _opened(file) as opened:
         names = sorted(opened.keys())
         for name in names:
-            found = opened.get_slice(name).get_dtype()
+            entry = opened.get_slice(name)
+            found, axes = entry.get_dtype(), len(entry.get_shape())
+            if axes > MAX_AXES:
+                raise FileFormatError(
+                    f"{name[:60]}: expected at most {MAX_AXES} axes, got {axes}; copy it again"
+                )
             if found not in dtypes:
                 raise FileFormatError(
                     f"{name[:60]}: expected one of {', '.join(dtypes)}, got {found}; the file was "

@@ -56,9 +56,14 @@ def to_spacetime(
     """The slice of each Gaussian at its time centre, and how it moves, fades and changes colour.
 
     ``period_s`` is that of the first order in time; the authors take the length of their clip.
+
+    Raises:
+        InputError: covariances whose slices at one time overflow.
     """
     orders = primitives.orders
     slices = conditional(primitives.covariance.to(torch.float64))
+    if not bool(torch.isfinite(slices.factors).all()):
+        raise InputError("SpacetimeGaussians.covariance: expected finite slices, got others")
     axes, scales, _ = torch.linalg.svd(slices.factors, full_matrices=False)
     axes = torch.cat([axes[..., :2], axes[..., 2:] * torch.det(axes).sign()[:, None, None]], -1)
     gaussians = Gaussians(

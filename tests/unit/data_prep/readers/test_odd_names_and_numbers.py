@@ -68,7 +68,7 @@ def test_colmap_sizes_beyond_any_image(tmp_path: Path, side: str) -> None:
         read_capture(tmp_path)
 
 
-@pytest.mark.parametrize("size", [[10**400, 24], [1e300, 1e300], [2**62, 2**62]])
+@pytest.mark.parametrize("size", [[10**400, 24], [1e300, 1e300], [2**62, 2**62], [0.2, 24]])
 def test_nerfies_sizes_beyond_any_image(tmp_path: Path, size: list[float]) -> None:
     write_hypernerf(tmp_path, count=3)
     for file in (tmp_path / "camera").iterdir():

@@ -87,3 +87,18 @@ def test_iterations_are_plain_numbers(tmp_path: Path) -> None:
     for name in ("²", "٣", "9" * 200):
         (last.parent / f"iteration_{name}").mkdir()
     assert len(read_fourdgs_checkpoint(tmp_path)[0]) == 3
+
+
+def test_a_name_of_many_pages_takes_no_time(tmp_path: Path) -> None:
+    """Torch searches its own message for patterns in a time that grows with its square."""
+    plain, file = io.BytesIO(), tmp_path / "a.pth"
+    torch.save(torch.zeros(3), plain)
+    with zipfile.ZipFile(plain) as source, zipfile.ZipFile(file, "w") as target:
+        for info in source.infolist():
+            data = source.read(info)
+            if info.filename.endswith("data.pkl"):
+                data = data.replace(b"torch._utils", b"t" * 500)
+            target.writestr(info.filename, data)
+    with pytest.raises(FileFormatError, match="expected a torch file of tensors") as refusal:
+        load_torch_file(file, "a test file")
+    assert "longer than any" in str(refusal.value.__cause__)

@@ -66,3 +66,9 @@ def test_shapes_that_no_tensor_can_have(tmp_path: Path) -> None:
             read_tensors(tmp_path / "a.safetensors")
         except FileFormatError as error:
             assert "expected a whole" in str(error)
+
+
+def test_more_axes_than_any_tensor_has(tmp_path: Path) -> None:
+    save_file({"a": torch.ones((1,) * 17)}, tmp_path / "a.safetensors")
+    with pytest.raises(FileFormatError, match="a: expected at most 16 axes, got 17"):
+        read_tensors(tmp_path / "a.safetensors")

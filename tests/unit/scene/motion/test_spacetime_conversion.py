@@ -164,3 +164,10 @@ def test_wrong_shapes_are_named() -> None:
         SpacetimeGaussians(
             covariance=good.covariance, opacities=good.opacities, orders=torch.ones(2, 4, 4, 3)
         )
+
+
+def test_covariances_whose_slices_overflow_are_refused() -> None:
+    wild = primitives(2, 0)
+    shape = replace(wild.covariance, scales=torch.full_like(wild.covariance.scales, torch.inf))
+    with pytest.raises(InputError, match="expected finite slices"):
+        to_spacetime(replace(wild, covariance=shape), **TIMING)
