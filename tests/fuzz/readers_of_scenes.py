@@ -10,12 +10,15 @@ import oracles_io
 import oracles_spacetime
 import torch
 from oracles_paths import random_path
+from oracles_render import random_gaussians
 
 from diff4splat.geometry.camera import pinhole
 from diff4splat.io.cameras.path_files import read_path, write_path
 from diff4splat.io.checkpoints.import_scene import import_scene
+from diff4splat.io.glb.glb_file import read_glb, write_glb
 from diff4splat.io.ply.ply_file import read_ply, write_ply
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
+from diff4splat.io.spz.spz_file import read_spz, write_spz
 from diff4splat.scene.scene import Scene
 from fuzz.reader import Reader, read_each
 
@@ -56,6 +59,14 @@ def _write_text_ply(folder: Path) -> None:
 def _write_plys(folder: Path) -> None:
     write_ply(oracles_io.gaussians(), folder / "binary.ply")
     _write_text_ply(folder)
+
+
+def _write_spz(folder: Path) -> None:
+    write_spz(random_gaussians(4, dtype=torch.float32), folder / "a.spz")
+
+
+def _write_glb(folder: Path) -> None:
+    write_glb(random_gaussians(4, dtype=torch.float32), folder / "a.glb")
 
 
 def _read_plys(folder: Path) -> None:
@@ -116,6 +127,8 @@ SCENES = {
     "scene spacetime": _scene(oracles_spacetime.file_scene),
     "scene hexplane": _scene(oracles_hexplane.file_scene),
     "ply": Reader(make=_write_plys, read=_read_plys),
+    "spz": Reader(make=_write_spz, read=lambda folder: read_spz(folder / "a.spz")),
+    "glb": Reader(make=_write_glb, read=lambda folder: read_glb(folder / "a.glb")),
     "camera paths": Reader(make=_write_paths, read=_read_paths),
     "4DGaussians": Reader(make=_write_fourdgs, read=_read_fourdgs),
     "native 4D": Reader(make=_write_native, read=_read_native),

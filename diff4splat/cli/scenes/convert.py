@@ -1,4 +1,4 @@
-"""``diff4splat convert``: scenes and checkpoints as INRIA PLY files or as a scene file."""
+"""``diff4splat convert``: scenes and files of other programs as PLY, SPZ, GLB or a scene file."""
 
 import math
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from diff4splat.cli.options.constraints import InputPath, Number, require_writab
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.scene_time import require_scene_time
 from diff4splat.errors import ConfigError
+from diff4splat.io.splats.suffixes import SPLAT_SUFFIXES
 
 if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
@@ -18,16 +19,19 @@ if TYPE_CHECKING:
 
 MAX_FILES = 10_000
 SCENE_SUFFIX = ".safetensors"
+FILE_SUFFIXES = (*SPLAT_SUFFIXES, SCENE_SUFFIX)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Convert:
-    """Convert a scene, or a checkpoint of another program, to PLY files or to a scene file."""
+    """Convert a scene, or a file of another program, to PLY, SPZ, GLB or to a scene file."""
 
     scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene or checkpoint")]
-    """A scene file, a 4DGaussians model folder, or a checkpoint (.pth) of native 4D Gaussians."""
+    """A scene file, a .ply, .spz or .glb file of Gaussians, a 4DGaussians model folder, or a
+    checkpoint (.pth) of native 4D Gaussians."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
-    """A .ply file for one time, a .safetensors scene file, or a folder for a PLY sequence."""
+    """A .ply, .spz or .glb file for one time, a .safetensors scene file, or a folder for a PLY
+    sequence."""
     time: Annotated[float | None, Number()] = None
     """Time in seconds of a single file. Default: the start of the motion."""
     fps: Annotated[float, Number(above=0, most=9999)] = 24.0
@@ -40,10 +44,12 @@ class Convert:
         """Check what depends on the kind of output."""
         suffix = output_suffix(self.out)
         require_inputs_not_overwritten((self.scene,), (self.out,))
-        require_writable(self.out, is_folder=suffix not in (".ply", SCENE_SUFFIX))
-        if self.time is not None and suffix != ".ply":
+        require_writable(self.out, is_folder=suffix not in FILE_SUFFIXES)
+        if self.time is not None and suffix not in SPLAT_SUFFIXES:
             kind = "a scene file" if suffix == SCENE_SUFFIX else "a folder"
-            raise ConfigError(f"--time: expected together with one .ply file; --out is {kind} here")
+            raise ConfigError(
+                f"--time: expected together with one .ply, .spz or .glb file; --out is {kind} here"
+            )
 
     def run(self) -> None:
         """Read, convert, write; existing files are replaced only by complete ones."""
@@ -56,8 +62,8 @@ class Convert:
             note(line)
         if suffix == SCENE_SUFFIX:
             self._write_scene(imported.scene)
-        elif suffix == ".ply":
-            self._write_ply(imported.scene)
+        elif suffix in SPLAT_SUFFIXES:
+            self._write_moment(imported.scene)
         else:
             self._write_sequence(imported.scene)
 
@@ -68,16 +74,19 @@ class Convert:
         save_scene(scene, self.out)
         note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians)")
 
-    def _write_ply(self, scene: "Scene") -> None:
+    def _write_moment(self, scene: "Scene") -> None:
         from diff4splat.cli.common.console import note
-        from diff4splat.io.ply.ply_file import write_ply
+        from diff4splat.outputs.splat_export import export_moment
 
         _note_dilation(scene)
         start_s, _ = scene.motion.time_range_s
         time_s = start_s if self.time is None else self.time
         require_scene_time(scene, time_s)
-        write_ply(scene.state_at(time_s), self.out, comments=(f"time_s {time_s:g}",))
+        measured = export_moment(scene, time_s, self.out)
+        if len(scene.motion.moving_index):
+            note(f"{self.out.suffix} holds one moment: motion is left out")
         note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians at {time_s:g} s)")
+        note(f"read again and rendered: {measured:.1f} dB to the scene in the worst of its views")
 
     def _write_sequence(self, scene: "Scene") -> None:
         from diff4splat.cli.common.console import ConsolePhases, note
@@ -97,13 +106,13 @@ def output_suffix(out: Path) -> str:
         ConfigError: a suffix of no format that is written, and no folder of that name.
     """
     suffix = out.suffix.lower()
-    if suffix in (".ply", SCENE_SUFFIX) or not suffix:
+    if suffix in FILE_SUFFIXES or not suffix:
         return suffix
     if out.is_dir():
         return ""
     raise ConfigError(
-        f"--out: expected a name ending in .ply or {SCENE_SUFFIX}, or a folder without a suffix, "
-        f"got {out}; rename it, or make the folder first"
+        f"--out: expected a name ending in {', '.join(FILE_SUFFIXES)}, or a folder without a "
+        f"suffix, got {out}; rename it, or make the folder first"
     )
 
 
@@ -125,6 +134,6 @@ def _note_dilation(scene: "Scene") -> None:
 
     if scene.dilation_px2 < DILATION_PX2:
         note(
-            f"made for a dilation of {scene.dilation_px2:g} px², which a PLY cannot say: "
+            f"made for a dilation of {scene.dilation_px2:g} px², which the file cannot say: "
             f"viewers add {DILATION_PX2:g} and show it softer"
         )

@@ -1,4 +1,4 @@
-"""Scenes from the checkpoints of other programs: 4DGaussians and native 4D Gaussians."""
+"""Scenes from files of other programs: checkpoints that move, and Gaussians of one moment."""
 
 import math
 from dataclasses import dataclass
@@ -15,15 +15,19 @@ from diff4splat.io.checkpoints.fourdgs_checkpoint import read_fourdgs_checkpoint
 from diff4splat.io.checkpoints.native_4dgs_checkpoint import read_native_4dgs_checkpoint
 from diff4splat.io.checkpoints.native_4dgs_import import from_raw_4d
 from diff4splat.io.scene_files.scene_file import load_scene
+from diff4splat.io.splats.formats import SPLAT_FORMATS
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.spacetime_conversion import to_spacetime
+from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 
 CHECKPOINT_SUFFIXES = (".pth", ".pt")
 FOURDGS_TIME_RANGE_S, NATIVE_TIME_RANGE_S = (0.0, 1.0), (-0.5, 0.5)
 """Default time ranges of the two programs."""
+MOMENT_TIME_RANGE_S = (0.0, 1.0)
+"""How long the default path of a file of one moment lasts."""
 FPS, SIZE_PX, FOV_DEG = 24, (360, 640), 60.0
 """Frame rate, image size and horizontal field of view of the default camera path."""
 _RADIUS_QUANTILE, _DISTANCE_IN_RADII = 0.9, 3.0
@@ -38,12 +42,12 @@ class ImportedScene:
 
 
 def is_checkpoint(source: Path) -> bool:
-    """Whether ``source`` is a folder of 4DGaussians or a torch file, not a scene file."""
+    """Whether ``source`` is a folder of 4DGaussians or a torch file."""
     return source.is_dir() or source.suffix.lower() in CHECKPOINT_SUFFIXES
 
 
 def import_scene(source: Path, time_range_s: tuple[float, float] | None = None) -> ImportedScene:
-    """Load a scene file, a 4DGaussians model folder, or a native 4D Gaussian checkpoint.
+    """Load a scene file, a checkpoint that moves, or a PLY, SPZ or GLB file of one moment.
 
     ``time_range_s`` is the time range of a checkpoint in seconds; None is the program's default.
 
@@ -54,6 +58,8 @@ def import_scene(source: Path, time_range_s: tuple[float, float] | None = None) 
     if not is_checkpoint(source):
         if time_range_s is not None:
             raise InputError("time range: expected with a checkpoint only, got a scene file")
+        if source.suffix.lower() in SPLAT_FORMATS:
+            return _import_moment(source)
         return ImportedScene(scene=load_scene(source))
     if time_range_s is not None:
         _require_time_range(time_range_s)
@@ -84,6 +90,13 @@ def _camera_position(means: Float[Tensor, "n 3"]) -> Float[Tensor, " 3"]:
     distances = (means - center).norm(dim=-1).sort().values
     radius = float(distances[int(_RADIUS_QUANTILE * (len(distances) - 1))]) or 1.0
     return center - torch.tensor([0.0, 0.0, _DISTANCE_IN_RADII * radius])
+
+
+def _import_moment(file: Path) -> ImportedScene:
+    gaussians = SPLAT_FORMATS[file.suffix.lower()].read(file)
+    kind = file.suffix.lower().removeprefix(".").upper()
+    motion = StaticMotion(time_range_s=MOMENT_TIME_RANGE_S)
+    return ImportedScene(scene=_scene(gaussians, motion, f"{kind} file"))
 
 
 def _import_fourdgs(folder: Path, time_range_s: tuple[float, float]) -> ImportedScene:

@@ -33,7 +33,7 @@ def load_torch_file(file: Path, what: str) -> object:
     """
     content = read_bytes(file, what)
     try:
-        _require_stored(content)
+        require_loadable(content)
         found = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
     except Exception as error:  # what damaged bytes make it raise is not documented
         raise FileFormatError(
@@ -49,8 +49,12 @@ def load_torch_file(file: Path, what: str) -> object:
     return found
 
 
-def _require_stored(content: bytes) -> None:
-    """No entry of the archive may be larger than what the file holds of it, and no name long."""
+def require_loadable(content: bytes) -> None:
+    """No entry of the archive may be larger than what the file holds of it, and no name long.
+
+    Raises:
+        ValueError: one is. Damaged archives raise whatever Python's readers do.
+    """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         entries = archive.infolist()
         if any(entry.compress_type != zipfile.ZIP_STORED for entry in entries):

@@ -10,6 +10,7 @@ from random import Random
 
 from fuzz.edits.byte_edits import BYTE_EDITS, BytesEdit
 from fuzz.edits.json_edits import JSON_EDITS, is_json
+from fuzz.edits.stream_edits import edit_glb_document, edit_gzip
 from fuzz.edits.tensor_edits import odd_tensor
 
 DTYPES = (
@@ -144,6 +145,10 @@ def edits_of(content: bytes) -> dict[str, BytesEdit]:
         found |= _named(odd_tensor)
     if content.startswith(b"\x89PNG"):
         found |= _named(edit_chunk)
+    if content.startswith(b"\x1f\x8b"):
+        found |= _named(edit_gzip)
+    if content.startswith(b"glTF"):
+        found |= _named(edit_glb_document)
     return found
 
 

@@ -7,6 +7,8 @@ from random import Random
 import torch
 from torch import Tensor
 
+from diff4splat.io.checkpoints.torch_file import require_loadable
+
 
 def _same_size(tensor: Tensor, value: float) -> Tensor:
     return torch.full_like(tensor.float(), value)
@@ -45,6 +47,7 @@ ODD_TENSORS: tuple[Callable[[Tensor], object], ...] = (
 
 def odd_tensor(content: bytes, rng: Random) -> bytes:
     """One tensor of a torch file replaced."""
+    require_loadable(content)  # after another edit it may not be
     root = torch.load(io.BytesIO(content), weights_only=True)
     changed = io.BytesIO()
     count = _count(root)

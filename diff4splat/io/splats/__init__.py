@@ -1,0 +1,1 @@
+"""Gaussians of one moment in the files of other programs."""

@@ -1,0 +1,1 @@
+"""SPZ, the compressed splat file of Niantic."""
