@@ -11,6 +11,7 @@ from diff4splat.captions.grammar import CaptionFacts, Event, NamedObject, descri
 from diff4splat.captions.known_words import (
     NO_MOTION_WORD,
     NO_OBJECT,
+    UNKNOWN_OBJECT,
     known_words,
     read_prompt,
     stem,
@@ -55,7 +56,10 @@ def test_every_training_caption_is_known_word_by_word(
         ("moving cars", ""),
         ("a gear is spinning", ""),
         ("nothing moves", ""),
-        ("the blue cat walks", ""),
+        ("the blue one moves", ""),
+        ("the blue cat walks", UNKNOWN_OBJECT.format("cat")),
+        ("a purple zebra flies away", UNKNOWN_OBJECT.format("zebra")),
+        ("the sofa beside the red car moves", ""),
     ],
 )
 def test_a_prompt_needs_an_object_and_a_motion(prompt: str, reason: str) -> None:
@@ -76,7 +80,10 @@ def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     (line,) = notes("a cat purrs")
     assert "nothing moves: the prompt names no object" in line
     assert "diff4splat inspect words" in line
-    assert notes("the red cat moves") == ["words of the prompt that the model does not know: cat"]
+    (line,) = notes("the red cat moves")
+    assert "nothing moves: the model does not know the object 'cat'" in line
+    unknown = "words of the prompt that the model does not know: quickly"
+    assert notes("the red car moves quickly") == [unknown]
     assert notes("the red car moves to the left") == notes(None) == []
     assert notes("a cat purrs", "test") == []
 
