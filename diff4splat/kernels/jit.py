@@ -22,6 +22,8 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.runtime import rtsys
 
+from diff4splat.kernels.verified_cache import VerifiedCacheFile
+
 EXACT = {"nogil": True, "error_model": "numpy"}
 """Options of ``numba.njit``: every operation rounds."""
 CONTRACTED = {**EXACT, "fastmath": {"contract"}}
@@ -73,7 +75,15 @@ def cached_njit(function: Callable[..., Any], options: dict[str, Any], *sources:
 
 
 class _DiskCache(FunctionCache):
-    """Numba's cache, but loading skips what only compiling needs, and a full disk stops nothing."""
+    """Numba's cache, but loading skips what only compiling needs, and no disk stops a run."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = VerifiedCacheFile(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=self._impl.locator.get_source_stamp(),
+        )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load a compiled kernel; the registries of the compiler are loaded when it compiles."""

@@ -119,3 +119,26 @@ def test_a_folder_that_may_not_be_written_to_is_refused(
     jit.cache_folder.__wrapped__().chmod(0o500)
     with pytest.raises(PermissionError, match="expected a folder to write to"):
         jit.cache_folder.__wrapped__()
+
+
+@pytest.mark.parametrize("damage", [b"", b"noise" * 40, None], ids=["empty", "noise", "cut off"])
+def test_damaged_files_are_compiled_again(
+    damage: bytes | None,
+    twice: Callable[[], Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(jit, "cache_folder", lambda *sources: tmp_path / "kernels")
+    assert RASTER.kernel(twice())(21.0) == 42.0
+    files = [file for file in (tmp_path / "kernels").rglob("*") if file.is_file()]
+    for suffix in (".nbi", ".nbc"):
+        for file in files:
+            if file.suffix == suffix:
+                whole = file.read_bytes()
+                file.write_bytes(whole[:-1] if damage is None else damage)
+        again = RASTER.kernel(twice())
+        assert again(21.0) == 42.0
+        assert sum(again.stats.cache_misses.values()) == 1
+        healed = RASTER.kernel(twice())
+        assert healed(21.0) == 42.0
+        assert sum(healed.stats.cache_hits.values()) == 1
