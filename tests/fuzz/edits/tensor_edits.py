@@ -45,6 +45,9 @@ ODD_TENSORS: tuple[Callable[[Tensor], object], ...] = (
 )
 
 
+MOST_NUMBERS = 1_000_000
+
+
 def odd_tensor(content: bytes, rng: Random) -> bytes:
     """One tensor of a torch file replaced."""
     require_loadable(content)  # after another edit it may not be
@@ -67,7 +70,9 @@ def _replaced(value: object, left: list[int], odd: Callable[[Tensor], object]) -
     """The same value; the tensor at which ``left[0]`` has counted down to 0 is replaced."""
     if isinstance(value, Tensor):
         left[0] -= 1
-        return odd(value.detach()) if left[0] == -1 else value
+        # After another edit a tensor may stand for more numbers than memory holds.
+        small = value.numel() < MOST_NUMBERS
+        return odd(value.detach()) if left[0] == -1 and small else value
     if isinstance(value, dict):
         return {key: _replaced(inner, left, odd) for key, inner in value.items()}
     if isinstance(value, list | tuple):
