@@ -131,7 +131,7 @@ def test_damaged_files_are_compiled_again(
     monkeypatch.setattr(jit, "cache_folder", lambda *sources: tmp_path / "kernels")
     assert RASTER.kernel(twice())(21.0) == 42.0
     files = [file for file in (tmp_path / "kernels").rglob("*") if file.is_file()]
-    for suffix in (".nbi", ".nbc"):
+    for suffix in (".nbi", ".nbc", ".sha256"):
         for file in files:
             if file.suffix == suffix:
                 whole = file.read_bytes()
