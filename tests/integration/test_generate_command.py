@@ -103,7 +103,7 @@ def test_a_ply_that_viewers_show_softer_is_said_to_be(
     for dilation_px2, said in ((0.0, True), (scene.dilation_px2, False)):
         save_scene(replace(scene, dilation_px2=dilation_px2), file)
         assert run(["convert", str(file), "--out", str(tmp_path / "scene.ply")]) == 0
-        assert ("which a PLY cannot say" in capsys.readouterr().err) == said
+        assert ("which the file cannot say" in capsys.readouterr().err) == said
 
 
 def test_render_needs_nothing_but_the_scene_file(folder: Path, tmp_path: Path) -> None:

@@ -112,7 +112,12 @@ def run_child(
 ) -> subprocess.CompletedProcess:
     code = WRITE.replace("NUMBER", str(int(stop))).replace("COMMAND", body)
     return subprocess.run(
-        [sys.executable, "-c", code, str(out)], capture_output=True, text=True, check=False
+        [sys.executable, "-c", code, str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+        # Tests may run under nohup, whose children ignore SIGHUP.
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
     )
 
 
