@@ -5,7 +5,6 @@ and the part alone: not on the caller's random state, nor on which other parts a
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any
 
@@ -19,47 +18,10 @@ from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
+from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.text_encoder.encoder import TextEncoder
 from diff4splat.models.video_dit.dit import VideoDiT
 from diff4splat.models.video_vae.vae import VideoVae
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Networks:
-    """The networks of one model; None for parts that are not built, or that the model lacks."""
-
-    vae: VideoVae | None = None
-    text_encoder: TextEncoder | None = None
-    dit: VideoDiT | None = None
-    ldrm: Ldrm | None = None
-    deformation: DeformationNetwork | RefinedDeformation | None = None
-    monocular_depth: MonocularDepthNet | None = None
-    motion_unet: MotionUNet | None = None
-
-    def parts(self) -> list[tuple[str, nn.Module]]:
-        """(name, network) of the parts that exist."""
-        named = [(field.name, getattr(self, field.name)) for field in fields(self)]
-        return [(name, part) for name, part in named if part is not None]
-
-    def to(self, target: torch.device | torch.dtype) -> "Networks":
-        """Move or cast every part, in place."""
-        for _, part in self.parts():
-            part.to(target)
-        return self
-
-
-PARTS = tuple(field.name for field in fields(Networks))
-"""Names of the networks, in the order of their random streams."""
-
-
-def model_parts(config: ModelConfig) -> tuple[str, ...]:
-    """The parts that a model of this configuration has."""
-    absent = set()
-    if not config.monocular_depth.used:
-        absent.add("monocular_depth")
-    if not config.motion_unet.used:
-        absent.add("motion_unet")
-    return tuple(part for part in PARTS if part not in absent)
 
 
 def create_networks(

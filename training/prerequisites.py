@@ -16,8 +16,9 @@ import torch
 from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
-from diff4splat.models.factory import PARTS, Networks, create_networks
+from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model
+from diff4splat.models.networks import PARTS, Networks
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.stage import StageRecipe

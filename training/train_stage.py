@@ -10,8 +10,8 @@ from pathlib import Path
 
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.features.load import load_features
-from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.model import Model, save_model
+from diff4splat.models.networks import model_parts
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.earlier_release import earlier_fingerprint

@@ -28,7 +28,8 @@ from diff4splat.evaluation.systems.evaluated_system import (
 )
 from diff4splat.generation.plan import RECONSTRUCTION_PARTS
 from diff4splat.models.hub.model import Model, load_model
-from diff4splat.models.video_vae.vae import LatentDistribution, VideoVae
+from diff4splat.models.video_vae.latent_distribution import LatentDistribution
+from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.progress.phases import Phases
 from diff4splat.training.train_stage import MODEL_FOLDER
 

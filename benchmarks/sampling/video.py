@@ -20,7 +20,7 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_sampling import Conditions, sample_video
 from diff4splat.metrics.image import psnr
 from diff4splat.models.hub.model import Model
-from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.models.video_dit.conditions import RenderCondition
 from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.temporal_crop import from_first_camera
 from diff4splat.training.latents.encode import encode_clip

@@ -15,7 +15,7 @@ import tyro
 from diff4splat.cli.options.camera import CameraOptions, choose_path, require_camera
 from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
-from diff4splat.cli.options.models import ModelName, require_prompt_for
+from diff4splat.cli.options.models import ModelName, require_prompt_for, require_runtime
 
 if TYPE_CHECKING:
     from diff4splat.generation.inputs.input_image import InputImage
@@ -45,6 +45,9 @@ class Generate:
     """Random seed. The same seed gives the same scene, bit for bit, on one machine."""
     model: Annotated[str, ModelName()] = "small"
     """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
+    runtime: Literal["torch", "onnx"] | None = None
+    """What runs the networks: PyTorch, or ONNX Runtime on graphs that `diff4splat export onnx`
+    wrote. Default: what the model folder holds."""
     resolution: Annotated[int | None, Number(least=1, most=1024)] = None
     """Image size: the side of a square with the same area, in pixels, up to 1024. Default: 512, or
     the photo's if that is smaller."""
@@ -91,6 +94,7 @@ class Generate:
         require_camera(self.camera, self.options)
         if self.prompt is not None:
             require_prompt_for(self.model, self.prompt)
+        require_runtime(self.model, self.runtime, self.device)
         if photo_files(self.images) == list(self.images[:1]):
             self.check_photo()
 

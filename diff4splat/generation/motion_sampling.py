@@ -21,7 +21,7 @@ from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.networks import MOTION_CELL_PX
-from diff4splat.models.motion_unet.unet import MotionUNet
+from diff4splat.models.protocols import MotionPrior
 
 WINDOW_PX, SIGMA_PX, COLOR_SIGMA, ROUNDS = 15, 5.0, 0.05, 2
 """Joint bilateral smoothing of probabilities: window and deviations in pixels and colour."""
@@ -69,7 +69,7 @@ class MotionSample:
 
 
 def sample_motion(
-    network: MotionUNet,
+    network: MotionPrior,
     image: InputImage,
     frames: int,
     request: MotionRequest,
@@ -125,7 +125,7 @@ def bilateral_smooth(
 
 
 def _velocity(
-    network: MotionUNet,
+    network: MotionPrior,
     rgb: Float[Tensor, "1 3 hh ww"],
     request: MotionRequest,
     calls: CallCount,

@@ -103,7 +103,7 @@ class Diff4SplatPipeline:
             settings=settings or GenerationSettings(),
         )
         request = prepare_request(self.model, user, self.device)
-        request.plan.record(self.model.config, log)
+        request.plan.record(self.model, log)
         with log.phases.phase("load networks"):
             self.model = with_parts(self.model, request.plan.parts)
             self.model.networks.to(self.device)

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import Fill, ModelConfig
-from diff4splat.models.factory import model_parts, parameter_counts
+from diff4splat.models.hub.model import Model, parameter_counts
+from diff4splat.models.networks import model_parts
 from diff4splat.progress.run_log import RunLog
 
 FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
@@ -79,10 +80,10 @@ class GenerationPlan:
         """Whether the image's own pixels are shown; else LDRM reconstructs every frame."""
         return self.has_depth or not self.fills
 
-    def record(self, config: ModelConfig, log: RunLog) -> None:
+    def record(self, model: Model, log: RunLog) -> None:
         """Note what runs, and what is skipped with the weights that this saves."""
-        log.networks.extend(part for part in model_parts(config) if part in self.parts)
-        counts = parameter_counts(config)
+        log.networks.extend(part for part in model.parts if part in self.parts)
+        counts = parameter_counts(model)
         for skipped in self.skipped:
             saved = f"{counts[skipped.part]:,} weights neither loaded nor run"
             error = None if skipped.changes_result else 0.0

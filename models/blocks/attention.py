@@ -4,6 +4,8 @@ Axes: ``b`` batch, ``n`` tokens, ``s`` tokens attended to, ``d`` width (all head
 The norm runs over the whole width before it is split into heads, as in Wan 2.1.
 """
 
+import math
+
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
@@ -19,10 +21,23 @@ def attend(
     bias: Float[Tensor, "#b #h #n s"] | Bool[Tensor, "#b #h #n s"] | None = None,
 ) -> Float[Tensor, "b n d"]:
     """softmax(q kᵀ / √c + bias) v, heads joined; a Boolean bias marks what may be attended to."""
-    heads = torch.nn.functional.scaled_dot_product_attention(
-        query.transpose(1, 2), key.transpose(1, 2), value.transpose(1, 2), attn_mask=bias
-    )
+    # The exporter lays the fused operation's output out otherwise than it was traced.
+    attention = _by_formula if torch.compiler.is_exporting() else _fused
+    heads = attention(query.transpose(1, 2), key.transpose(1, 2), value.transpose(1, 2), bias)
     return heads.transpose(1, 2).flatten(2)
+
+
+def _fused(query: Tensor, key: Tensor, value: Tensor, bias: Tensor | None) -> Tensor:
+    return torch.nn.functional.scaled_dot_product_attention(query, key, value, attn_mask=bias)
+
+
+def _by_formula(query: Tensor, key: Tensor, value: Tensor, bias: Tensor | None) -> Tensor:
+    logits = (query * query.shape[-1] ** -0.5) @ key.mT
+    if bias is not None and bias.dtype == torch.bool:
+        logits = logits.masked_fill(~bias, -math.inf)
+    elif bias is not None:
+        logits = logits + bias
+    return logits.softmax(-1) @ value
 
 
 class Attention(nn.Module):

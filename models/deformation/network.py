@@ -91,7 +91,6 @@ class DeformationNetwork(nn.Module):
         )
         self.heads = nn.ModuleList([zero_(nn.Conv2d(width, CHANNELS, 1)) for width in widths])
 
-    @property
     def is_identity(self) -> bool:
         """True while the last layers are exactly zero; then nothing moves."""
         return not any(bool(parameter.any()) for parameter in self.heads.parameters())

@@ -75,7 +75,6 @@ class RefinedDeformation(nn.Module):
         self.weights = nn.Conv2d(deformation.width, NEIGHBOURS * CELL_PX**2, 1)
         self.head = zero_(nn.Conv2d(deformation.width, CHANNELS + 1, 3, padding=1))
 
-    @property
     def is_identity(self) -> bool:
         """True while the last layer is exactly zero; then nothing moves."""
         return not any(bool(parameter.any()) for parameter in self.head.parameters())

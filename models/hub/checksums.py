@@ -13,9 +13,9 @@ from pathlib import Path
 from diff4splat.errors import FileFormatError
 from diff4splat.io.atomic import write_text
 from diff4splat.io.require_file import read_text
-from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.provenance import PROVENANCE_FILE
-from diff4splat.models.hub.weights import CONFIG_FILE, part_file
+from diff4splat.models.hub.weight_files import CONFIG_FILE, part_file
+from diff4splat.models.networks import PARTS
 
 SUMS_FILE = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64})  (\S+)")

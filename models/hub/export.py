@@ -16,17 +16,12 @@ from torch import nn
 
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.io.atomic import atomic_folder
-from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.checksums import SUMS_FILE, write_sums
 from diff4splat.models.hub.model import Model, with_parts
 from diff4splat.models.hub.provenance import PROVENANCE_FILE, ModelProvenance, write_provenance
-from diff4splat.models.hub.weights import (
-    CONFIG_FILE,
-    has_weights,
-    part_file,
-    save_networks,
-    weights_sha256,
-)
+from diff4splat.models.hub.weight_files import CONFIG_FILE, has_weights, part_file, weights_sha256
+from diff4splat.models.hub.weights import save_networks
+from diff4splat.models.networks import PARTS
 
 PACKED_TYPE = torch.float16
 LARGEST = torch.finfo(PACKED_TYPE).max

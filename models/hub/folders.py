@@ -12,7 +12,7 @@ from diff4splat.models.config.sizes import SIZES, size_by_name
 from diff4splat.models.hub.bundled_weights import bundled_folder
 from diff4splat.models.hub.checksums import SUMS_FILE, require_complete
 from diff4splat.models.hub.provenance import PROVENANCE_FILE, ModelProvenance, read_provenance
-from diff4splat.models.hub.weights import CONFIG_FILE, load_config, weight_file
+from diff4splat.models.hub.weight_files import CONFIG_FILE, load_config, weight_file
 
 
 def checked_folder(name_or_folder: str | Path, names: Collection[str] | None = None) -> Path | None:

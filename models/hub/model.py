@@ -3,20 +3,19 @@
 config.json  provenance.json  <part>.safetensors  [SHA256SUMS]
 """
 
-import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import torch
 
 from diff4splat.errors import ConfigError
 from diff4splat.io.locks import sole_writer
 from diff4splat.models.config.model import ModelConfig
-from diff4splat.models.config.sizes import SIZES, size_by_name
-from diff4splat.models.factory import Networks, create_networks, model_parts, parameter_counts
+from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.hub.checksums import SUMS_FILE
-from diff4splat.models.hub.folders import checked_folder, require_parts
+from diff4splat.models.hub.folders import checked_folder
 from diff4splat.models.hub.provenance import (
     NOT_STATED,
     PROVENANCE_FILE,
@@ -24,16 +23,11 @@ from diff4splat.models.hub.provenance import (
     read_provenance,
     write_provenance,
 )
-from diff4splat.models.hub.weights import (
-    CONFIG_FILE,
-    has_weights,
-    load_config,
-    load_networks,
-    save_networks,
-    weights_sha256,
-)
+from diff4splat.models.hub.weight_files import CONFIG_FILE, load_config, weights_sha256
+from diff4splat.models.networks import Networks, model_parts
+from diff4splat.models.onnx.manifest import has_graphs, read_manifest
 
-BYTES_PER_WEIGHT = 4
+Runtime = Literal["torch", "onnx"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +44,11 @@ class Model:
     origin: str = NOT_STATED
 
     @property
+    def runtime(self) -> Runtime:
+        """What runs the networks: PyTorch, or ONNX Runtime where the folder holds graphs."""
+        return "onnx" if self.folder is not None and has_graphs(self.folder) else "torch"
+
+    @property
     def parts(self) -> tuple[str, ...]:
         """Names of all networks that the model has, loaded or not."""
         return model_parts(self.config)
@@ -63,6 +62,8 @@ class Model:
         """Digest of the weight files of ``parts``, or of all; ``none`` for random weights."""
         if self.folder is None:
             return "none"
+        if self.runtime == "onnx":
+            return read_manifest(self.folder).weights_sha256(parts)
         return weights_sha256(self.folder, self.parts if parts is None else parts)
 
 
@@ -101,8 +102,28 @@ def with_parts(model: Model, parts: Collection[str]) -> Model:
     missing = [part for part in model.parts if part in parts and part not in model.loaded]
     if not missing:
         return model
-    fresh = _random(model, missing) if model.folder is None else _stored(model, missing)
+    fresh = _networks(model, missing)
     return replace(model, networks=replace(model.networks, **dict(fresh.parts())))
+
+
+def _networks(model: Model, parts: Collection[str]) -> Networks:
+    """Each runtime's code is imported only where it runs."""
+    if model.runtime == "onnx":
+        from diff4splat.models.onnx.networks import onnx_networks
+
+        return onnx_networks(model.folder, parts)
+    from diff4splat.models.hub.torch_networks import torch_networks
+
+    return torch_networks(model.config, model.folder, parts)
+
+
+def parameter_counts(model: Model) -> Mapping[str, int]:
+    """Trainable weights per part, loaded or not."""
+    if model.runtime == "onnx":
+        return read_manifest(model.folder).parameter_counts
+    from diff4splat.models.factory import parameter_counts as built_counts
+
+    return built_counts(model.config)
 
 
 def save_model(model: Model, folder: Path) -> None:
@@ -110,6 +131,12 @@ def save_model(model: Model, folder: Path) -> None:
 
     Another process that writes there, such as a stage that ends at the same time, is waited for.
     """
+    from diff4splat.models.hub.weights import save_networks
+
+    if model.runtime == "onnx":
+        raise ConfigError(
+            "save: expected a model of PyTorch weights, got one of ONNX graphs; copy its folder"
+        )
     complete = with_parts(model, model.parts)
     provenance = ModelProvenance(trained=model.trained, license=model.license, origin=model.origin)
     with sole_writer(folder, wait=True):
@@ -119,34 +146,8 @@ def save_model(model: Model, folder: Path) -> None:
         save_networks(complete.networks, model.config, folder)
 
 
-def _stored(model: Model, parts: Collection[str]) -> Networks:
-    require_parts(model.folder, parts)
-    may_lack = read_provenance(model.folder).may_lack
-    drawn = [part for part in parts if part in may_lack and not has_weights(model.folder, part)]
-    if drawn:
-        counts = parameter_counts(model.config)
-        _require_memory(model.config.name, sum(counts[part] for part in drawn))
-    return load_networks(model.folder, model.config, parts, may_lack)
-
-
-def _random(model: Model, parts: Collection[str]) -> Networks:
-    counts = parameter_counts(model.config)
-    _require_memory(model.config.name, sum(counts[part] for part in parts))
-    return create_networks(model.config, parts=parts)
-
-
-def _require_memory(name: str, weights: int) -> None:
-    needed = weights * BYTES_PER_WEIGHT
-    present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > 0.8 * present:
-        raise ConfigError(
-            f"model {name!r}: expected at least {needed / 0.8 / 2**30:.0f} GiB of memory "
-            f"for its weights, got {present / 2**30:.0f} GiB; choose another of {', '.join(SIZES)}"
-        )
-
-
 def model_device(model: Model) -> torch.device:
     """Where the loaded networks are; the CPU while there are none."""
-    for _, part in model.networks.parts():
+    for _, part in model.networks.parts() if model.runtime == "torch" else ():
         return next(part.parameters()).device
     return torch.device("cpu")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import size_by_name
-from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.folders import checked_folder
 from diff4splat.models.hub.provenance import ModelProvenance, read_provenance
-from diff4splat.models.hub.weights import has_weights, load_config, weights_sha256
+from diff4splat.models.hub.weight_files import has_weights, load_config, weights_sha256
+from diff4splat.models.networks import model_parts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

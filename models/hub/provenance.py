@@ -18,9 +18,9 @@ from typing import Any
 from diff4splat.errors import CheckpointError
 from diff4splat.io.atomic import write_text
 from diff4splat.io.require_file import is_file, read_text
-from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.legacy import SOURCES
-from diff4splat.models.hub.weights import is_version_1
+from diff4splat.models.hub.weight_files import is_version_1
+from diff4splat.models.networks import PARTS
 from diff4splat.paths.formats.json_text import decode_json
 
 PROVENANCE_FILE = "provenance.json"

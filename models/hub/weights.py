@@ -7,8 +7,7 @@ may be stored in half precision; they are read into float32. Folders of version 
 (``legacy.py``). provenance.py decides which parts may be absent.
 """
 
-import hashlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from pathlib import Path
 
 import torch
@@ -17,14 +16,20 @@ from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.io.atomic import atomic_path, write_text
-from diff4splat.io.require_file import is_file, read_text
+from diff4splat.io.require_file import is_file
 from diff4splat.io.scene_files.tensor_file import WEIGHT_DTYPES, read_tensors
 from diff4splat.models.config.model import ModelConfig
-from diff4splat.models.factory import PARTS, Networks, create_networks, model_parts
-from diff4splat.models.hub.legacy import legacy_file, upgrade_tensors
-from diff4splat.paths.formats.json_text import decode_json
+from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.legacy import upgrade_tensors
+from diff4splat.models.hub.weight_files import (
+    CONFIG_FILE,
+    has_weights,
+    is_version_1,
+    part_file,
+    weight_file,
+)
+from diff4splat.models.networks import PARTS, Networks, model_parts
 
-CONFIG_FILE = "config.json"
 MAX_LISTED = 3
 """Names listed in an error message before "and so on"."""
 
@@ -76,55 +81,6 @@ def load_networks(
         _fill(part, _read_part(folder, name, config), name)
     random = create_networks(config, parts=drawn)
     return Networks(**dict(stored.parts()), **dict(random.parts()))
-
-
-def load_config(folder: Path) -> ModelConfig:
-    """The configuration alone."""
-    return ModelConfig.from_json(_config_text(folder))
-
-
-def weights_sha256(folder: Path, parts: Iterable[str] = PARTS) -> str:
-    """SHA-256 over the weight files of ``parts`` that exist, in a fixed order, names included."""
-    digest = hashlib.sha256()
-    for path in sorted({weight_file(folder, part) for part in parts}):
-        if path.is_file():
-            with path.open("rb") as file:
-                sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-            digest.update(f"{path.stem}:{sha256}\n".encode())
-    return digest.hexdigest()
-
-
-def part_file(folder: Path, name: str) -> Path:
-    """Where a part's weights are written."""
-    return folder / f"{name}.safetensors"
-
-
-def weight_file(folder: Path, part: str) -> Path:
-    """Where a part's weights are read from; version 1 kept the priors in other files."""
-    return part_file(folder, legacy_file(part) if is_version_1(folder) else part)
-
-
-def has_weights(folder: Path, part: str) -> bool:
-    """Whether the folder holds a part's weights."""
-    return weight_file(folder, part).is_file()
-
-
-def is_version_1(folder: Path) -> bool:
-    """Whether the folder has the layout of version 1; without a configuration it has not."""
-    try:
-        data = decode_json(_config_text(folder))
-    except (CheckpointError, FileFormatError):
-        return False
-    return isinstance(data, dict) and data.get("version", 1) == 1
-
-
-def _config_text(folder: Path) -> str:
-    path = folder / CONFIG_FILE
-    if not is_file(path):
-        raise CheckpointError(
-            f"{folder}: expected a model folder with {CONFIG_FILE}, got none; check the path"
-        )
-    return read_text(path, "the configuration of a model")
 
 
 def _read_part(folder: Path, part: str, config: ModelConfig) -> dict[str, Tensor]:

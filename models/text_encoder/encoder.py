@@ -15,10 +15,7 @@ from torch import Tensor, nn
 from diff4splat.models.blocks.attention import attend
 from diff4splat.models.blocks.norm import TokenRmsNorm
 from diff4splat.models.config.networks import TextConfig
-from diff4splat.models.text_encoder.prompt import require_prompt
-
-PAD, BEGIN, END = 256, 257, 258
-VOCABULARY = 259
+from diff4splat.models.text_encoder.prompt import PAD, VOCABULARY, token_row
 
 
 def tokenize(prompts: list[str], max_bytes: int) -> tuple[Int[Tensor, "b s"], Bool[Tensor, "b s"]]:
@@ -27,7 +24,7 @@ def tokenize(prompts: list[str], max_bytes: int) -> tuple[Int[Tensor, "b s"], Bo
     Raises:
         InputError: a prompt is empty or longer than ``max_bytes``.
     """
-    rows = [[BEGIN, *require_prompt(prompt, max_bytes).encode("utf-8"), END] for prompt in prompts]
+    rows = [token_row(prompt, max_bytes) for prompt in prompts]
     longest = max(map(len, rows))
     tokens = torch.tensor([row + [PAD] * (longest - len(row)) for row in rows])
     return tokens, tokens != PAD

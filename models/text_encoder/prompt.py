@@ -1,6 +1,22 @@
-"""Checks of prompts, before any network is built (and without importing torch)."""
+"""Prompts as bytes and their checks, before any network is built (and without importing torch).
+
+A token is a UTF-8 byte 0 … 255, so there is no vocabulary file; 256 pads, 257 begins and 258 ends a
+prompt.
+"""
 
 from diff4splat.errors import InputError
+
+PAD, BEGIN, END = 256, 257, 258
+VOCABULARY = 259
+
+
+def token_row(prompt: str, max_bytes: int) -> list[int]:
+    """The tokens of one prompt.
+
+    Raises:
+        InputError: as ``require_prompt``.
+    """
+    return [BEGIN, *require_prompt(prompt, max_bytes).encode("utf-8"), END]
 
 
 def require_prompt(prompt: str, max_bytes: int) -> str:

@@ -17,8 +17,6 @@ what to add to the render condition (to 0, where there is none), and the velocit
 fresh model leads any noise to the render condition.
 """
 
-from dataclasses import dataclass
-
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
@@ -34,28 +32,11 @@ from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embeddin
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TOKEN_PATCH
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
+from diff4splat.models.video_dit.conditions import DitConditions, RenderCondition
 from diff4splat.models.video_dit.dit_block import MODULATIONS, DitBlock
-from diff4splat.models.video_dit.render_condition import (
-    RenderCondition,
-    RenderConditionEmbedding,
-)
+from diff4splat.models.video_dit.render_condition import RenderConditionEmbedding
 
 PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DitConditions:
-    """Embedded conditions, the same at all noise levels of a generation; None is skipped."""
-
-    camera: Float[Tensor, "b t h2 w2 d"] | None = None
-    text: Float[Tensor, "b s d"] | None = None
-    text_mask: Bool[Tensor, "b s"] | None = None
-    """True where a text token is real; None when all are."""
-    pooled_text: Float[Tensor, "b d"] | None = None
-    """Added to the embedding of the level."""
-    render_latent: Float[Tensor, "b c t h w"] | None = None
-    """Latent of the render condition, which clean predictions correct."""
-    render_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
 
 
 class TextProjection(nn.Module):
@@ -101,7 +82,10 @@ class VideoDiT(nn.Module):
         text_mask: Bool[Tensor, "b s"] | None = None,
         condition: RenderCondition | None = None,
     ) -> Float[Tensor, "b c t h w"]:
-        """Velocity in one call: ``prepare``, then ``velocity``."""
+        """Velocity in one call: ``prepare``, then ``velocity``.
+
+        A sample without a real token in ``text_mask`` gets the output of one without text.
+        """
         return self.velocity(latent, level, self.prepare(camera, text, text_mask, condition))
 
     def prepare(
@@ -140,7 +124,8 @@ class VideoDiT(nn.Module):
         if mask is None:
             return self.pooled_text(states.mean(1))
         real = mask[..., None].to(states)
-        return self.pooled_text((states * real).sum(1) / real.sum(1).clamp_min(1))
+        mean = (states * real).sum(1) / real.sum(1).clamp_min(1)
+        return self.pooled_text(mean) * mask.any(1, keepdim=True)
 
     def velocity(
         self,

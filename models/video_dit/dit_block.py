@@ -43,7 +43,10 @@ class DitBlock(nn.Module):
         text: Float[Tensor, "b s d"] | None,
         text_mask: Bool[Tensor, "b s"] | None,
     ) -> Float[Tensor, "b t m d"]:
-        """Without ``text`` the cross-attention is not computed at all."""
+        """Without ``text`` the cross-attention is not computed at all.
+
+        Nothing is added to a sample of which ``text_mask`` marks no token as real.
+        """
         shift, scale, gate, ff_shift, ff_scale, ff_gate = (modulation + self.modulation)[
             ..., None, :
         ].unbind(2)
@@ -52,8 +55,19 @@ class DitBlock(nn.Module):
         tokens = tokens + gate * self.attention(modulated, rope=rope).unflatten(1, (frames, -1))
         if text is not None:
             queries = self.text_norm(tokens).flatten(1, 2)
-            tokens = tokens + self.text_attention(queries, context=text, mask=text_mask).unflatten(
-                1, (frames, -1)
-            )
+            tokens = tokens + self._from_text(queries, text, text_mask).unflatten(1, (frames, -1))
         modulated = modulate(self.feedforward_norm(tokens), ff_shift, ff_scale)
         return tokens + ff_gate * self.feedforward(modulated)
+
+    def _from_text(
+        self,
+        queries: Float[Tensor, "b n d"],
+        text: Float[Tensor, "b s d"],
+        mask: Bool[Tensor, "b s"] | None,
+    ) -> Float[Tensor, "b n d"]:
+        if mask is None:
+            return self.text_attention(queries, context=text)
+        has_text = mask.any(1, keepdim=True)
+        # Softmax needs a token even where the result is thrown away.
+        update = self.text_attention(queries, context=text, mask=mask | ~has_text)
+        return update * has_text[..., None]

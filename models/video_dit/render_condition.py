@@ -6,8 +6,6 @@ like this (ViewCrafter, arXiv 2409.02048; GEN3C, arXiv 2503.03751): valid pixels
 input image, all others are to be filled.
 """
 
-from dataclasses import dataclass
-
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -15,16 +13,7 @@ from torch import Tensor, nn
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.patches import fill_first_pack, patchify
 from diff4splat.models.config.networks import TIME_STRIDE, TOKEN_PATCH
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RenderCondition:
-    """A rendered video as the transformer takes it."""
-
-    latent: Float[Tensor, "b c t h w"]
-    """Standardised."""
-    validity: Float[Tensor, "b 1 f hh ww"]
-    """1 where the pixel is visible in the input image, 0 where it is hidden."""
+from diff4splat.models.video_dit.conditions import RenderCondition
 
 
 class RenderConditionEmbedding(nn.Module):

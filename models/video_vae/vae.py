@@ -6,8 +6,6 @@ rows and columns. Video is ``b c t h w`` in [−1, 1]. Latents outside this clas
 is 1.
 """
 
-from dataclasses import dataclass
-
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -17,24 +15,13 @@ from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.config.networks import TIME_STRIDE, VaeConfig
 from diff4splat.models.video_vae.decoder import VaeDecoder
 from diff4splat.models.video_vae.encoder import VaeEncoder
+from diff4splat.models.video_vae.latent_distribution import LatentDistribution
 from diff4splat.models.video_vae.pca_shortcut import PcaShortcut
 
 LOG_VARIANCE_RANGE = (-30.0, 20.0)
 """Clamp that keeps exp() finite in float32 and half precision losses (Stable Diffusion)."""
 FIRST_LOG_VARIANCE = -6.0
 """Initial log-variance with a PCA shortcut, whose latents have variance 1."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LatentDistribution:
-    """Diagonal Gaussian over standardised latents."""
-
-    mean: Float[Tensor, "b c t h w"]
-    log_variance: Float[Tensor, "b c t h w"]
-
-    def sample(self, noise: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b c t h w"]:
-        """Mean plus std times noise, with standard normal ``noise``."""
-        return self.mean + (0.5 * self.log_variance).exp() * noise
 
 
 class VideoVae(nn.Module):

@@ -25,7 +25,16 @@ LAYERS = [  # lower may never import higher; the same row may not import each ot
     {"cli"},
 ]
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row}
-OPTIONAL = ("matplotlib", "gsplat", "mitsuba", "av", "tensorboard")
+OPTIONAL = (
+    "matplotlib",
+    "gsplat",
+    "mitsuba",
+    "av",
+    "tensorboard",
+    "onnx",
+    "fastapi",
+    "uvicorn",
+)
 """Third-party modules that are extras: each may be imported in one file only."""
 
 

@@ -7,11 +7,12 @@ import pytest
 import torch
 
 from diff4splat.models.config.sizes import SIZES, size_by_name
-from diff4splat.models.factory import create_networks, model_parts
+from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.bundled_weights import CARD_FILE, WEIGHTS_FOLDER
 from diff4splat.models.hub.model import load_model
 from diff4splat.models.hub.model_info import model_info
 from diff4splat.models.hub.provenance import NOT_STATED
+from diff4splat.models.networks import model_parts
 
 ROOT = Path(__file__).parents[2]
 FILES = {"config.json", "provenance.json", "SHA256SUMS", CARD_FILE}

@@ -25,8 +25,8 @@ from diff4splat.generation.plan import WORSE_FILL, RequestFacts, plan_generation
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.config.model import Fill
-from diff4splat.models.factory import PARTS
-from diff4splat.models.hub.weights import weights_sha256
+from diff4splat.models.hub.weight_files import weights_sha256
+from diff4splat.models.networks import PARTS
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion

@@ -15,8 +15,8 @@ from diff4splat.io.scene_files.tensor_file import (
     read_tensors,
     write_tensors,
 )
-from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.model import load_model
+from diff4splat.models.networks import model_parts
 from diff4splat.training.latents.latent_shards import read_packs
 
 SHORT = ("--set", "stages.video_diffusion.steps=2")

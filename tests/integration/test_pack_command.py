@@ -11,9 +11,9 @@ from training_commands import refusal
 from diff4splat.cli.main import run
 from diff4splat.io.photos.images import write_png
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import model_parts
 from diff4splat.models.hub.model import load_model
-from diff4splat.models.hub.weights import part_file, weights_sha256
+from diff4splat.models.hub.weight_files import part_file, weights_sha256
+from diff4splat.models.networks import model_parts
 
 PARTS = model_parts(tiny_size())
 STATED = ("--license", "Apache-2.0", "--origin", "made by a test")

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, join_cameras
-from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.models.video_dit.conditions import RenderCondition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.hub.model import Model
 from diff4splat.models.motion_unet.motion_field import masked_offsets, upsample_to_pixels
-from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.models.video_dit.conditions import RenderCondition
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.training.batches.clip_batch import ClipBatch

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from diff4splat.models.factory import Networks
+from diff4splat.models.networks import Networks
 from diff4splat.training.recipe.kinds import StageKind
 from diff4splat.training.stages.kinds.dynamic import DynamicStage
 from diff4splat.training.stages.kinds.joint import JointStage

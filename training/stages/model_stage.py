@@ -9,7 +9,7 @@ from torch import Tensor
 from diff4splat.errors import ConfigError
 from diff4splat.metrics.features.protocol import PerceptualFeatures
 from diff4splat.models.config.model import ModelConfig
-from diff4splat.models.factory import Networks
+from diff4splat.models.networks import Networks
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import Stage
 from diff4splat.training.stages.randomness import StageRandom

@@ -4,7 +4,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.factory import Networks
+from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stages.input_selection import InputSelection
 from diff4splat.training.stages.metrics import reconstruction_metrics

@@ -31,11 +31,11 @@ from diff4splat.models.deformation.keyframes import (
     deformation_state,
     raw_scales,
 )
-from diff4splat.models.factory import Networks
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH, UNSEEN, plane_base
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.networks import Networks
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings

@@ -17,7 +17,7 @@ from diff4splat.flow.path import add_noise
 from diff4splat.models.blocks.patches import fill_first_pack
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
-from diff4splat.models.factory import Networks
+from diff4splat.models.networks import Networks
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.latents.video_latents import camera_rays
 from diff4splat.training.losses.flow_matching import flow_matching

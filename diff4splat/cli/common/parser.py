@@ -6,6 +6,7 @@ import tyro
 
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
+from diff4splat.cli.export_onnx import ExportOnnx
 from diff4splat.cli.fit import Fit
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
@@ -15,7 +16,7 @@ from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSyntheti
 from diff4splat.cli.report import ErrorTime, ListKnobs
 from diff4splat.cli.scenes.bake import Bake
 from diff4splat.cli.scenes.convert import Convert
-from diff4splat.cli.scenes.export import Export, View
+from diff4splat.cli.scenes.export_html import ExportHtml, View
 from diff4splat.cli.scenes.render import Render
 from diff4splat.cli.train import Train
 
@@ -26,6 +27,7 @@ Prepare = (
     | Annotated[PrepareLatents, subcommand("latents")]
     | Annotated[PrepareCheck, subcommand("check")]
 )
+Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
 Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
 Command = (
     Annotated[Generate, subcommand("generate")]
@@ -33,7 +35,7 @@ Command = (
     | Annotated[Render, subcommand("render")]
     | Annotated[Bake, subcommand("bake")]
     | Annotated[Convert, subcommand("convert")]
-    | Annotated[Export, subcommand("export")]
+    | Annotated[Export, subcommand("export", description="Scenes and models for other programs.")]
     | Annotated[View, subcommand("view")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]

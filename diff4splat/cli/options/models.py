@@ -54,3 +54,26 @@ def require_prompt_for(model: str, prompt: str) -> None:
     from diff4splat.models.text_encoder.prompt import require_prompt
 
     require_prompt(prompt, SIZES[model]().text.max_bytes if model in SIZES else sys.maxsize)
+
+
+def require_runtime(model: str, runtime: str | None, device: str) -> None:
+    """Check that the model folder holds what the runtime runs.
+
+    Raises:
+        ConfigError: graphs where weights are asked for, or the other way round, or not on a CPU.
+    """
+    from diff4splat.models.onnx.manifest import has_graphs
+
+    graphs = has_graphs(Path(model))
+    if runtime == "onnx" and not graphs:
+        raise ConfigError(
+            f"--runtime onnx: expected --model with a folder of ONNX graphs, got {model}; "
+            f"write one with diff4splat export onnx --model {model} --out FOLDER"
+        )
+    if runtime == "torch" and graphs:
+        raise ConfigError(
+            f"--runtime torch: expected --model with PyTorch weights, got ONNX graphs in {model}; "
+            "leave out --runtime, or name the model that was exported"
+        )
+    if graphs and device != "cpu":
+        raise ConfigError(f"--device: expected cpu for ONNX graphs, got {device}; use cpu")

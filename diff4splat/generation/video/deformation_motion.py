@@ -15,15 +15,14 @@ from diff4splat.models.deformation.keyframes import (
     keyframe_motion,
     raw_scales,
 )
-from diff4splat.models.deformation.network import DeformationNetwork
-from diff4splat.models.deformation.refined_network import RefinedDeformation
+from diff4splat.models.protocols import DeformationMaps
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.static import StaticMotion
 
 
 def deform(
-    network: DeformationNetwork | RefinedDeformation | None,
+    network: DeformationMaps | None,
     canonical: CanonicalScene,
     key_times_s: Float[Tensor, " k"],
     units: DeformationUnits,
@@ -32,7 +31,7 @@ def deform(
     """Motion of the kept Gaussians; static without a network, or while it is the identity."""
     if network is None:
         return static_over(key_times_s)
-    if network.is_identity:
+    if network.is_identity():
         log.record_skipped(
             "deformation network",
             "its output layers are zero, so nothing can move",

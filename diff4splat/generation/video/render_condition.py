@@ -15,7 +15,7 @@ from diff4splat.generation.layered_image.gaussians import image_gaussians
 from diff4splat.generation.layered_image.types import LayeredImage
 from diff4splat.geometry.camera import Camera
 from diff4splat.models.hub.model import Model
-from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.models.video_dit.conditions import RenderCondition
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings

@@ -15,8 +15,8 @@ from torch import Tensor
 from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.models.video_dit.dit import DitConditions, VideoDiT
-from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.models.protocols import VideoVelocity
+from diff4splat.models.video_dit.conditions import DitConditions, RenderCondition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,7 @@ class VideoSample:
 
 
 def sample_video(
-    dit: VideoDiT,
+    dit: VideoVelocity,
     conditions: Conditions,
     settings: GenerationSettings,
     seed: int,
@@ -72,7 +72,7 @@ def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w
 
 
 def _velocity(
-    dit: VideoDiT, conditions: Conditions, guidance: Guidance, calls: CallCount
+    dit: VideoVelocity, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
     # Cameras and text are embedded once: they are the same at every level.
     embedded = dit.prepare(conditions.plucker, conditions.text, condition=conditions.render)
@@ -82,7 +82,7 @@ def _velocity(
     return guided(_branch(dit, embedded), unconditional, guidance, calls)
 
 
-def _branch(dit: VideoDiT, embedded: DitConditions) -> VelocityFn:
+def _branch(dit: VideoVelocity, embedded: DitConditions) -> VelocityFn:
     def call(state: Tensor, level: float) -> Tensor:
         levels = state.new_full((state.shape[0], state.shape[2]), level)
         levels[:, 0] = 0

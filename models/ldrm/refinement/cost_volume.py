@@ -26,38 +26,39 @@ def cost_volume(
     features: Float[Tensor, "b f c h w"], cameras: Camera, inverse_depths: Float[Tensor, " d"]
 ) -> Float[Tensor, "b k d2 h w"]:
     """Mean, then maximum agreement per depth; ``cameras`` (b, f) are of the cells' size."""
-    keys = range(0, features.shape[1], TIME_STRIDE)
-    return torch.stack([_agreement(features, cameras, inverse_depths, key) for key in keys], 1)
-
-
-def _agreement(
-    features: Tensor, cameras: Camera, inverse_depths: Tensor, key: int
-) -> Float[Tensor, "b d2 h w"]:
-    others = torch.tensor([frame for frame in range(0, features.shape[1], STEP) if frame != key])
-    height, width = features.shape[-2:]
-    if len(others) == 0:
-        shape = (len(features), 2 * len(inverse_depths), height, width)
+    keys = torch.arange(0, features.shape[1], TIME_STRIDE, device=features.device)
+    others = _other_frames(keys, features.shape[1])
+    if others.shape[1] == 0:
+        height, width = features.shape[-2:]
+        shape = (len(features), len(keys), 2 * len(inverse_depths), height, width)
         return features.new_full(shape, UNSEEN)
-    agreement, visible = _compare(features, cameras, inverse_depths, (key, others))
-    count = visible.sum(1)
-    mean = (agreement * visible).sum(1) / count.clamp_min(1)
-    best = agreement.masked_fill(~visible, UNSEEN).amax(1)
-    return torch.cat([torch.where(count > 0, mean, UNSEEN), best], 1)
+    agreement, visible = _compare(features, cameras, inverse_depths, (keys, others))
+    count = visible.sum(2)
+    mean = (agreement * visible).sum(2) / count.clamp_min(1)
+    best = agreement.masked_fill(~visible, UNSEEN).amax(2)
+    return torch.cat([torch.where(count > 0, mean, UNSEEN), best], 2)
+
+
+def _other_frames(keys: Int[Tensor, " k"], frames: int) -> Int[Tensor, "k s"]:
+    """Every second frame but the key frame itself."""
+    slots = STEP * torch.arange((frames - 1) // STEP, device=keys.device)
+    return slots + STEP * (slots >= keys[:, None])
 
 
 def _compare(
     features: Tensor,
     cameras: Camera,
     inverse_depths: Tensor,
-    frames: tuple[int, Int[Tensor, " s"]],
-) -> tuple[Float[Tensor, "b s d h w"], Tensor]:
+    frames: tuple[Int[Tensor, " k"], Int[Tensor, "k s"]],
+) -> tuple[Float[Tensor, "b k s d h w"], Tensor]:
     """Scalar products, and in which frames each point is visible."""
-    key, others = frames
-    reference = features[:, key]
-    count, size = len(others), reference.shape[-2:]
-    source = flat_cameras(camera_frames(cameras, torch.full_like(others, key)))
-    depths = inverse_depths[None, :, None, None].expand(len(reference) * count, -1, *size)
-    pixels, relative = other_pixels(source, flat_cameras(camera_frames(cameras, others)), depths)
-    warped = sampled(features[:, others].flatten(0, 1), pixels).unflatten(0, (-1, count))
-    product = (warped * reference[:, None, :, None]).mean(2)
-    return product, inside(pixels, relative).unflatten(0, (-1, count))
+    keys, others = frames
+    batch, size = features.shape[0], features.shape[-2:]
+    source = flat_cameras(camera_frames(cameras, keys[:, None].expand_as(others).flatten()))
+    other = flat_cameras(camera_frames(cameras, others.flatten()))
+    depths = inverse_depths[None, :, None, None].expand(batch * others.numel(), -1, *size)
+    pixels, relative = other_pixels(source, other, depths)
+    pairs = (batch, *others.shape)
+    warped = sampled(features[:, others.flatten()].flatten(0, 1), pixels).unflatten(0, pairs)
+    product = (warped * features[:, keys, None, :, None]).mean(3)
+    return product, inside(pixels, relative).unflatten(0, pairs)

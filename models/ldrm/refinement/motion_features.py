@@ -12,6 +12,8 @@ so that a point at depth z moves by z · rate per clip, and the colour differenc
 gradient passes.
 """
 
+from collections.abc import Callable
+
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
@@ -35,17 +37,41 @@ CUES = SLOT_CUES * SLOTS + 1
 """Channels appended to the features: those of the slots, then the logarithm of depth."""
 
 
+def track_slot(
+    depth: Float[Tensor, "b k h w"],
+    posed_video: PosedVideo,
+    frames: Int[Tensor, " k"],
+    rate_px: Float[Tensor, "n 2 h w"],
+) -> tuple[Float[Tensor, "n 2 h w"], Float[Tensor, "n 4 h w"]]:
+    """Rate in pixels per frame until ``frames``, initialised with ``rate_px``; and the slot."""
+    source = posed_video.key_rgb.flatten(0, 1).float()
+    elapsed = (frames - posed_video.keys).repeat(depth.shape[0]).to(source)[:, None, None, None]
+    target = _warped_frames(depth, posed_video, frames)
+    flow = track_flow(source, target, rate_px * elapsed)
+    difference = (warp(target, flow) - source).abs().mean(1, keepdim=True)
+    nearest = torch.where(elapsed == 0, 1, elapsed)
+    rate_px = torch.where(elapsed == 0, rate_px, flow / nearest)
+    slot = torch.cat([_rate(rate_px, posed_video), difference / DIFFERENCE_UNIT], 1)
+    return rate_px, slot
+
+
+TrackSlot = Callable[[Tensor, PosedVideo, Tensor, Tensor], tuple[Tensor, Tensor]]
+"""``track_slot``, or a graph of it."""
+
+
 def motion_features(
     features: Float[Tensor, "b k c h4 w4"],
     raw_distance: Float[Tensor, "b k h w"],
     posed_video: PosedVideo,
     config: ActivationConfig,
+    track: TrackSlot = track_slot,
 ) -> Float[Tensor, "b d k h4 w4"]:
     """Features of the key frames, then their motion features."""
     with torch.no_grad(), torch.autocast(features.device.type, enabled=False):
         depth = key_depth(raw_distance, config)
         relative = (depth / PLANE_DEPTH).log()[:, :, None]
-        pixels = torch.cat([warped_flow(depth, posed_video).flatten(2, 3), relative], 2)
+        flow = warped_flow(depth, posed_video, track).flatten(2, 3)
+        pixels = torch.cat([flow, relative], 2)
         cues = torch.nn.functional.avg_pool2d(pixels.flatten(0, 1), CELL_PX)
         cues = cues.unflatten(0, depth.shape[:2])
     return torch.cat([features, cues.to(features.dtype)], 2).transpose(1, 2)
@@ -60,10 +86,10 @@ def key_depth(
 
 
 def warped_flow(
-    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo
+    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo, track: TrackSlot = track_slot
 ) -> Float[Tensor, "b k s 4 h w"]:
     """Rate and difference per pixel and slot; beyond an end, those of the other direction."""
-    later, earlier = (_one_direction(depth, posed_video, sign) for sign in (1, -1))
+    later, earlier = (_one_direction(depth, posed_video, sign, track) for sign in (1, -1))
     last = posed_video.rgb.shape[2] - 1
     ends = [(posed_video.keys == end)[:, None, None, None, None] for end in (last, 0)]
     return torch.cat(
@@ -85,20 +111,15 @@ def keyframe_span(keys: int) -> int:
 
 
 def _one_direction(
-    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo, sign: int
+    depth: Float[Tensor, "b k h w"], posed_video: PosedVideo, sign: int, track: TrackSlot
 ) -> Float[Tensor, "b k s 4 h w"]:
     """Slots at growing distance, each initialised with the velocity of the one before."""
-    source = posed_video.key_rgb.flatten(0, 1).float()
-    rate_px = torch.zeros_like(source[:, :2])
+    rate_px = torch.zeros_like(posed_video.key_rgb[:, :, :2].flatten(0, 1)).float()
     slots = []
     for distance in DISTANCES:
         frames = (posed_video.keys + sign * distance).clamp(0, posed_video.rgb.shape[2] - 1)
-        elapsed = (frames - posed_video.keys).repeat(len(depth)).to(source)[:, None, None, None]
-        target = _warped_frames(depth, posed_video, frames)
-        flow = track_flow(source, target, rate_px * elapsed)
-        difference = (warp(target, flow) - source).abs().mean(1, keepdim=True)
-        rate_px = torch.where(elapsed == 0, rate_px, flow / elapsed)
-        slots.append(torch.cat([_rate(rate_px, posed_video), difference / DIFFERENCE_UNIT], 1))
+        rate_px, slot = track(depth, posed_video, frames, rate_px)
+        slots.append(slot)
     return torch.stack(slots, 1).unflatten(0, depth.shape[:2])
 
 

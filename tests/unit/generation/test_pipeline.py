@@ -14,10 +14,11 @@ from diff4splat.generation.video.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.models.config.sizes import small_size
-from diff4splat.models.factory import PARTS, create_networks
+from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model, with_parts
-from diff4splat.models.hub.weights import weights_sha256
+from diff4splat.models.hub.weight_files import weights_sha256
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.networks import PARTS
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion

@@ -15,7 +15,9 @@ from diff4splat.generation.plan import (
 )
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import size_by_name
-from diff4splat.models.factory import PARTS, model_parts, parameter_counts
+from diff4splat.models.factory import parameter_counts
+from diff4splat.models.hub.model import Model
+from diff4splat.models.networks import PARTS, model_parts
 from diff4splat.progress.run_log import RunLog
 
 VIDEO = frozenset(FILL_PARTS)
@@ -111,7 +113,7 @@ def test_the_log_says_why_a_network_does_not_run(
     request_: dict, trained: tuple[str, ...], part: str, why: str, error: float | None
 ) -> None:
     log = RunLog()
-    planned("small", trained, request_).record(config(), log)
+    planned("small", trained, request_).record(Model(config=config()), log)
     (entry,) = [entry for entry in log.skipped if entry.what == part]
     assert (entry.why, entry.error) == (why, error)
     assert entry.saved == f"{parameter_counts(config())[part]:,} weights neither loaded nor run"

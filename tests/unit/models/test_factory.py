@@ -7,13 +7,8 @@ from torch import nn
 
 from diff4splat.models.config.sizes import SIZES, paper_size, size_by_name, small_size
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import (
-    PARTS,
-    Networks,
-    create_networks,
-    model_parts,
-    parameter_counts,
-)
+from diff4splat.models.factory import create_networks, parameter_counts
+from diff4splat.models.networks import PARTS, Networks, model_parts
 
 
 def weights(part: nn.Module) -> torch.Tensor:
@@ -78,7 +73,7 @@ def test_no_parts_are_no_networks() -> None:
 
 def test_fresh_networks_are_the_identity() -> None:
     networks = create_networks(tiny_size())
-    assert networks.deformation.is_identity
+    assert networks.deformation.is_identity()
     maps = networks.ldrm(torch.randn(1, 4, 2, 2, 2), torch.randn(1, 6, 5, 16, 16))
     assert not maps.gaussians.any()
 

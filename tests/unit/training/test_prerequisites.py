@@ -13,7 +13,8 @@ from stage_fixtures import SquaredDifference
 from diff4splat.configs.recipes import RECIPES, recipe_by_name
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError
 from diff4splat.models.config.model import MonocularDepthConfig
-from diff4splat.models.factory import create_networks, model_parts
+from diff4splat.models.factory import create_networks
+from diff4splat.models.networks import model_parts
 from diff4splat.training.latent_statistics import FILE, read_statistics
 from diff4splat.training.prerequisites import (
     continued_stage,

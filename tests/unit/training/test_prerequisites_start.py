@@ -14,8 +14,9 @@ from torch import nn
 from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.models.config.model import MonocularDepthConfig
-from diff4splat.models.factory import create_networks, model_parts
+from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model, load_model
+from diff4splat.models.networks import model_parts
 from diff4splat.training.prerequisites import (
     continued_stage,
     last_checkpoint,

@@ -13,8 +13,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.config.model import ModelConfig
-from diff4splat.models.factory import Networks
 from diff4splat.models.hub.model import Model
+from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.latents.video_latents import encode_batch

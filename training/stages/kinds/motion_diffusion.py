@@ -15,7 +15,7 @@ from torch import Tensor
 
 from diff4splat.flow.path import add_noise, velocity_from_clean
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.factory import Networks
+from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.random_flip import flip_samples
 from diff4splat.training.losses.flow_matching import flow_matching

@@ -22,9 +22,9 @@ from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import camera_rays
 from diff4splat.models.config.model import Fill, ModelConfig
 from diff4splat.models.config.sizes import size_by_name, small_size
-from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.provenance import ModelProvenance, write_provenance
-from diff4splat.models.hub.weights import CONFIG_FILE
+from diff4splat.models.hub.weight_files import CONFIG_FILE
+from diff4splat.models.networks import PARTS
 
 
 def folder_of(folder: Path, config: ModelConfig, *trained: str) -> str:

@@ -10,7 +10,8 @@ from diff4splat.flow.guidance import Guidance
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_sampling import Conditions, initial_noise, sample_video
 from diff4splat.models.config.sizes import size_by_name
-from diff4splat.models.video_dit.dit import DitConditions, VideoDiT
+from diff4splat.models.video_dit.conditions import DitConditions
+from diff4splat.models.video_dit.dit import VideoDiT
 
 STEPS = 8
 

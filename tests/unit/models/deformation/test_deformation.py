@@ -29,7 +29,7 @@ def test_shapes(stride: int, frames: int) -> None:
 
 def test_fresh_network_is_the_identity() -> None:
     network = DeformationNetwork(tiny_size())
-    assert network.is_identity
+    assert network.is_identity()
     assert not network(torch.randn(1, 24, 2, 2, 2), torch.tensor([0.7])).any()
 
 
@@ -39,7 +39,7 @@ def test_any_weight_in_a_last_layer_ends_the_identity(level: int, name: str) -> 
     network = DeformationNetwork(tiny_size())
     with torch.no_grad():
         getattr(network.heads[level], name).view(-1)[-1] = 1e-20
-    assert not network.is_identity
+    assert not network.is_identity()
 
 
 def test_trained_network_moves_differently_at_other_times() -> None:

@@ -6,7 +6,7 @@ from packed_models import packed_folder
 
 from diff4splat.errors import FileFormatError
 from diff4splat.models.hub.checksums import SUMS_FILE, require_complete
-from diff4splat.models.hub.weights import part_file
+from diff4splat.models.hub.weight_files import part_file
 
 ADVICE = "do it again"
 

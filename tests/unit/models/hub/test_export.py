@@ -9,7 +9,7 @@ from safetensors.torch import load_file
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.models.hub.export import Packed, export_model
 from diff4splat.models.hub.model import Model, load_model
-from diff4splat.models.hub.weights import part_file, weights_sha256
+from diff4splat.models.hub.weight_files import part_file, weights_sha256
 
 FILES = {"config.json", "provenance.json", "SHA256SUMS"}
 

@@ -9,14 +9,14 @@ from packed_models import TRAINED, packed_folder, ship, trained_folder
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.models.config.sizes import small_size
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import model_parts
 from diff4splat.models.hub import bundled_weights
 from diff4splat.models.hub.checksums import write_sums
 from diff4splat.models.hub.folders import checked_folder, find_config, find_provenance
 from diff4splat.models.hub.model import load_model
 from diff4splat.models.hub.model_info import model_info
 from diff4splat.models.hub.provenance import ModelProvenance
-from diff4splat.models.hub.weights import part_file, weights_sha256
+from diff4splat.models.hub.weight_files import part_file, weights_sha256
+from diff4splat.models.networks import model_parts
 
 
 def test_a_model_folder_of_that_name_comes_first(

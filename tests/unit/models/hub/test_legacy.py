@@ -17,13 +17,13 @@ from torch import Tensor
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import plucker_map
-from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.checksums import write_sums
 from diff4splat.models.hub.model import Model, load_model, save_model
 from diff4splat.models.hub.model_info import model_info
-from diff4splat.models.hub.weights import part_file
+from diff4splat.models.hub.weight_files import part_file
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
-from diff4splat.models.video_dit.render_condition import RenderCondition
+from diff4splat.models.networks import PARTS
+from diff4splat.models.video_dit.conditions import RenderCondition
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "model_v1"
 FRAMES, SIDE_PX = 5, 32

@@ -12,11 +12,12 @@ from torch import nn
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError, OutputError
 from diff4splat.models.config.sizes import paper_size
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import Networks, create_networks, model_parts
+from diff4splat.models.factory import create_networks
 from diff4splat.models.hub import bundled_weights
 from diff4splat.models.hub.checksums import write_sums
 from diff4splat.models.hub.model import Model, load_model, model_device, save_model, with_parts
-from diff4splat.models.hub.weights import part_file, weights_sha256
+from diff4splat.models.hub.weight_files import part_file, weights_sha256
+from diff4splat.models.networks import Networks, model_parts
 
 PARTS = model_parts(tiny_size())
 

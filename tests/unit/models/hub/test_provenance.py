@@ -4,7 +4,6 @@ from pathlib import Path
 import pytest
 
 from diff4splat.errors import CheckpointError
-from diff4splat.models.factory import PARTS
 from diff4splat.models.hub.provenance import (
     NOT_STATED,
     PROVENANCE_FILE,
@@ -12,6 +11,7 @@ from diff4splat.models.hub.provenance import (
     read_provenance,
     write_provenance,
 )
+from diff4splat.models.networks import PARTS
 
 
 def written(folder: Path, content: object) -> Path:

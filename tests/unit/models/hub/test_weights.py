@@ -7,14 +7,10 @@ from safetensors.torch import load_file, save_file
 
 from diff4splat.errors import CheckpointError, ConfigError, FileFormatError, OutputError
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import Networks, create_networks
-from diff4splat.models.hub.weights import (
-    load_config,
-    load_networks,
-    part_file,
-    save_networks,
-    weights_sha256,
-)
+from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.weight_files import load_config, part_file, weights_sha256
+from diff4splat.models.hub.weights import load_networks, save_networks
+from diff4splat.models.networks import Networks
 
 
 @pytest.fixture

@@ -4,14 +4,8 @@ import torch
 
 from diff4splat.errors import InputError
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.text_encoder.encoder import (
-    BEGIN,
-    END,
-    PAD,
-    TextEncoder,
-    distance_buckets,
-    tokenize,
-)
+from diff4splat.models.text_encoder.encoder import TextEncoder, distance_buckets, tokenize
+from diff4splat.models.text_encoder.prompt import BEGIN, END, PAD
 
 CONFIG = tiny_size().text
 

@@ -6,7 +6,8 @@ from oracles_models import packed_frames, patches, randomised
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.models.video_dit.render_condition import RenderCondition, RenderConditionEmbedding
+from diff4splat.models.video_dit.conditions import RenderCondition
+from diff4splat.models.video_dit.render_condition import RenderConditionEmbedding
 
 CHANNELS, WIDTH = 3, 5
 SIDE_PX = 4

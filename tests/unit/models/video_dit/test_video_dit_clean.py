@@ -14,8 +14,8 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_sampling import Conditions, sample_video
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.video_dit.conditions import RenderCondition
 from diff4splat.models.video_dit.dit import VideoDiT
-from diff4splat.models.video_dit.render_condition import RenderCondition
 
 SHAPE = (1, 4, 3, 4, 4)
 

@@ -5,7 +5,8 @@ from oracles_models import randomised
 from diff4splat.errors import ShapeError
 from diff4splat.models.config.model import VaeConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.video_vae.vae import LatentDistribution, VideoVae
+from diff4splat.models.video_vae.latent_distribution import LatentDistribution
+from diff4splat.models.video_vae.vae import VideoVae
 
 
 @pytest.fixture(scope="module")

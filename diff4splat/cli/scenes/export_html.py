@@ -3,7 +3,7 @@
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
@@ -14,11 +14,9 @@ PAGE_SUFFIXES = (".html", ".htm")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export:
+class ExportHtml:
     """Write a scene as one HTML page that plays it, without a server or a network."""
 
-    format: Annotated[Literal["html"], tyro.conf.Positional]
-    """What to write."""
     scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene or checkpoint")]
     """A scene file, a folder with one, a 4DGaussians model folder, or a checkpoint (.pth) of native
     4D Gaussians."""

@@ -1,0 +1,55 @@
+"""``diff4splat export onnx``: a model as ONNX graphs."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from diff4splat.cli.options.constraints import OutFolder
+from diff4splat.cli.options.models import ModelName
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOnnx:
+    """Write every network of a model as ONNX graphs, with a manifest and a parity report.
+
+    `diff4splat generate --model OUT` then runs them with ONNX Runtime.
+    """
+
+    out: OutFolder
+    """Folder for the graphs."""
+    model: Annotated[str, ModelName()] = "small"
+    """Model folder, or a size: test, small or paper. A size takes its bundled weights, or random
+    ones."""
+    precision: Literal["float32", "float16", "int8", "int8-dynamic"] = "float32"
+    """float16 computes in half precision; int8 stores weights in a quarter of the size;
+    int8-dynamic also multiplies matrices in int8."""
+    shapes_only: bool = False
+    """Write graphs without weights; allocates nothing, so paper works on any machine."""
+    triton: bool = False
+    """Also write a model repository for Triton Inference Server: OUT/triton."""
+    skip_parity: bool = False
+    """Do not compare ONNX Runtime with PyTorch."""
+
+    def run(self) -> None:
+        """Export, compare, say where it is."""
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.models.hub.model import load_model
+        from diff4splat.models.onnx_export.export import require_exporter
+        from diff4splat.models.onnx_export.folder import (
+            ExportSettings,
+            export_model,
+            graph_names,
+        )
+
+        require_exporter()
+        settings = ExportSettings(
+            precision=self.precision,
+            shapes_only=self.shapes_only,
+            parity=not self.skip_parity,
+            triton=self.triton,
+        )
+        model = load_model(self.model, parts=())
+        with ConsolePhases().phase("export graphs", len(graph_names(model))) as advance:
+            rows = export_model(model, self.out, settings, advance)
+        for row in rows:
+            note(f"{row.graph}: relative error {max(row.errors.values()):.1e}")
+        note(f"wrote {self.out}; diff4splat generate PHOTO --model {self.out} runs it")

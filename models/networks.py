@@ -1,0 +1,55 @@
+"""The networks of a model by name; none of their code is imported here."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import torch
+
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.protocols import (
+    DeformationMaps,
+    DepthPrior,
+    GaussianMaps,
+    MotionPrior,
+    PromptEncoder,
+    VideoCodec,
+    VideoVelocity,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Networks:
+    """The networks of one model; None for parts that are not loaded, or that the model lacks."""
+
+    vae: VideoCodec | None = None
+    text_encoder: PromptEncoder | None = None
+    dit: VideoVelocity | None = None
+    ldrm: GaussianMaps | None = None
+    deformation: DeformationMaps | None = None
+    monocular_depth: DepthPrior | None = None
+    motion_unet: MotionPrior | None = None
+
+    def parts(self) -> list[tuple[str, Any]]:
+        """(name, network) of the parts that exist."""
+        named = [(field.name, getattr(self, field.name)) for field in fields(self)]
+        return [(name, part) for name, part in named if part is not None]
+
+    def to(self, target: torch.device | torch.dtype) -> "Networks":
+        """Move or cast every part, in place."""
+        for _, part in self.parts():
+            part.to(target)
+        return self
+
+
+PARTS = tuple(field.name for field in fields(Networks))
+"""Names of the networks, in the order of their random streams."""
+
+
+def model_parts(config: ModelConfig) -> tuple[str, ...]:
+    """The parts that a model of this configuration has."""
+    absent = set()
+    if not config.monocular_depth.used:
+        absent.add("monocular_depth")
+    if not config.motion_unet.used:
+        absent.add("motion_unet")
+    return tuple(part for part in PARTS if part not in absent)

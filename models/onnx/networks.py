@@ -1,0 +1,46 @@
+"""A folder of ONNX graphs as the networks of a model."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+from diff4splat.models.hub.weight_files import load_config
+from diff4splat.models.networks import Networks
+from diff4splat.models.onnx.adapters import (
+    OnnxDeformation,
+    OnnxDepth,
+    OnnxDit,
+    OnnxLdrm,
+    OnnxMotion,
+    OnnxTextEncoder,
+    OnnxVae,
+)
+from diff4splat.models.onnx.graph import OnnxModel
+
+ADAPTERS = {
+    "vae": OnnxVae,
+    "text_encoder": OnnxTextEncoder,
+    "dit": OnnxDit,
+    "ldrm": OnnxLdrm,
+    "deformation": OnnxDeformation,
+    "monocular_depth": OnnxDepth,
+    "motion_unet": OnnxMotion,
+}
+FEW_THREADS = ("text_encoder", "monocular_depth", "motion_unet")
+"""One thread: these decide about a scene by thresholds, and must not depend on the machine."""
+
+
+def onnx_networks(folder: Path, parts: Collection[str]) -> Networks:
+    """``parts`` of the model in ``folder``, every graph compared with the manifest.
+
+    Raises:
+        FileFormatError: a graph is absent, damaged, or not the one that was exported.
+    """
+    config = load_config(folder)
+    one, many = OnnxModel(folder, threads=1), OnnxModel(folder)
+    chosen = {}
+    for part in parts:
+        model = one if part in FEW_THREADS else many
+        for entry in model.manifest.of_part(part):
+            model[entry.name]
+        chosen[part] = ADAPTERS[part](model, config)
+    return Networks(**chosen)

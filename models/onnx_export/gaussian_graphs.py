@@ -1,0 +1,161 @@
+"""Graphs of LDRM and the deformation network.
+
+With refinement, optical flow has a graph of its own: one call per direction and distance in time,
+each initialised with the result of the one before.
+"""
+
+from torch import Tensor, nn
+
+from diff4splat.geometry.camera import Camera
+from diff4splat.models.blocks.conv_block import CELL_PX
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.networks import (
+    DEFORMATION_SPLIT,
+    GAUSSIAN_SPLIT,
+    TIME_STRIDE,
+    TOKEN_PATCH,
+)
+from diff4splat.models.ldrm.refinement.decoder import widths
+from diff4splat.models.ldrm.refinement.motion_features import CUES, SLOT_CUES, track_slot
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.onnx.manifest import TensorSpec
+from diff4splat.models.onnx.shapes import Axis
+from diff4splat.models.onnx_export.source import (
+    GraphSource,
+    InputSource,
+    TensorFunction,
+    integers,
+    normal,
+    output,
+    pixels,
+    poses,
+    positive,
+    unit,
+)
+
+FRAMES: Axis = f"{TIME_STRIDE}*packs+1"
+KEYS: Axis = "packs+1"
+
+
+def ldrm_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """Raw maps, and with refinement the optical flow of one slot."""
+    refined = config.refinement.used
+    posed = refined or config.ldrm.input == "frames"
+    size = _pixels(config)
+    cells = (f"{TOKEN_PATCH}*rows", f"{TOKEN_PATCH}*columns")
+
+    def maps(ldrm: nn.Module, latent: Tensor, camera: Tensor, *video: Tensor) -> tuple[Tensor, ...]:
+        found = ldrm(latent, camera, posed_video(*video) if video else None, moving=False)
+        states = (found.gaussians, found.tokens, found.border)
+        return tuple(tensor for tensor in states if tensor is not None)
+
+    graph = GraphSource(
+        name="ldrm",
+        part="ldrm",
+        module=TensorFunction(network, maps),
+        inputs=(
+            normal("latent", "batch", config.vae.latent_channels, KEYS, *cells),
+            normal("camera", "batch", 6, FRAMES, *size),
+            *(posed_sources(config) if posed else ()),
+        ),
+        outputs=_map_outputs(config),
+    )
+    return [graph, _optical_flow(config)] if refined else [graph]
+
+
+def deformation_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """Raw deformation of every Gaussian at one time."""
+    channels = sum(DEFORMATION_SPLIT)
+    if config.refinement.used:
+        keys, stride = "frames", config.token_px // CELL_PX
+        tokens = (widths(config.refinement.channels)[0] + CUES, keys)
+        raw = output("raw", "batch", channels, keys, *_pixels(config))
+        cells = (f"{stride}*rows", f"{stride}*columns")
+    else:
+        tokens, cells = (config.ldrm.width, KEYS), ("rows", "columns")
+        raw = output("raw", "batch", channels, FRAMES, *_grid(config))
+    return [
+        GraphSource(
+            name="deformation",
+            part="deformation",
+            module=TensorFunction(network, lambda deform, *inputs: (deform(*inputs),)),
+            inputs=(normal("tokens", "batch", *tokens, *cells), unit("time", "batch")),
+            outputs=(raw,),
+        )
+    ]
+
+
+def posed_video(rgb: Tensor, focal_px: Tensor, center_px: Tensor, pose: Tensor) -> PosedVideo:
+    """A video from the tensors of ``posed_sources``."""
+    cameras = Camera(
+        focal_px=focal_px,
+        center_px=center_px,
+        world_from_camera=pose,
+        size_px=tuple(rgb.shape[3:]),
+    )
+    return PosedVideo(rgb=rgb, cameras=cameras)
+
+
+def posed_sources(config: ModelConfig) -> tuple[InputSource, ...]:
+    """Frames in [0, 1] and their cameras."""
+    return (
+        unit("rgb", "batch", 3, FRAMES, *_pixels(config)),
+        pixels("focal_px", "batch", FRAMES, 2),
+        pixels("center_px", "batch", FRAMES, 2),
+        poses("world_from_camera", "batch", FRAMES, 4, 4),
+    )
+
+
+def _map_outputs(config: ModelConfig) -> tuple[TensorSpec, ...]:
+    channels = sum(GAUSSIAN_SPLIT)
+    if not config.refinement.used:
+        return (
+            output("gaussians", "batch", channels, FRAMES, *_grid(config)),
+            output("tokens", "batch", config.ldrm.width, KEYS, "rows", "columns"),
+        )
+    side, margin = config.token_px // CELL_PX, 2 * config.refinement.border_cells
+    cells = (f"{side}*rows", f"{side}*columns")
+    width = widths(config.refinement.channels)[0]
+    border = output("border", "batch", channels, *(f"{axis}+{margin}" for axis in cells))
+    return (
+        output("gaussians", "batch", channels, KEYS, *_pixels(config)),
+        output("tokens", "batch", width, KEYS, *cells),
+        *((border,) if margin else ()),
+    )
+
+
+def _optical_flow(config: ModelConfig) -> GraphSource:
+    def track(
+        _: nn.Module, depth: Tensor, frames: Tensor, rate_px: Tensor, *video: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        found = track_slot(depth, posed_video(*video), frames, rate_px.flatten(0, 1))
+        batch = depth.shape[0]
+        return tuple(maps.unflatten(0, (batch, -1)) for maps in found)
+
+    size = _pixels(config)
+    rate = ("batch", KEYS, 2, *size)
+    return GraphSource(
+        name="ldrm_optical_flow",
+        part="ldrm",
+        module=TensorFunction(nn.Identity(), track),
+        inputs=(
+            positive("depth", "batch", KEYS, *size),
+            integers("frames", 1, KEYS),
+            normal("rate_px", *rate),
+            *posed_sources(config),
+        ),
+        outputs=(
+            output("next_rate_px", *rate),
+            output("slot", "batch", KEYS, SLOT_CUES, *size),
+        ),
+    )
+
+
+def _pixels(config: ModelConfig) -> tuple[Axis, Axis]:
+    return f"{config.token_px}*rows", f"{config.token_px}*columns"
+
+
+def _grid(config: ModelConfig) -> tuple[Axis, Axis]:
+    """The grid of Gaussians."""
+    side = config.token_px // config.ldrm.grid_stride
+    return f"{side}*rows", f"{side}*columns"

@@ -1,0 +1,75 @@
+"""Graphs of the text encoder, the depth prior and the motion prior."""
+
+from torch import Tensor, nn
+
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.networks import MOTION_CELL_PX
+from diff4splat.models.monocular_depth.network import MULTIPLE_PX as DEPTH_MULTIPLE_PX
+from diff4splat.models.motion_unet.unet import MULTIPLE_PX as MOTION_MULTIPLE_PX
+from diff4splat.models.onnx_export.source import (
+    GraphSource,
+    TensorFunction,
+    integers,
+    mask,
+    normal,
+    output,
+    unit,
+)
+from diff4splat.models.text_encoder.prompt import VOCABULARY
+
+
+def text_encoder_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """Tokens of prompts to states."""
+    return [
+        GraphSource(
+            name="text_encoder",
+            part="text_encoder",
+            module=TensorFunction(network, lambda encoder, *inputs: (encoder(*inputs),)),
+            inputs=(
+                integers("tokens", VOCABULARY, "batch", "tokens"),
+                mask("mask", "batch", "tokens"),
+            ),
+            outputs=(output("states", "batch", "tokens", config.text.width),),
+        )
+    ]
+
+
+def monocular_depth_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """An image to the raw ray distance of its pixels."""
+    del config
+    size = (f"{DEPTH_MULTIPLE_PX}*rows", f"{DEPTH_MULTIPLE_PX}*columns")
+    return [
+        GraphSource(
+            name="monocular_depth",
+            part="monocular_depth",
+            module=TensorFunction(network, lambda depth, image: (depth(image),)),
+            inputs=(unit("image", "batch", 3, *size),),
+            outputs=(output("raw_distance", "batch", 1, *size),),
+        )
+    ]
+
+
+def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """An image, noisy motion and text to clean motion and to the logits of the motion mask."""
+    size = (f"{MOTION_MULTIPLE_PX}*rows", f"{MOTION_MULTIPLE_PX}*columns")
+    side = MOTION_MULTIPLE_PX // MOTION_CELL_PX
+    motion = ("batch", 3, "frames", f"{side}*rows", f"{side}*columns")
+    return [
+        GraphSource(
+            name="motion_unet",
+            part="motion_unet",
+            module=TensorFunction(network, _motion_and_mask),
+            inputs=(
+                unit("image", "batch", 3, *size),
+                normal("noisy", *motion),
+                unit("level", "batch"),
+                normal("text", "batch", "tokens", config.text.width),
+                mask("text_mask", "batch", "tokens"),
+            ),
+            outputs=(output("motion", *motion), output("mask_logits", "batch", *size)),
+        )
+    ]
+
+
+def _motion_and_mask(network: nn.Module, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+    return network.predict_motion_and_mask(*inputs)

@@ -1,0 +1,35 @@
+"""Conditions of the video model, before and after they are embedded.
+
+Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and columns, ``f hh ww``
+video frames and pixels, ``h2 w2`` tokens, ``d`` width, ``s`` text tokens.
+"""
+
+from dataclasses import dataclass
+
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderCondition:
+    """A rendered video as the transformer takes it."""
+
+    latent: Float[Tensor, "b c t h w"]
+    """Standardised."""
+    validity: Float[Tensor, "b 1 f hh ww"]
+    """1 where the pixel is visible in the input image, 0 where it is hidden."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DitConditions:
+    """Embedded conditions, the same at all noise levels of a generation; None is skipped."""
+
+    camera: Float[Tensor, "b t h2 w2 d"] | None = None
+    text: Float[Tensor, "b s d"] | None = None
+    text_mask: Bool[Tensor, "b s"] | None = None
+    """True where a text token is real; None when all are."""
+    pooled_text: Float[Tensor, "b d"] | None = None
+    """Added to the embedding of the level."""
+    render_latent: Float[Tensor, "b c t h w"] | None = None
+    """Latent of the render condition, which clean predictions correct."""
+    render_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
