@@ -20,8 +20,8 @@ class ExportOnnx:
     """Model folder, or a size: test, small or paper. A size takes its bundled weights, or random
     ones."""
     precision: Literal["float32", "float16", "int8", "int8-dynamic"] = "float32"
-    """float16 computes in half precision; int8 stores weights in a quarter of the size;
-    int8-dynamic also multiplies matrices in int8."""
+    """float16 and int8 store weights in a half and a quarter of the size; int8-dynamic also
+    multiplies matrices in int8."""
     shapes_only: bool = False
     """Write graphs without weights; allocates nothing, so paper works on any machine."""
     triton: bool = False

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from diff4splat.generation.settings import GenerationSettings
     from diff4splat.outputs.card import Result
     from diff4splat.paths.camera_path import CameraPath
+    from diff4splat.progress.phases import Phases
     from diff4splat.progress.run_log import RunLog
     from diff4splat.scene.scene import Scene
 
@@ -127,8 +128,8 @@ class Generate:
         self.check_photo()
         self.run_one()
 
-    def run_one(self) -> None:
-        """Generate, render and write."""
+    def run_one(self, phases: "Phases | None" = None) -> None:
+        """Generate, render and write; ``phases`` report instead of progress bars."""
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.options.device import require_device
         from diff4splat.generation.pipeline import Diff4SplatPipeline
@@ -137,7 +138,7 @@ class Generate:
         from diff4splat.outputs.file_names import OUTPUT_FILES
         from diff4splat.progress.run_log import RunLog
 
-        settings, log = self.settings(), RunLog(phases=ConsolePhases())
+        settings, log = self.settings(), RunLog(phases=phases or ConsolePhases())
         device = require_device(self.device)
         input_image, path = self.read_inputs()
         with atomic_folder(self.out, OUTPUT_FILES) as folder:

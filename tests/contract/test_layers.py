@@ -21,7 +21,7 @@ LAYERS = [  # lower may never import higher; the same row may not import each ot
     {"generation", "error_time"},
     {"training"},
     {"fitting", "evaluation"},
-    {"configs"},
+    {"configs", "serving"},
     {"cli"},
 ]
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row}
@@ -32,7 +32,6 @@ OPTIONAL = (
     "av",
     "tensorboard",
     "onnx",
-    "fastapi",
     "uvicorn",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
@@ -96,8 +95,18 @@ def test_an_optional_dependency_is_imported_in_at_most_one_file(package: str) ->
     assert len(users) <= 1, f"{package} is imported in {users}"
 
 
+@pytest.mark.parametrize("package", ["fastapi", "starlette", "uvicorn", "prometheus_client"])
+def test_the_web_framework_is_imported_in_one_folder(package: str) -> None:
+    for _, path in source_files():
+        if package in {name.split(".")[0] for name in imported_modules(path)}:
+            assert path.parent == ROOT / "diff4splat" / "serving" / "api"
+
+
 def test_no_network_library_and_no_torchvision_anywhere() -> None:
     banned = {"torchvision", "requests", "urllib", "http", "socket", "pickle"}
     for _, path in source_files():
         found = {name.split(".")[0] for name in imported_modules(path)} & banned
+        # The server listens there; nothing connects to anything.
+        if path == ROOT / "diff4splat" / "serving" / "api" / "run.py":
+            found.discard("socket")
         assert not found, f"{path.relative_to(ROOT)} imports {found}"

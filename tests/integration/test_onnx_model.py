@@ -48,7 +48,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     with torch.no_grad():
         for _, part in noisy.networks.parts():
             for weight in part.parameters():
-                weight += 0.05 * torch.randn(weight.shape, generator=generator)
+                weight.add_(torch.randn(weight.shape, generator=generator), alpha=0.05)
     folder = tmp_path_factory.mktemp("model")
     save_model(noisy, folder)
     return load_model(folder)
@@ -189,7 +189,7 @@ def test_shapes_that_the_network_refuses_are_refused(exported: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("precision", "tolerance"), [("float16", 2e-2), ("int8", 0.1), ("int8-dynamic", 0.3)]
+    ("precision", "tolerance"), [("float16", 5e-3), ("int8", 0.1), ("int8-dynamic", 0.3)]
 )
 def test_fewer_bits(
     exported: Path, sources: list[GraphSource], tmp_path: Path, precision: str, tolerance: float

@@ -18,6 +18,7 @@ from diff4splat.cli.scenes.bake import Bake
 from diff4splat.cli.scenes.convert import Convert
 from diff4splat.cli.scenes.export_html import ExportHtml, View
 from diff4splat.cli.scenes.render import Render
+from diff4splat.cli.serve import Serve
 from diff4splat.cli.train import Train
 
 subcommand = tyro.conf.subcommand
@@ -37,6 +38,7 @@ Command = (
     | Annotated[Convert, subcommand("convert")]
     | Annotated[Export, subcommand("export", description="Scenes and models for other programs.")]
     | Annotated[View, subcommand("view")]
+    | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]

@@ -1,0 +1,1 @@
+"""Generation over HTTP: a queue of jobs, worker processes, and the graphs of an ONNX model."""

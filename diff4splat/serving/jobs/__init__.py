@@ -1,0 +1,1 @@
+"""Jobs: what was asked for, their states, and where their files lie."""

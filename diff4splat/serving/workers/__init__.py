@@ -1,0 +1,1 @@
+"""Worker processes: one generation each, started before it is needed."""
