@@ -1,5 +1,6 @@
 """Jobs over HTTP, with workers that only echo: every state, every limit, every refusal."""
 
+import asyncio
 import io
 import time
 from collections.abc import Callable, Iterator
@@ -7,10 +8,12 @@ from pathlib import Path
 
 import pytest
 from echo_server import WORKER, settings
+from fastapi import HTTPException, Request
 from fastapi.testclient import TestClient
 from PIL import Image
 
 from diff4splat.serving.api.app import create_app
+from diff4splat.serving.api.photo import read_body
 
 WAIT_S = 60.0
 
@@ -222,3 +225,15 @@ def test_metrics_and_page(start: Start) -> None:
     assert "frame-ancestors 'none'" in page.headers["content-security-policy"]
     assert client.get("/v2").json()["name"] == "diff4splat"
     assert client.get("/openapi.json").status_code == 200
+
+
+def test_a_body_that_never_ends_is_given_up() -> None:
+    scope = {"type": "http", "method": "POST", "headers": [], "path": "/v1/jobs"}
+
+    async def slow() -> dict:
+        await asyncio.sleep(0.05)
+        return {"type": "http.request", "body": b"x", "more_body": True}
+
+    with pytest.raises(HTTPException) as refused:
+        asyncio.run(read_body(Request(scope, slow), 1_000, 0.1))
+    assert refused.value.status_code == 408
