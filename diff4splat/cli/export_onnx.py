@@ -52,4 +52,7 @@ class ExportOnnx:
             rows = export_model(model, self.out, settings, advance)
         for row in rows:
             note(f"{row.graph}: relative error {max(row.errors.values()):.1e}")
-        note(f"wrote {self.out}; diff4splat generate PHOTO --model {self.out} runs it")
+        use = f"diff4splat generate PHOTO --model {self.out} runs it"
+        note(
+            f"wrote {self.out}; " + ("shapes alone, which cannot run" if self.shapes_only else use)
+        )

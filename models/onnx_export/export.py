@@ -39,7 +39,8 @@ def export_graph(source: GraphSource, file: Path, *, weights: bool = True) -> No
 
     Without ``weights`` the file holds shapes alone.
     """
-    inputs = source.examples(source.traced_sizes())
+    device = next(source.module.parameters(), torch.empty(0)).device
+    inputs = tuple(tensor.to(device) for tensor in source.examples(source.traced_sizes()))
     with torch.no_grad(), _quiet():
         program = torch.onnx.export(
             source.module.eval(),
@@ -49,6 +50,8 @@ def export_graph(source: GraphSource, file: Path, *, weights: bool = True) -> No
             dynamic_shapes=(tuple(_dynamic_axes(source)),),
             input_names=[entry.spec.name for entry in source.inputs],
             verbose=False,
+            # Constants cannot be folded where there are no values.
+            optimize=weights,
         )
     _forget_origin(program.model)
     _name_outputs(program.model.graph, [spec.name for spec in source.outputs])

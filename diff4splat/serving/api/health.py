@@ -13,6 +13,7 @@ from prometheus_client import (
     generate_latest,
 )
 
+from diff4splat.serving.api.graphs import EXTENSIONS
 from diff4splat.serving.api.state import Server, ServerState
 from diff4splat.serving.jobs.job import ENDED, State
 from diff4splat.serving.workers.worker import resident_bytes
@@ -73,7 +74,11 @@ def health_router(metrics: Metrics) -> APIRouter:
     @router.get("/v2")
     async def describe_server() -> dict[str, object]:
         """Name and version, as the inference protocol asks."""
-        return {"name": "diff4splat", "version": version("diff4splat"), "extensions": []}
+        return {
+            "name": "diff4splat",
+            "version": version("diff4splat"),
+            "extensions": list(EXTENSIONS),
+        }
 
     @router.get("/metrics", response_class=Response)
     async def read_metrics() -> Response:

@@ -118,3 +118,39 @@ def test_bodies_are_refused(client: TestClient, body: bytes) -> None:
 
 def test_a_long_body_is_refused(client: TestClient) -> None:
     assert client.post("/v2/models/double/infer", content=b" " * 10_000).status_code == 413
+
+
+def post_bytes(
+    client: TestClient, content: bytes, size: int | None, **parameters: object
+) -> object:
+    import json
+
+    inputs = tensor(data=None, parameters={"binary_data_size": size})
+    text = json.dumps({"inputs": [inputs], "parameters": parameters}).encode()
+    headers = {"Inference-Header-Content-Length": str(len(text))}
+    return client.post("/v2/models/double/infer", content=text + content, headers=headers)
+
+
+def test_tensors_as_bytes(client: TestClient) -> None:
+    values = np.array([1, 2, 3, np.pi], "<f4")
+    answer = post_bytes(client, values.tobytes(), 16, binary_data_output=True)
+    length = int(answer.headers["inference-header-content-length"])
+    assert answer.status_code == 200
+    assert np.array_equal(np.frombuffer(answer.content[length:], "<f4"), 2 * values)
+    assert b'"binary_data_size":16' in answer.content[:length]
+    assert client.get("/v2").json()["extensions"] == ["binary_tensor_data"]
+
+
+@pytest.mark.parametrize(
+    ("content", "size"),
+    [(b"", 16), (b"x" * 12, 12), (b"x" * 20, 16), (b"\xff" * 16, 16), (b"x" * 16, 20)],
+)
+def test_other_bytes_are_refused(client: TestClient, content: bytes, size: int) -> None:
+    assert post_bytes(client, content, size).status_code == 400
+
+
+@pytest.mark.parametrize("length", ["-1", "99999", "x", ""])
+def test_a_wrong_length_of_the_json_is_refused(client: TestClient, length: str) -> None:
+    headers = {"Inference-Header-Content-Length": length}
+    answer = client.post("/v2/models/double/infer", content=b"{}", headers=headers)
+    assert answer.status_code == 400
