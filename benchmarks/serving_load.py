@@ -24,7 +24,7 @@ import httpx2 as httpx
 
 ECHO = Path(__file__).parents[1] / "tests" / "support" / "echo_server.py"
 BAD = ("", "steps=1000000", "camera=../x", "frames=-5")
-HEALTH_PERIOD_S, KILL_PERIOD_S = 0.1, 1.5
+HEALTH_PERIOD_S = 0.1
 
 
 @dataclass
@@ -129,11 +129,11 @@ class Server:
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-async def disturb(server: Server, load: Load, kills: int) -> int:
+async def disturb(server: Server, load: Load, kills: int, every_s: float) -> int:
     """Kill a worker now and then, and the server ``kills`` times; returns the workers killed."""
     killed, since = 0, 0
     while not load.over:
-        await asyncio.sleep(KILL_PERIOD_S)
+        await asyncio.sleep(every_s)
         for worker in server.workers()[:1]:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(worker, signal.SIGKILL)
@@ -169,7 +169,7 @@ async def run(given: argparse.Namespace) -> str:
         numbers.put_nowait(number)
     start = time.perf_counter()
     health = asyncio.create_task(load.health())
-    chaos = asyncio.create_task(disturb(server, load, given.kills))
+    chaos = asyncio.create_task(disturb(server, load, given.kills, given.kill_every_s))
     await asyncio.gather(*(load.client(index, numbers) for index in range(given.clients)))
     await load.wait_for_all()
     load.over = True
@@ -209,6 +209,7 @@ def main() -> None:
     parser.add_argument("--requests", type=int, default=200)
     parser.add_argument("--clients", type=int, default=16)
     parser.add_argument("--kills", type=int, default=2)
+    parser.add_argument("--kill-every-s", type=float, default=1.5)
     parser.add_argument("--model")
     parser.add_argument("--photo", type=Path, required=True)
     parser.add_argument("--work", type=Path, required=True)

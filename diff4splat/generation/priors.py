@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.generation.depth_prediction import predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
@@ -15,7 +16,6 @@ from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, s
 from diff4splat.generation.settings import why_unguided
 from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.progress.run_log import RunLog
 
 
@@ -39,8 +39,7 @@ def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:
     network = model.networks.monocular_depth
     if network is None:
         return torch.full_like(image.rgb[..., 0], PLANE_DEPTH)
-    raw = network(image.rgb.movedim(-1, 0)[None])[:, 0]
-    return key_depth(raw, model.config.activation)[0]
+    return predict_depth(network, image.rgb, model.config.activation)
 
 
 def _sample_motion(

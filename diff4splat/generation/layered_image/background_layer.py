@@ -23,7 +23,8 @@ BEHIND = 1.03
 """Depth over that of the farthest pixel in the neighbourhood."""
 SAME_SURFACE = 0.15
 """Difference of log depth up to which pixels belong to the far side."""
-FOOTPRINT_PX = 0.5
+FOOTPRINT_PX = 0.9
+"""Wide enough to close the gaps that open between its own pixels."""
 COLOR_SIGMA_PX = 1.0
 """Standard deviation with which near pixels of the far side give their colour."""
 

@@ -1,6 +1,6 @@
 """From an image, its depth and its displacement to all layers.
 
-image, depth, displacement ─ upsample ─ pixels ─ subpixel infill        the image shows these
+image, depth, displacement ─ upsample ─ smooth ─ pixels ─ subpixel infill    the image shows these
 smaller copy ─┬─ background layer                                       these extend them into
 └─ border extension ─ inpaint what moving objects uncover  what the image hides
 """
@@ -17,6 +17,7 @@ from diff4splat.generation.layered_image.border_extension import (
     border_extension,
     push_behind_surface,
 )
+from diff4splat.generation.layered_image.depth_smoothing import smooth_maps
 from diff4splat.generation.layered_image.disocclusion import inpaint_background, inpaint_border
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
@@ -63,6 +64,8 @@ def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list
 def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageLayer:
     """One opaque cell per pixel of the image."""
     depth, displacement = upsample_maps(maps.depth, maps.displacement, (small.rgb, image.rgb))
+    if small.camera.size_px != image.camera.size_px:
+        depth, displacement = smooth_maps(depth, displacement, image.rgb)
     return ImageLayer(
         camera=image.camera,
         rgb=image.rgb,

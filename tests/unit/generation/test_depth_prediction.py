@@ -1,0 +1,72 @@
+"""Depth of one image from several passes of the depth prior."""
+
+import pytest
+import torch
+from image_layers import random_rgb
+from torch import Tensor
+
+from diff4splat.generation.depth_prediction import MULTIPLE_PX, SCALES, predict_depth
+from diff4splat.models.config.networks import ActivationConfig
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+
+CONFIG = ActivationConfig()
+
+
+class Ramp:
+    """Depth from the column alone, in a unit that depends on the size: a prior at its worst."""
+
+    def __init__(self, slope: float, unit: float = 0.0) -> None:
+        self.slope, self.unit, self.sizes = slope, unit, []
+
+    def __call__(self, image: Tensor) -> Tensor:
+        self.sizes.append(tuple(image.shape[2:]))
+        column = torch.linspace(-1, 1, image.shape[3]).expand(len(image), 1, *image.shape[2:])
+        return self.slope * column + self.unit * image.shape[3] / 100
+
+
+class Brightness:
+    """Depth that the image decides, whichever way round it is."""
+
+    def __call__(self, image: Tensor) -> Tensor:
+        return image.mean(1, keepdim=True)
+
+
+def test_an_unsided_prior_gives_the_mirrored_depth_of_the_mirrored_image() -> None:
+    rgb = random_rgb(64, 96)
+    straight = predict_depth(Brightness(), rgb, CONFIG)
+    mirrored = predict_depth(Brightness(), rgb.flip(1), CONFIG)
+    torch.testing.assert_close(mirrored.flip(1), straight, rtol=1e-5, atol=0)
+
+
+def test_what_the_prior_says_of_a_side_cancels() -> None:
+    depth = predict_depth(Ramp(0.3), random_rgb(64, 96), CONFIG)
+    torch.testing.assert_close(depth, torch.full((64, 96), PLANE_DEPTH))
+
+
+def test_scales_are_brought_to_the_unit_of_the_image_itself() -> None:
+    rgb = random_rgb(64, 64)
+    with_unit = predict_depth(Ramp(0.0, 1.0), rgb, CONFIG)
+    alone = Ramp(0.0, 1.0)(rgb.movedim(-1, 0)[None])[0, 0]
+    limit = CONFIG.log_distance_limit
+    wanted = PLANE_DEPTH * (limit * (alone / limit).tanh()).exp()
+    torch.testing.assert_close(with_unit, wanted)
+
+
+def test_every_scale_is_seen_twice_in_sides_that_the_network_takes() -> None:
+    prior = Ramp(0.1)
+    predict_depth(prior, random_rgb(64, 128), CONFIG)
+    assert len(prior.sizes) == 2 * len(SCALES)
+    assert set(prior.sizes) == {(64, 128), (48, 96), (80, 160)}
+    assert all(side % MULTIPLE_PX == 0 for size in prior.sizes for side in size)
+
+
+def test_scales_of_one_size_are_seen_once() -> None:
+    prior = Ramp(0.1)
+    depth = predict_depth(prior, random_rgb(16, 16), CONFIG)
+    assert prior.sizes == [(16, 16)] * 2 and depth.shape == (16, 16)
+
+
+@pytest.mark.parametrize("value", [-1e30, 1e30])
+def test_extreme_outputs_are_finite_depth(value: float) -> None:
+    depth = predict_depth(lambda image: image[:, :1] * 0 + value, random_rgb(32, 48), CONFIG)
+    assert bool(depth.isfinite().all()) and bool((depth > 0).all())
