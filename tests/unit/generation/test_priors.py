@@ -67,7 +67,6 @@ def test_the_depth_prior_decides_about_depth() -> None:
     network = model.networks.monocular_depth
     for parameter in network.parameters():
         parameter.add_(0.1 * torch.randn_like(parameter))
-    raw = network(image().rgb.movedim(-1, 0)[None])[0, 0].double()
     wanted = predict_depth(network, image().rgb, model.config.activation)
     assert torch.equal(image_depth(model, image()), wanted)
     assert float(wanted.std()) > 0
