@@ -6,6 +6,7 @@ photograph ─ load_image ───┐
 """
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -128,8 +129,16 @@ class Generate:
         self.check_photo()
         self.run_one()
 
-    def run_one(self, phases: "Phases | None" = None) -> None:
-        """Generate, render and write; ``phases`` report instead of progress bars."""
+    def run_one(
+        self,
+        phases: "Phases | None" = None,
+        on_scene: "Callable[[Scene], None] | None" = None,
+    ) -> None:
+        """Generate, render and write.
+
+        ``phases`` report instead of progress bars; ``on_scene`` gets the scene before it is
+        rendered.
+        """
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.options.device import require_device
         from diff4splat.generation.pipeline import Diff4SplatPipeline
@@ -146,6 +155,8 @@ class Generate:
             scene = pipeline(
                 input_image, path, self.prompt, seed=self.seed, settings=settings, log=log
             )
+            if on_scene is not None:
+                on_scene(scene)
             result, lines = self.write_results(folder, scene, input_image, log)
             inputs = self.inputs(input_image, settings, pipeline.model.config.fingerprint())
             write_card(folder / "card.json", result, inputs, log)

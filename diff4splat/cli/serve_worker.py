@@ -8,12 +8,16 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from diff4splat.errors import Diff4SplatError
 from diff4splat.progress.phases import Advance, Phases
 from diff4splat.serving.workers.protocol import Task, message
+
+if TYPE_CHECKING:
+    from diff4splat.scene.scene import Scene
 
 FAILED = 1
 
@@ -75,11 +79,21 @@ def _answer(task: Task, phases: Phases) -> str:
     )
     try:
         command.check()
-        command.run_one(phases)
+        command.run_one(phases, on_scene=partial(_show, Path(task.preview)))
     except Diff4SplatError as error:
         # Clients know neither this file's name nor its folder.
         return message(refused=str(error).replace(task.photo, "photo"))
     return message(ended=True)
+
+
+def _show(file: Path, scene: "Scene") -> None:
+    """The frame in the middle of the path, seconds before all of them are rendered."""
+    from diff4splat.io.photos.images import write_png
+    from diff4splat.render.api import render
+
+    middle = len(scene.path) // 2
+    camera, time_s = scene.path.cameras[middle], float(scene.path.times_s[middle])
+    write_png(render(scene, camera, time_s).rgb.clamp(0, 1), file)
 
 
 def _end_with_server() -> None:

@@ -45,6 +45,8 @@ class JobStatus(BaseModel):
     error: str
     created_s: float
     """Seconds since 1970."""
+    preview: bool
+    """Whether /v1/jobs/ID/preview shows something yet."""
     results: list[str]
     """Names to fetch under /v1/jobs/ID/results/NAME."""
 
@@ -89,8 +91,14 @@ async def read_result(identifier: str, name: str, server: Server) -> FileRespons
 
 @job_router.get("/{identifier}/preview", responses=UNKNOWN, response_class=FileResponse)
 async def read_preview(identifier: str, server: Server) -> FileResponse:
-    """The result as one image."""
-    return await read_result(identifier, PREVIEW, server)
+    """The result as one image; while frames are rendered, one of them."""
+    job = _job(server, identifier)
+    if PREVIEW in job.results:
+        return FileResponse(server.queue.folders.result(job) / PREVIEW)
+    early = server.queue.folders.preview(job)
+    if not early.is_file():
+        raise HTTPException(404, "preview: none yet; ask again when the job says there is one")
+    return FileResponse(early)
 
 
 def _job(server: ServerState, identifier: str) -> Job:
@@ -102,6 +110,7 @@ def _job(server: ServerState, identifier: str) -> Job:
 
 def _status(server: ServerState, job: Job) -> JobStatus:
     done, steps = job.progress
+    early = server.queue.folders.preview(job)
     return JobStatus(
         id=job.identifier,
         state=job.state,
@@ -112,5 +121,6 @@ def _status(server: ServerState, job: Job) -> JobStatus:
         attempts=job.attempts,
         error=job.error,
         created_s=job.created_s,
+        preview=PREVIEW in job.results or early.is_file(),
         results=list(job.results),
     )

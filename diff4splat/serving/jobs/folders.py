@@ -1,7 +1,7 @@
 """Files of jobs.
 
     FOLDER/jobs.sqlite
-    FOLDER/jobs/<identifier>/{photo, result/<file>…}
+    FOLDER/jobs/<identifier>/{photo, preview.png, result/<file>…}
 
 No part of a path comes from a client: names of results are looked up in a list.
 """
@@ -35,6 +35,10 @@ class JobFolders:
         """Where the worker writes; its files appear there together."""
         return self.of(job) / "result"
 
+    def preview(self, job: Job) -> Path:
+        """One frame, while the others are rendered."""
+        return self.of(job) / "preview.png"
+
     def accept(self, job: Job, photo: bytes) -> None:
         """Write the photograph, and wait until the disk has it."""
         self.of(job).mkdir()
@@ -51,6 +55,7 @@ class JobFolders:
     def discard_result(self, job: Job) -> None:
         """Before a job starts anew."""
         shutil.rmtree(self.result(job), ignore_errors=True)
+        self.preview(job).unlink(missing_ok=True)
 
     def remove(self, identifier: str) -> None:
         """Everything of a job."""

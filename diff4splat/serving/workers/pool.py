@@ -90,6 +90,7 @@ class WorkerPool:
         task = Task(
             photo=_absolute(folders.photo(job)),
             out=_absolute(folders.result(job)),
+            preview=_absolute(folders.preview(job)),
             model=settings.model,
             options=job.options,
         )

@@ -18,6 +18,8 @@ class Task:
 
     photo: str
     out: str
+    preview: str
+    """A PNG that appears as soon as there is a scene."""
     model: str
     options: dict[str, Any]
 

@@ -78,6 +78,22 @@ def test_a_job_ends_in_files(start: Start) -> None:
         assert client.get(f"{base}/results/{name}").status_code in (404, 307), name
 
 
+def test_a_frame_is_seen_before_the_result(start: Start) -> None:
+    client = start(workers=1)
+    slow, waiting = submit(client, seed=7), submit(client)
+    limit = time.monotonic() + WAIT_S
+    while not client.get(f"/v1/jobs/{slow}").json()["preview"]:
+        assert time.monotonic() < limit
+        time.sleep(0.02)
+    early = client.get(f"/v1/jobs/{slow}/preview")
+    assert early.content == photo() and early.headers["content-type"] == "image/png"
+    assert not client.get(f"/v1/jobs/{slow}").json()["results"]
+    assert not client.get(f"/v1/jobs/{waiting}").json()["preview"]
+    refused = client.get(f"/v1/jobs/{waiting}/preview")
+    assert refused.status_code == 404 and "none yet" in refused.json()["detail"]
+    client.delete(f"/v1/jobs/{slow}")
+
+
 @pytest.mark.parametrize(
     ("options", "field"),
     [
