@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_prediction import predict_depth
+from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
@@ -39,7 +39,8 @@ def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:
     network = model.networks.monocular_depth
     if network is None:
         return torch.full_like(image.rgb[..., 0], PLANE_DEPTH)
-    return predict_depth(network, image.rgb, model.config.activation)
+    scales = SCALES if image.reduction > 1 else SCALES[:1]
+    return predict_depth(network, image.rgb, model.config.activation, scales)
 
 
 def _sample_motion(

@@ -52,6 +52,8 @@ class InputImage:
     """False for a default lens; a camera path that names one then decides."""
     notes: tuple[str, ...] = ()
     """What was done to the photograph, in words."""
+    reduction: int = 1
+    """Pixels of the photograph on a side of each pixel here; above 1 in the networks' copy."""
 
     def to(self, device: torch.device) -> "InputImage":
         """Move pixels and camera."""
@@ -65,7 +67,8 @@ def downsample(image: InputImage, factor: int) -> InputImage:
     rgb = torch.nn.functional.avg_pool2d(image.rgb.movedim(-1, 0)[None], factor)[0]
     height, width = image.camera.size_px
     camera = image.camera.resized((height // factor, width // factor))
-    return replace(image, rgb=rgb.movedim(0, -1), camera=camera)
+    reduction = image.reduction * factor
+    return replace(image, rgb=rgb.movedim(0, -1), camera=camera, reduction=reduction)
 
 
 def load_image(

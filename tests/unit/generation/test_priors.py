@@ -7,7 +7,7 @@ import pytest
 import torch
 from image_layers import input_image, random_rgb
 
-from diff4splat.generation.depth_prediction import predict_depth
+from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
@@ -67,9 +67,11 @@ def test_the_depth_prior_decides_about_depth() -> None:
     network = model.networks.monocular_depth
     for parameter in network.parameters():
         parameter.add_(0.1 * torch.randn_like(parameter))
-    wanted = predict_depth(network, image().rgb, model.config.activation)
-    assert torch.equal(image_depth(model, image()), wanted)
-    assert float(wanted.std()) > 0
+    for reduction, scales in ((1, SCALES[:1]), (4, SCALES)):
+        wanted = predict_depth(network, image().rgb, model.config.activation, scales)
+        actual = image_depth(model, replace(image(), reduction=reduction))
+        assert torch.equal(actual, wanted)
+        assert float(wanted.std()) > 0
 
 
 def test_displacement_is_a_share_of_depth_from_zero_on() -> None:

@@ -130,7 +130,7 @@ def test_a_smaller_image_has_the_mean_of_each_cell() -> None:
         cell = image.rgb[4 * row : 4 * row + 4, 4 * column : 4 * column + 4]
         torch.testing.assert_close(small.rgb[row, column], cell.mean((0, 1)))
     assert (small.focal_source, small.notes) == (image.focal_source, image.notes)
-    assert downsample(image, 1) is image
+    assert small.reduction == 4 and downsample(image, 1) is image
 
 
 def test_the_ray_of_a_cell_is_the_mean_of_those_of_its_pixels() -> None:
