@@ -42,6 +42,9 @@ class DataSettings:
     """Swapped input views, mirrored and time-reversed clips; only for stages without text."""
     crop_px: tuple[int, int] = (0, 0)
     """Random crop (height, width) of images of ``size_px``; 0 takes the whole image."""
+    view_sides_px: tuple[int, ...] = ()
+    """Stage ``monocular_depth``: random views (window, zoom, roll, noise) of every image instead of
+    whole ones; height and width are drawn from these at each step."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4
@@ -76,6 +79,8 @@ class DataSettings:
         cuts = zip(self.crop_px, self.size_px, strict=True)
         fits = max(self.crop_px) == 0 or all(0 < part <= whole for part, whole in cuts)
         require(fits, "data.crop_px", "0, or sides that size_px has room for", self.crop_px)
+        multiples = all(side > 0 and side % 16 == 0 for side in self.view_sides_px)
+        require(multiples, "data.view_sides_px", "multiples of 16", self.view_sides_px)
         share = self.min_valid_depth
         require(0 <= share <= 1, "data.min_valid_depth", "0 to 1", share)
 

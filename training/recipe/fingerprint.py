@@ -38,6 +38,8 @@ def decisive(stage: Mapping[str, Any]) -> dict[str, Any]:
         {key: value for key, value in source.items() if key != "folder"}
         for source in data["sources"]
     ]
+    # Stages of recipes from before random views keep their fingerprint.
+    data = {key: value for key, value in data.items() if key != "view_sides_px" or value}
     kept = {key: value for key, value in stage.items() if key != "micro_batch"}
     return kept | {"data": data}
 

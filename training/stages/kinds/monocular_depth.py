@@ -8,10 +8,10 @@ than everything else.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.io.pixels import unit_rgb
@@ -20,7 +20,14 @@ from diff4splat.metrics.masked import masked_mean, mean_or_nan
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.losses.log_depth import gradient_error, inverse_depth_error, rescale_median
+from diff4splat.training.batches.random_views import (
+    DRAWS,
+    DepthImages,
+    depth_images,
+    random_photo,
+    random_views,
+)
+from diff4splat.training.losses.log_depth import gradient_error, inverse_depth_error
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, Terms
 from diff4splat.training.stages.previews import depth_preview
@@ -30,16 +37,6 @@ SKY_DEPTH = 10 * PLANE_DEPTH
 """Pixels without depth are at least as far."""
 GAMMA, GAIN = 0.25, 0.15
 """Half the range of the logarithms of exponent and factor of a channel."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DepthImages:
-    """Images and their depths, the same number of every sample."""
-
-    rgb: Float[Tensor, "n 3 h w"]
-    depth: Float[Tensor, "n h w"]
-    """In the image's own unit; 1 where it is not known."""
-    known: Bool[Tensor, "n h w"]
 
 
 class MonocularDepthStage(ModelStage):
@@ -53,7 +50,7 @@ class MonocularDepthStage(ModelStage):
 
     def forward(self, batch: ClipBatch) -> Terms:
         """The terms ``depth_log``, ``depth_gradient``, ``inverse_depth`` and ``sky_margin``."""
-        images, weights = depth_images(batch), self.plan.recipe.losses
+        images, weights = self._views(batch), self.plan.recipe.losses
         predicted = self.log_depth(self._random_colors(images.rgb, batch))
         terms = depth_terms(predicted, images)
         return weighted_sum(
@@ -73,20 +70,41 @@ class MonocularDepthStage(ModelStage):
         with torch.autocast(rgb.device.type, enabled=False):
             return log_depth(raw, self.plan.model)
 
+    def _views(self, batch: ClipBatch) -> DepthImages:
+        """Every image whole, or a random view of it where the recipe names sides of views."""
+        images, sides = batch_images(batch), self.plan.recipe.data.view_sides_px
+        if not sides:
+            return images
+        generator = self.random.per_step(batch, "view size")
+        height, width = (
+            sides[int(i)] for i in torch.randint(len(sides), (2,), generator=generator)
+        )
+        draws = self._draws(batch, "view", len(images.rgb), DRAWS + 3)
+        views = random_views(images, (height, width), draws[:, :DRAWS].to(images.rgb))
+        noise = torch.randn(views.rgb.shape, generator=self.random.per_step(batch, "noise"))
+        photo = random_photo(views.rgb, draws[:, DRAWS:].to(views.rgb), noise.to(views.rgb))
+        return replace(views, rgb=photo)
+
+    def _draws(
+        self, batch: ClipBatch, purpose: str, images: int, count: int
+    ) -> Float[Tensor, "n c"]:
+        """Uniform numbers for every image."""
+        generators = self.random.per_sample(batch, purpose)
+        rows = [torch.rand(images // len(batch), count, generator=own) for own in generators]
+        return torch.cat(rows)
+
     def _random_colors(
         self, rgb: Float[Tensor, "n 3 h w"], batch: ClipBatch
     ) -> Float[Tensor, "n 3 h w"]:
         """Every image with a random gamma and random gains: depth does not follow from colour."""
-        count, generators = len(rgb) // len(batch), self.random.per_sample(batch, "light")
-        draws = [torch.rand(count, 4, generator=own) for own in generators]
-        spread = 2 * torch.cat(draws).to(rgb)[:, :, None, None] - 1
+        spread = 2 * self._draws(batch, "light", len(rgb), 4).to(rgb)[:, :, None, None] - 1
         gamma, gain = (GAMMA * spread[:, :1]).exp(), (GAIN * spread[:, 1:]).exp()
         return (rgb.clamp_min(1e-3) ** gamma * gain).clamp(0, 1)
 
     @torch.no_grad()
     def measure(self, batch: ClipBatch) -> Terms:
         """``depth_correlation``, and ``depth_error``: the mean of |log depth − log truth|."""
-        images = depth_images(batch)
+        images = batch_images(batch)
         predicted, known = self.log_depth(images.rgb), images.known
         error = (predicted - images.depth.log()).abs()
         values = {
@@ -98,18 +116,16 @@ class MonocularDepthStage(ModelStage):
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """Images, true depths and predicted depths."""
-        images = depth_images(batch)
+        images = batch_images(batch)
         truth = torch.where(images.known, images.depth.log(), math.inf)
         return depth_preview(images.rgb, truth, self.log_depth(images.rgb))
 
 
-def depth_images(batch: ClipBatch) -> DepthImages:
+def batch_images(batch: ClipBatch) -> DepthImages:
     """Keyframes and targets of every sample, those of one sample after another."""
     rgb = torch.cat([batch.video[:, ::TIME_STRIDE], batch.target_rgb.flatten(1, 2)], 1)
     depth = torch.cat([batch.depth, batch.target_depth.flatten(1, 2)], 1)
-    scaled, known = rescale_median(depth.flatten(0, 1), PLANE_DEPTH)
-    images = unit_rgb(rgb.flatten(0, 1)).movedim(-1, 1)
-    return DepthImages(rgb=images, depth=scaled, known=known)
+    return depth_images(unit_rgb(rgb.flatten(0, 1)).movedim(-1, 1), depth.flatten(0, 1))
 
 
 def depth_terms(

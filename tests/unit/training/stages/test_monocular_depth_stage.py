@@ -12,13 +12,13 @@ from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.stage import TOTAL
-from diff4splat.training.stages.kinds.monocular_depth import SKY_DEPTH, depth_images
+from diff4splat.training.stages.kinds.monocular_depth import SKY_DEPTH, batch_images
 
 
 def test_every_key_frame_and_target_is_an_image() -> None:
     recipe = depth_recipe()
     batch = with_sky(make_batch(recipe, (0, 1)))
-    shown = depth_images(batch)
+    shown = batch_images(batch)
     each = batch.depth.shape[1] + batch.target_rgb[0, :, :, 0, 0, 0].numel()
     assert len(shown.rgb) == len(shown.depth) == 2 * each
     assert not shown.known[:, :8].any() and bool((shown.depth[:, :8] == 1).all())
@@ -50,7 +50,7 @@ def test_the_total_is_the_weighted_sum() -> None:
 def test_the_shift_is_that_of_inverse_depths_where_they_are_known() -> None:
     recipe = depth_recipe()
     batch = with_sky(make_batch(recipe, (0,)))
-    shown = depth_images(batch)
+    shown = batch_images(batch)
     # A fresh network puts everything on the plane.
     off = (1 - PLANE_DEPTH / shown.depth).abs()
     wanted = torch.stack([one[known].mean() for one, known in zip(off, shown.known, strict=True)])
@@ -87,7 +87,7 @@ def test_without_any_depth_there_is_nothing_to_learn_but_sky() -> None:
 def test_light_is_drawn_anew_for_every_image_and_alike_every_time() -> None:
     recipe = depth_recipe()
     stage, batch = make_stage(recipe, model=MODEL), make_batch(recipe, (0, 1))
-    count = len(depth_images(batch).rgb)
+    count = len(batch_images(batch).rgb)
     rgb = torch.rand(1, 3, 8, 8).expand(count, -1, -1, -1)
     lit = stage._random_colors(rgb, batch)
     assert torch.equal(lit, stage._random_colors(rgb, batch))
@@ -121,3 +121,22 @@ def test_a_recipe_without_the_network_is_refused() -> None:
     without = replace(MODEL, monocular_depth=MonocularDepthConfig())
     with pytest.raises(ConfigError, match=r"monocular_depth\.channels: expected a depth network"):
         Recipe(name="test", seed=0, model=without, stages=(depth_recipe(),))
+
+
+def test_random_views_have_sides_of_the_recipe_and_repeat_exactly() -> None:
+    recipe = depth_recipe()
+    recipe = replace(recipe, data=replace(recipe.data, view_sides_px=(16, 32)))
+    stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0, 1)))
+    shake_heads(stage)
+    views, again = stage._views(batch), stage._views(batch)
+    assert set(views.rgb.shape[2:]) <= {16, 32} and len(views.rgb) == len(batch_images(batch).rgb)
+    assert torch.equal(views.rgb, again.rgb) and torch.equal(views.depth, again.depth)
+    terms = stage(batch)
+    assert all(bool(term.isfinite().all()) for term in terms.values())
+
+
+@pytest.mark.parametrize("sides", [(0,), (24,), (-16,)])
+def test_sides_that_the_network_cannot_take_are_refused(sides: tuple[int, ...]) -> None:
+    data = depth_recipe().data
+    with pytest.raises(ConfigError, match=r"view_sides_px: expected multiples of 16"):
+        replace(data, view_sides_px=sides)
