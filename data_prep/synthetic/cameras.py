@@ -46,6 +46,11 @@ class ViewSpec:
     tilt_rad: float
     distance_m: float
     path: str
+    focus_m: tuple[float, float, float] | None = None
+    """Point the view looks at; None is the centre of the area, at the height of all views."""
+    roll_rad: float = 0.0
+    fov_deg: float | None = None
+    """None is that of all views."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,24 +120,33 @@ def sample_views(
 
 def camera_batch(view: ViewSpec, lens: LensSpec, focus_height_m: float) -> Camera:
     """The cameras of a view, float64, quantised."""
-    level = view.distance_m * np.cos(view.tilt_rad)
-    eye = (
-        level * np.sin(view.azimuth_rad),
-        -focus_height_m - view.distance_m * np.sin(view.tilt_rad),
-        -level * np.cos(view.azimuth_rad),
-    )
-    start = rigid.look_at(
-        torch.tensor(eye, dtype=torch.float64),
-        torch.tensor([0.0, -focus_height_m, 0.0], dtype=torch.float64),
-        torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64),
-    )
-    camera = pinhole(focal_from_fov(lens.fov_deg, lens.size_px[1]), lens.size_px, torch.float64)
+    start = _start_pose(view, view.focus_m or (0.0, -focus_height_m, 0.0))
+    fov_deg = view.fov_deg or lens.fov_deg
+    camera = pinhole(focal_from_fov(fov_deg, lens.size_px[1]), lens.size_px, torch.float64)
     frame = PathFrame(
         camera=camera, near_depth=NEAR_SHARE * view.distance_m, focus_depth=view.distance_m
     )
     path = build_path(view.path, frame, PathSettings(frames=lens.frames, fps=lens.fps))
     poses = start @ path.cameras.world_from_camera
     return _quantised(path.cameras.with_pose(poses), path.cameras.focal_px)
+
+
+def _start_pose(view: ViewSpec, focus_m: tuple[float, float, float]) -> torch.Tensor:
+    """Pose that looks at the focus; roll turns it around its axis."""
+    level = view.distance_m * np.cos(view.tilt_rad)
+    offset = (
+        level * np.sin(view.azimuth_rad),
+        -view.distance_m * np.sin(view.tilt_rad),
+        -level * np.cos(view.azimuth_rad),
+    )
+    focus = torch.tensor(focus_m, dtype=torch.float64)
+    down = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
+    pose = rigid.look_at(focus + torch.tensor(offset, dtype=torch.float64), focus, down)
+    if view.roll_rad == 0.0:
+        return pose
+    cos, sin = np.cos(view.roll_rad), np.sin(view.roll_rad)
+    turn = torch.tensor([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]], dtype=torch.float64)
+    return rigid.from_parts(pose[:3, :3] @ turn, pose[:3, 3])
 
 
 def _quantised(cameras: Camera, focal_px: torch.Tensor) -> Camera:

@@ -16,6 +16,7 @@ from diff4splat.data_prep.synthetic.camera_rig import rig_views
 from diff4splat.data_prep.synthetic.cameras import LensSpec, camera_batch, sample_path, sample_views
 from diff4splat.data_prep.synthetic.captioning import caption_facts, clip_metadata
 from diff4splat.data_prep.synthetic.environment import EnvironmentContext, furnish_environment
+from diff4splat.data_prep.synthetic.free_cameras import free_views
 from diff4splat.data_prep.synthetic.layout.floor_plan import FloorPlan, PlacedObject
 from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
 from diff4splat.data_prep.synthetic.lights import sample_lighting
@@ -52,6 +53,8 @@ class WorldRecipe:
     """17 frames make 2 seconds."""
     rig: bool = False
     """Static cameras all around the scene; otherwise moving cameras near the input view."""
+    free_cameras: bool = False
+    """Static cameras of all kinds beside the input view; for depth of single images."""
     families: Names = None
     textures: Names = None
     motions: Names = None
@@ -59,13 +62,17 @@ class WorldRecipe:
     scenes: Names = None
 
     def __post_init__(self) -> None:
-        _require_range("frames", self.frames, 2, 1000)
+        _require_range("frames", self.frames, 1, 1000)
         _require_range("views", self.views, 4 if self.rig else 1, 64 if self.rig else 8)
         _require_range("size_px", min(self.size_px), 8, 4096)
         _require_range("size_px", max(self.size_px), 8, 4096)
         for name in ("still_share", "against_share", "frozen_share"):
             _require_range(name, getattr(self, name), 0.0, 1.0)
         _require_range("fps", self.fps, 0.1, 1000.0)
+        if self.rig and self.free_cameras:
+            raise ConfigError(
+                "cameras: expected one arrangement, got rig and free_cameras; leave one out"
+            )
 
     def allowed(self) -> Split:
         """The lists of the split, restricted to the recipe.
@@ -122,7 +129,7 @@ def _try_world(
     if framing is None:
         return None
     sampler, area = framing.sampler, framing.area
-    moving = _moving(area, rng, is_still)
+    moving = _moving(area, rng, is_still, is_watched=not recipe.free_cameras)
     if not is_still and not moving:
         return None
     context = EnvironmentContext(
@@ -166,9 +173,9 @@ def _framing(recipe: WorldRecipe, split: Split, rng: Rng, is_still: bool) -> _Fr
     radius = math.exp(rng.uniform(*(math.log(limit) for limit in kind.area_radius_m)))
     fov_deg = rng.uniform(35.0, 72.0)
     lens = LensSpec(size_px=recipe.size_px, fov_deg=fov_deg, frames=recipe.frames, fps=recipe.fps)
-    arrange = rig_views if recipe.rig else sample_views
+    arrange = rig_views if recipe.rig else free_views if recipe.free_cameras else sample_views
     specs = arrange(kind, lens, radius, recipe.views, rng.child("shots"))
-    if is_still and not recipe.rig:
+    if is_still and not (recipe.rig or recipe.free_cameras):
         specs[0] = replace(specs[0], path=sample_path(rng.child("path"), may_be_static=False))
     views = tuple(camera_batch(spec, lens, 0.28 * radius) for spec in specs)
     eyes = np.concatenate([view.position.numpy() for view in views])
@@ -187,11 +194,12 @@ def _framing(recipe: WorldRecipe, split: Split, rng: Rng, is_still: bool) -> _Fr
     return _Framing(sampler=sampler, area=area, views=views, path=specs[0].path)
 
 
-def _moving(area: StageArea, rng: Rng, is_still: bool) -> list[PlacedObject]:
+def _moving(area: StageArea, rng: Rng, is_still: bool, *, is_watched: bool) -> list[PlacedObject]:
     """The moving objects; a static world keeps the centre of the area visible instead."""
     if is_still:
         radius = area.radius_m
-        area.plan.watched.append((0.0, 0.3 * radius, 0.0, 0.4 * radius))
+        if is_watched:
+            area.plan.watched.append((0.0, 0.3 * radius, 0.0, 0.4 * radius))
         return []
     count = rng.weighted_choice((1, 2, 3), (5.0, 4.0, 2.0))
     return place_moving_objects(area, count, rng.child("act"))
@@ -199,7 +207,7 @@ def _moving(area: StageArea, rng: Rng, is_still: bool) -> list[PlacedObject]:
 
 def world_identifier(recipe: WorldRecipe, index: int) -> str:
     """Identifier of the clip of a world."""
-    rig = f"-rig{recipe.views}" if recipe.rig else ""
+    rig = f"-rig{recipe.views}" if recipe.rig else "-free" if recipe.free_cameras else ""
     return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{rig}"
 
 

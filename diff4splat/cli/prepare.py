@@ -32,7 +32,7 @@ class PrepareSynthetic:
     """Fraction of the other clips whose movable objects are static."""
     size: Annotated[int, Number(least=8, most=4096)] = 128
     """Image side in pixels."""
-    frames: Annotated[int, Number(least=2, most=1000)] = 17
+    frames: Annotated[int, Number(least=1, most=1000)] = 17
     """Frames per clip, 1 + 4 k for training."""
     fps: Annotated[float, Number(least=0.1, most=1000)] = 8.0
     """Frames per second; the motion network is trained on 3 frames at 1 fps."""
@@ -40,6 +40,8 @@ class PrepareSynthetic:
     """Cameras per clip; the first is the input."""
     rig: bool = False
     """Place cameras all around the scene, for per-scene fitting; hold out the last two."""
+    free_cameras: bool = False
+    """Place cameras after the first anywhere: above, close, rolled, other lenses; for depth."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
     tracks: Annotated[int, Number(least=0)] = 512
@@ -73,6 +75,7 @@ class PrepareSynthetic:
             size_px=(self.size, self.size),
             views=self.views,
             rig=self.rig,
+            free_cameras=self.free_cameras,
             motions=self.motions or None,
         )
         job = WorldJob(

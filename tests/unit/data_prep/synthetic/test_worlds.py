@@ -168,7 +168,7 @@ def test_overrides_choose_what_is_made() -> None:
 
 def test_recipes_that_cannot_be_made(as_shipped: None) -> None:
     for broken, words in (
-        ({"frames": 1}, "frames"), ({"views": 0}, "views"), ({"size_px": (4, 128)}, "size_px"),
+        ({"frames": 0}, "frames"), ({"views": 0}, "views"), ({"size_px": (4, 128)}, "size_px"),
         ({"still_share": 1.5}, "still_share"), ({"fps": 0.0}, "fps"),
     ):  # fmt: skip
         with pytest.raises(ConfigError, match=words):
