@@ -25,7 +25,7 @@ from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gau
 from diff4splat.generation.motion_sampling import MotionRequest
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
-from diff4splat.generation.priors import image_maps
+from diff4splat.generation.priors import Copies, image_maps
 from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
@@ -110,12 +110,14 @@ class Diff4SplatPipeline:
         return self._generate(request, log)
 
     def _generate(self, request: Request, log: RunLog) -> Scene:
-        model, small = self._running(request.plan), request.small
-        frames = model.config.latent_grid(len(request.small_path), small.camera.size_px)[0]
+        model = self._running(request.plan)
+        copies = Copies(image=request.image, small=request.small)
+        size_px = request.small.camera.size_px
+        frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread():
             text = self._text_states(request, log)
             motion = MotionRequest(text=text, seed=request.seed, settings=request.settings)
-            maps = image_maps(model, small, frames, motion, log)
+            maps = image_maps(model, copies, frames, motion, log)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(
             gaussians=gaussians.gaussians,

@@ -4,13 +4,15 @@ Axes: ``h w`` pixels of the copy that the networks see, ``t`` latent frames, ``s
 depth prior the image lies on a plane; without a motion prior it is static.
 """
 
+from dataclasses import dataclass
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
-from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.layered_image.build import ImageMaps
+from diff4splat.generation.inputs.input_image import InputImage, downsample
+from diff4splat.generation.layered_image.build import FineDepth, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
 from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import why_unguided
@@ -19,19 +21,41 @@ from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.progress.run_log import RunLog
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Copies:
+    """An image, and the smaller copy of it that networks see."""
+
+    image: InputImage
+    small: InputImage
+
+
 def image_maps(
-    model: Model, image: InputImage, frames: int, request: MotionRequest, log: RunLog
+    model: Model, images: Copies, frames: int, request: MotionRequest, log: RunLog
 ) -> ImageMaps:
     """Depth, and displacement over ``frames`` latent frames, by the priors that are loaded."""
+    image = images.small
     with log.phases.phase("predict depth"):
-        depth = image_depth(model, image)
+        depth, fine = _depths(model, images)
     if model.networks.motion_unet is None or frames < 2:
-        return ImageMaps(depth=depth, displacement=None)
+        return ImageMaps(depth=depth, displacement=None, fine=fine)
     motion = _sample_motion(model, image, frames, request, log)
     mask = motion.mask(request.settings.motion.threshold)
     mean = motion.field if request.settings.motion.steps == 1 else motion.mean_field
     displacement = rigid_component_offsets(motion.field, mask, depth, mean)
-    return ImageMaps(depth=depth, displacement=displacement if displacement.any() else None)
+    moved = displacement if displacement.any() else None
+    return ImageMaps(depth=depth, displacement=moved, fine=fine)
+
+
+def _depths(model: Model, images: Copies) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
+    """Depth of the copy; where the prior sees a larger one, its own and that one reduced."""
+    scale = model.config.monocular_depth.photo_scale
+    reduction = images.small.reduction
+    if model.networks.monocular_depth is None or scale == 1 or reduction % scale:
+        return image_depth(model, images.small), None
+    larger = downsample(images.image, reduction // scale)
+    fine = FineDepth(rgb=larger.rgb, depth=image_depth(model, larger))
+    inverse = torch.nn.functional.avg_pool2d(1 / fine.depth[None, None], scale)[0, 0]
+    return 1 / inverse, fine
 
 
 def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:

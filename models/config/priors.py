@@ -11,9 +11,12 @@ class MonocularDepthConfig:
 
     channels: int = 0
     """At half the resolution; 0 leaves the prior out: the image is a plane."""
+    photo_scale: int = 1
+    """Sides of the copy of a photograph that it sees, against the copy of the other networks."""
 
     def __post_init__(self) -> None:
         require_optional_width(self, "channels")
+        require_counts(self, "photo_scale")
 
     @property
     def used(self) -> bool:

@@ -29,6 +29,14 @@ PIXEL_FOOTPRINT_PX = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FineDepth:
+    """Depth of a copy of an image that is larger than the one other networks see."""
+
+    rgb: Float[Tensor, "h w 3"]
+    depth: Float[Tensor, "h w"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ImageMaps:
     """What the priors say about the smaller copy of an image."""
 
@@ -36,6 +44,8 @@ class ImageMaps:
     """z in scene units."""
     displacement: Float[Tensor, "t h w 3"] | None
     """From the first frame, in scene units, at the times of the latent frames; None is static."""
+    fine: FineDepth | None = None
+    """The same depth of a larger copy, for the image's own pixels."""
 
 
 def build_layered_image(
@@ -63,7 +73,7 @@ def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list
 
 def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageLayer:
     """One opaque cell per pixel of the image."""
-    depth, displacement = upsample_maps(maps.depth, maps.displacement, (small.rgb, image.rgb))
+    depth, displacement = _pixel_maps(small.rgb, image.rgb, maps)
     if small.camera.size_px != image.camera.size_px:
         depth, displacement = smooth_maps(depth, displacement, image.rgb)
     return ImageLayer(
@@ -77,6 +87,19 @@ def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageL
         pixel_index=torch.arange(depth.numel(), device=depth.device).view_as(depth),
         in_image=True,
     )
+
+
+def _pixel_maps(
+    small: Float[Tensor, "h w 3"], full: Float[Tensor, "sh sw 3"], maps: ImageMaps
+) -> tuple[Float[Tensor, "sh sw"], Float[Tensor, "t sh sw 3"] | None]:
+    """Depth and displacement of every pixel, through the larger copy where there is one."""
+    fine = maps.fine
+    if fine is None or small.shape == full.shape:
+        return upsample_maps(maps.depth, maps.displacement, (small, full))
+    depth, displacement = upsample_maps(maps.depth, maps.displacement, (small, fine.rgb))
+    if displacement is not None:
+        displacement = displacement * (fine.depth / depth)[..., None]
+    return upsample_maps(fine.depth, displacement, (fine.rgb, full))
 
 
 def _moving(maps: ImageMaps) -> Bool[Tensor, "h w"]:

@@ -8,11 +8,11 @@ import torch
 from image_layers import input_image, random_rgb
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
-from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
 from diff4splat.generation.motion_sampling import MotionRequest
-from diff4splat.generation.priors import image_depth, image_maps
+from diff4splat.generation.priors import Copies, image_depth, image_maps
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
@@ -42,7 +42,7 @@ def image() -> InputImage:
 def maps_of(model: Model, frames: int = 2, log: RunLog | None = None) -> ImageMaps:
     text = torch.randn(1, 4, model.config.text.width)
     request = MotionRequest(text=text, seed=0, settings=GenerationSettings())
-    return image_maps(model, image(), frames, request, log or RunLog())
+    return image_maps(model, Copies(image=image(), small=image()), frames, request, log or RunLog())
 
 
 def moves_right(model: Model, share: float, probability: float = 0.99) -> Model:
@@ -72,6 +72,24 @@ def test_the_depth_prior_decides_about_depth() -> None:
         actual = image_depth(model, replace(image(), reduction=reduction))
         assert torch.equal(actual, wanted)
         assert float(wanted.std()) > 0
+
+
+@torch.no_grad()
+def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
+    model = model_of("monocular_depth")
+    for parameter in model.networks.monocular_depth.parameters():
+        parameter.add_(0.1 * torch.randn_like(parameter))
+    config = replace(model.config, monocular_depth=MonocularDepthConfig(channels=8, photo_scale=2))
+    photo = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
+    copies = Copies(image=photo, small=downsample(photo, 4))
+    request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
+    maps = image_maps(replace(model, config=config), copies, 2, request, RunLog())
+    assert maps.depth.shape == (SIDE_PX, SIDE_PX)
+    assert torch.equal(maps.fine.depth, image_depth(model, downsample(photo, 2)))
+    inverse = (1 / maps.fine.depth).unflatten(0, (-1, 2)).unflatten(2, (-1, 2))
+    torch.testing.assert_close(1 / maps.depth, inverse.mean((1, 3)))
+    whole = Copies(image=copies.small, small=replace(copies.small, reduction=1))
+    assert image_maps(replace(model, config=config), whole, 2, request, RunLog()).fine is None
 
 
 def test_displacement_is_a_share_of_depth_from_zero_on() -> None:

@@ -1,0 +1,31 @@
+"""Command line of the out-of-domain images."""
+
+import argparse
+from pathlib import Path
+
+from benchmarks.out_of_domain.depth_table import write_depth_table
+from benchmarks.out_of_domain.rendering import render_images
+
+
+def main() -> None:
+    """Render the images, or evaluate depth on them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    commands = parser.add_subparsers(required=True)
+    render = commands.add_parser("render")
+    render.add_argument("--out", type=Path, required=True)
+    render.add_argument("--images", type=int, default=24)
+    render.add_argument("--side", type=int, default=192)
+    render.add_argument("--seed", type=int, default=0)
+    render.set_defaults(run=render_images)
+    depth = commands.add_parser("depth")
+    depth.add_argument("--images", type=Path, required=True)
+    depth.add_argument("--model", nargs="+", default=["small"])
+    depth.add_argument("--sides", type=int, nargs="+", default=[64, 96, 128])
+    depth.add_argument("--out", type=Path, required=True)
+    depth.set_defaults(run=write_depth_table)
+    arguments = parser.parse_args()
+    arguments.run(arguments)
+
+
+if __name__ == "__main__":
+    main()
