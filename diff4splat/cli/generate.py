@@ -66,7 +66,8 @@ class Generate:
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Steps of the sampler. Default: 1 for motion, 8 for video."""
     sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
-    """ODE solver of the flow. `diff4splat report error-time` compares the solvers."""
+    """ODE solver of motion and video; without a prompt and `--fill video` nothing is sampled.
+    `diff4splat report error-time` compares the solvers."""
     shift: Annotated[float | None, Number(above=0)] = None
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: Annotated[float | None, Number(least=0)] = None

@@ -21,7 +21,7 @@ class Train:
     config: str
     """Recipe: test, small or paper; or a JSON file such as the recipe.json of a run."""
     stage: str
-    """Name of the stage, as in the recipe: vae, static-low, dynamic, video_diffusion, joint."""
+    """Stage to train, such as vae; another name is refused with a list of the recipe's stages."""
     out: OutFolder = Path("training-run")
     """Folder of the run, with one subfolder per stage."""
     clips: Annotated[Path | None, InputPath(what="a folder of shards", file=False)] = None
@@ -38,9 +38,9 @@ class Train:
     features: Annotated[str | None, FeatureFiles()] = None
     """LPIPS weights: vgg:FILE or alex:FILE. Default: a distance without weights."""
     steps: Annotated[int | None, Number(above=0)] = None
-    """Save and stop after this many steps."""
+    """Save and stop after this many steps of this call."""
     minutes: Annotated[float | None, Number(above=0)] = None
-    """Save and stop after this many minutes."""
+    """Save and stop after this many minutes of this call."""
     device: str | None = None
     """Device, such as cpu. Default: a GPU if available."""
     ignore_gates: bool = False

@@ -1,8 +1,10 @@
 """From an image, its depth and its displacement to all layers.
 
-image, depth, displacement ─ upsample ─ smooth ─ pixels ─ subpixel infill    the image shows these
-smaller copy ─┬─ background layer                                       these extend them into
-└─ border extension ─ inpaint what moving objects uncover  what the image hides
+    image and maps ─ upsample ─ smooth ─ pixels ─ subpixel infill       the image shows these
+    smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving   these extend them into
+                           └─ border extension ─┘  objects uncover       what the image hides
+
+A new way of filling hidden regions belongs into ``hidden_layers``.
 """
 
 from dataclasses import dataclass, replace
