@@ -1,0 +1,1 @@
+"""Size, start and sorting of the viewer's page, in a real browser."""
