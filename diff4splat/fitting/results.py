@@ -33,7 +33,7 @@ from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.physical.view_cone import radians_per_pixel
 from diff4splat.scene.scene import Provenance, Scene
-from diff4splat.viewer.page import write_page
+from diff4splat.viewer.page import write_page_or_reason
 
 RESULT_FILES = ("scene.safetensors", "scene.html", "video.mp4", "comparison.png", "card.json")
 COMPARISON_FRAMES = 4
@@ -99,7 +99,7 @@ def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
     scene = fitted_scene(report)
     with atomic_folder(folder, RESULT_FILES) as staging:
         save_scene(scene, staging / "scene.safetensors")
-        write_page(scene, staging / "scene.html")
+        write_page_or_reason(scene, staging / "scene.html")
         write_view(scene, scene.path, staging / "video.mp4", None, log)
         write_png(_comparison(report, scene), staging / "comparison.png")
         write_text(staging / "card.json", _card(report, scene, log))

@@ -29,7 +29,7 @@ from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render_video
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
-from diff4splat.viewer.page import write_page
+from diff4splat.viewer.page import write_page_or_reason
 
 UNTRAINED = "untrained: random weights; this is the photograph itself, on a plane"
 SheetFacts = tuple[tuple[str, str], ...]
@@ -66,7 +66,7 @@ def write_scene_folder(
     with phases.phase("write files", 4) as advance:
         save_scene(scene, folder / "scene.safetensors")
         advance()
-        write_page(scene, folder / "scene.html")
+        write_page_or_reason(scene, folder / "scene.html")
         advance()
         if record.depth is not None:
             write_depth_exr(record.depth, scene.path, folder / "depth.exr")

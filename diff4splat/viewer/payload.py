@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.errors import InputError
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.static import StaticMotion
@@ -28,6 +29,10 @@ from diff4splat.viewer.quantise import (
 LEAST_OPACITY = 1 / 255
 """Renderers draw nothing below it."""
 SH_DC = 0.28209479177387814
+BYTES_PER_GAUSSIAN, BYTES_PER_KEY = 23, 19
+MAX_BYTES = 380_000_000
+"""Before compression. A browser's longest string holds about 500 million characters, and base64
+needs four for three bytes."""
 
 
 @dataclass(slots=True)
@@ -69,6 +74,24 @@ def pack_scene(scene: Scene) -> Payload:
     if isinstance(scene.motion, KeyframeMotion):
         _pack_motion(payload, scene.motion)
     return payload
+
+
+def require_page_size(scene: Scene) -> None:
+    """Refuse a scene whose page no browser could open.
+
+    Raises:
+        InputError: it is too large.
+    """
+    motion, harmonics = scene.motion, scene.gaussians.sh.shape[1] - 1
+    size = len(scene.gaussians) * (BYTES_PER_GAUSSIAN + 3 * harmonics)
+    if isinstance(motion, KeyframeMotion):
+        size += len(motion.key_times_s) * len(motion.moving_index) * BYTES_PER_KEY
+    if size > MAX_BYTES:
+        raise InputError(
+            f"HTML page: expected a scene of at most {MAX_BYTES / 1e6:.0f} MB before compression, "
+            f"got {len(scene.gaussians):,} Gaussians with {size / 1e6:.0f} MB; "
+            "make it with fewer Gaussians or key times, or render a video"
+        )
 
 
 def _moving_first(scene: Scene) -> Scene:

@@ -40,7 +40,8 @@ function startControls(canvas, camera, actions) {
 
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT/.test(event.target.tagName)) return;
-    const key = event.key.toLowerCase();
+    const name = event.key.toLowerCase(), key = event.shiftKey && name.startsWith("arrow") ? `shift ${name}` : name;
+    if (key === " " && event.target.tagName === "BUTTON") return;
     if (key in FLIGHT) held.add(key);
     else if (key in actions.keys) {
       event.preventDefault();

@@ -1,36 +1,53 @@
 // The panel under the scene: what it shows follows the player's state, and buttons call actions.
 const byId = (id) => document.getElementById(id);
+const MODES = ["color", "depth", "motion"];
 
 function startPanel(header, state, actions) {
-  byId("panel").hidden = byId("about").hidden = false;
+  byId("panel").hidden = byId("hint").hidden = false;
   const [start, stop] = header.time_range_s, isStill = !(stop > start);
   Object.assign(byId("time"), { min: start, max: stop, disabled: isStill });
   for (const id of ["play", "loop", "speed"]) byId(id).disabled = isStill;
   byId("follow").disabled = header.path.times_s.length < 2;
+  byId("motion").disabled = !header.moving;
   byId("time").oninput = (event) => actions.setTime(Number(event.target.value));
   byId("speed").onchange = (event) => { state.speed = Number(event.target.value); };
-  byId("mode").onchange = (event) => actions.setMode(Number(event.target.value));
+  MODES.forEach((id, mode) => { byId(id).onclick = () => actions.setMode(mode); });
   for (const id of ["play", "loop", "follow", "record", "reset", "theme", "help"]) byId(id).onclick = actions[id];
-  describe(header);
+  // Keys belong to the scene again once the mouse or a finger has used a control.
+  byId("panel").addEventListener("pointerup", () => setTimeout(() => document.activeElement.blur()));
 }
 
 function showState(state) {
   byId("time").value = state.timeS;
   byId("clock").textContent = `${state.timeS.toFixed(2)} s`;
-  byId("play").textContent = state.isPlaying ? "❚❚" : "▶";
-  byId("mode").value = state.mode;
-  for (const [id, pressed] of [["loop", state.loops], ["follow", state.follows], ["record", state.records], ["help", !byId("keys").hidden]]) {
-    byId(id).setAttribute("aria-pressed", String(pressed));
-  }
+  byId("play").classList.toggle("plays", state.isPlaying);
+  const pressed = { loop: state.loops, follow: state.follows, record: state.records, help: !byId("keys").hidden };
+  MODES.forEach((id, mode) => { pressed[id] = mode === state.mode; });
+  for (const id in pressed) byId(id).setAttribute("aria-pressed", String(pressed[id]));
+}
+
+// Colours of depth run from near, warm, to far; those of motion from none to far, warm.
+function showLegend(mode, [near, far], largest) {
+  const legend = byId("legend"), digits = (value) => value.toPrecision(2) * 1;
+  legend.hidden = mode === 0;
+  legend.className = MODES[mode];
+  byId("least").textContent = mode === 1 ? `near ${digits(near)}` : "0";
+  byId("most").textContent = mode === 1 ? `${digits(far)} far` : digits(largest);
+  byId("unit").textContent = `${mode === 1 ? "depth" : "displacement"}, scene units`;
 }
 
 function describe({ about, count, moving }) {
   document.title = about.title;
-  const title = document.createElement("strong");
+  byId("about").hidden = false;
+  const title = document.createElement("strong"), facts = document.createElement("small");
   title.textContent = about.title;
-  const facts = [`${count.toLocaleString()} Gaussians, ${moving.toLocaleString()} move`, `model ${about.model}`, `licence ${about.license}`];
-  if (about.untrained) facts.push("random weights: not a trained result");
-  byId("about").append(title, [...facts, ...about.notes].join(" · "));
+  const lines = [];
+  if (count !== undefined) lines.push(`${count.toLocaleString()} Gaussians${moving ? `, ${moving.toLocaleString()} move` : ""}`);
+  if (about.model !== "none") lines.push(`model ${about.model}`);
+  if (about.license !== "unknown") lines.push(`licence ${about.license}`);
+  if (about.untrained) lines.push("random weights: not a trained result");
+  facts.textContent = [...lines, ...about.notes].join(" · ");
+  byId("about").append(title, facts);
 }
 
 function showMessage(text) {

@@ -1,28 +1,34 @@
 // Header and bytes of the page as typed arrays; the layout is that of payload.py.
-async function readPayload() {
-  const header = JSON.parse(document.getElementById("header").textContent);
-  const element = document.getElementById("payload");
-  const packed = await (await fetch("data:application/octet-stream;base64," + element.textContent.trim())).blob();
+const readHeader = () => JSON.parse(document.getElementById("header").textContent);
+
+async function unpack() {
+  const element = document.getElementById("payload"), stream = new Blob([fromBase64(element.textContent.trim())]).stream();
   element.remove();
-  const stream = packed.stream().pipeThrough(new DecompressionStream("gzip"));
-  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-  const sections = {};
-  let start = 0;
-  for (const [name, length] of header.sections) {
-    sections[name] = bytes.subarray(start, start + length);
-    start += length;
-  }
-  return { header, sections };
+  return new Uint8Array(await new Response(stream.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer());
+}
+
+function fromBase64(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  const binary = atob(text), bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = binary.charCodeAt(i);
+  return bytes;
 }
 
 // Plane by plane: the first bytes of all values, then the second ones.
-function joinPlanes(bytes, size, Type, skip = 0) {
-  const count = bytes.length / (size - skip), raw = new Uint8Array(count * size);
-  for (let plane = skip; plane < size; plane++) {
-    const offset = (plane - skip) * count;
-    for (let i = 0; i < count; i++) raw[i * size + plane] = bytes[offset + i];
+function join16(bytes, Type) {
+  const count = bytes.length / 2, joined = new Type(count);
+  for (let i = 0; i < count; i++) joined[i] = bytes[i] | (bytes[count + i] << 8);
+  return joined;
+}
+
+// With three planes the lowest byte is zero.
+function join32(bytes, planes) {
+  const count = bytes.length / planes, joined = new Uint32Array(count);
+  for (let plane = 0; plane < planes; plane++) {
+    const start = plane * count, shift = 8 * (plane + 4 - planes);
+    for (let i = 0; i < count; i++) joined[i] |= bytes[start + i] << shift;
   }
-  return new Type(raw.buffer);
+  return joined;
 }
 
 // Twice: what is stored are changes of changes.
@@ -34,23 +40,34 @@ function sumOverKeys(values, perKey) {
 }
 
 function packRotations(largest, parts) {
-  return Uint32Array.from(largest, (which, i) => (which << 30) | parts[3 * i] | (parts[3 * i + 1] << 10) | (parts[3 * i + 2] << 20));
+  const packed = new Uint32Array(largest.length);
+  for (let i = 0, j = 0; i < packed.length; i++, j += 3) {
+    packed[i] = (largest[i] << 30) | parts[j] | (parts[j + 1] << 10) | (parts[j + 2] << 20);
+  }
+  return packed;
 }
 
-function decodeScene({ header, sections }) {
+function decodeScene(header, bytes) {
+  const sections = {};
+  let start = 0;
+  for (const [name, length] of header.sections) {
+    sections[name] = bytes.subarray(start, start + length);
+    start += length;
+  }
+  if (bytes.length !== start) throw new Error("the file is damaged or incomplete");
   const scene = {
-    means: joinPlanes(sections.means, 4, Float32Array, 1),
-    logScales: joinPlanes(sections.log_scales, 2, Int16Array),
-    quats: joinPlanes(sections.quats, 4, Uint32Array),
+    means: new Float32Array(join32(sections.means, 3).buffer),
+    logScales: join16(sections.log_scales, Int16Array),
+    quats: join32(sections.quats, 4),
     colors: sections.colors,
     opacities: sections.opacities,
     harmonics: sections.harmonics,
   };
   if (!header.moving) return scene;
   const perKey = header.moving * 3;
-  scene.offsets = sumOverKeys(joinPlanes(sections.offsets, 2, Int16Array), perKey);
-  const parts = sumOverKeys(joinPlanes(sections.rotation_components, 2, Uint16Array), perKey);
+  scene.offsets = sumOverKeys(join16(sections.offsets, Int16Array), perKey);
+  const parts = sumOverKeys(join16(sections.rotation_components, Uint16Array), perKey);
   scene.rotations = packRotations(sections.rotation_largest, parts);
-  scene.logScaleOffsets = sumOverKeys(joinPlanes(sections.log_scale_offsets, 2, Int16Array), perKey);
+  scene.logScaleOffsets = sumOverKeys(join16(sections.log_scale_offsets, Int16Array), perKey);
   return scene;
 }

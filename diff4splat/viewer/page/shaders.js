@@ -1,10 +1,12 @@
 // The formulas of docs/reference/rendering.md; one quad per Gaussian, 128 quads per instance.
 const BATCH = 128;
-const VERTEX = `#version 300 es
+// Harmonics that a scene does not have are left out of the program: it compiles and runs faster.
+const vertexShader = (harmonicCount) => `#version 300 es
+#define HARMONICS ${harmonicCount}
 precision highp float; precision highp int;
 uniform highp usampler2D order, canonical, harmonics;
 uniform highp usampler2DArray keys;
-uniform int count, moving, harmonicCount, mode;
+uniform int count, moving, mode;
 uniform ivec4 layers; uniform vec4 weights;
 uniform ivec2 between; uniform float betweenWeight, offsetStep, logScaleStep, harmonicsStep;
 uniform mat3 cameraFromWorld; uniform vec3 position;
@@ -44,6 +46,7 @@ mat3 rotation(vec4 q) {
               2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
               2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }
+#if HARMONICS > 0
 vec3 harmonic(int index, int i) {
   vec3 c;
   for (int k = 0; k < 3; k++) {
@@ -54,21 +57,31 @@ vec3 harmonic(int index, int i) {
   return c * harmonicsStep;
 }
 vec3 viewColor(int index, vec3 base, vec3 d) {
-  if (harmonicCount == 0) return base;
   float x = d.x, y = d.y, z = d.z, xx = x * x, yy = y * y, zz = z * z;
   vec3 c = base + 0.48860251 * (-y * harmonic(index, 0) + z * harmonic(index, 1) - x * harmonic(index, 2));
-  if (harmonicCount < 8) return c;
+#if HARMONICS >= 8
   c += 1.09254843 * (x * y * harmonic(index, 3) - y * z * harmonic(index, 4) - x * z * harmonic(index, 6))
      + 0.31539157 * (2.0 * zz - xx - yy) * harmonic(index, 5) + 0.54627422 * (xx - yy) * harmonic(index, 7);
-  if (harmonicCount < 15) return c;
-  return c + 0.59004359 * (-y * (3.0 * xx - yy) * harmonic(index, 8) - x * (xx - 3.0 * yy) * harmonic(index, 14))
+#endif
+#if HARMONICS >= 15
+  c += 0.59004359 * (-y * (3.0 * xx - yy) * harmonic(index, 8) - x * (xx - 3.0 * yy) * harmonic(index, 14))
      + 2.89061144 * x * y * z * harmonic(index, 9) + 1.44530572 * z * (xx - yy) * harmonic(index, 13)
      - 0.45704580 * (4.0 * zz - xx - yy) * (y * harmonic(index, 10) + x * harmonic(index, 12))
      + 0.37317633 * z * (2.0 * zz - 3.0 * xx - 3.0 * yy) * harmonic(index, 11);
+#endif
+  return c;
 }
-vec3 heat(float v) {
-  v = clamp(v, 0.0, 1.0);
-  return clamp(vec3(1.6 * v - 0.1, 1.1 * sin(3.14159 * v) + 0.05, 0.9 - 1.3 * v), 0.0, 1.0);
+#else
+vec3 viewColor(int index, vec3 base, vec3 d) { return base; }
+#endif
+// The Turbo map without its dark end, as a polynomial.
+vec3 turbo(float v) {
+  v = 0.1 + 0.85 * clamp(v, 0.0, 1.0);
+  vec4 a = vec4(1.0, v, v * v, v * v * v); vec2 b = a.zw * a.z;
+  return clamp(vec3(
+    dot(a, vec4(0.13572138, 4.61539260, -42.66032258, 132.13108234)) + dot(b, vec2(-152.94239396, 59.28637943)),
+    dot(a, vec4(0.09140261, 2.19418839, 4.84296658, -14.18503333)) + dot(b, vec2(4.27729857, 2.82956604)),
+    dot(a, vec4(0.10667330, 12.64194608, -60.58204836, 110.36276771)) + dot(b, vec2(-89.90310912, 27.34824973))), 0.0, 1.0);
 }
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -115,8 +128,8 @@ void main() {
   gl_Position = vec4(2.0 * pixel.x / size.x - 1.0, 1.0 - 2.0 * pixel.y / size.y, 0.0, 1.0);
   vec3 stored = vec3(first.w & 255u, (first.w >> 8) & 255u, (first.w >> 16) & 255u) / 255.0;
   vec3 rgb = max(viewColor(index, mix(colorLow, colorHigh, stored), normalize(world - position)), 0.0);
-  if (mode == 1) rgb = heat(1.0 - log(camera.z / depthRange.x) / log(depthRange.y / depthRange.x));
-  if (mode == 2) rgb = mix(vec3(0.25 * dot(rgb, vec3(0.3, 0.6, 0.1))), heat(length(offset) / largestOffset), step(1e-6, length(offset)));
+  if (mode == 1) rgb = turbo(1.0 - log(camera.z / depthRange.x) / log(depthRange.y / depthRange.x));
+  if (mode == 2) rgb = index < moving ? turbo(length(offset) / largestOffset) : vec3(0.3 * dot(rgb, vec3(0.3, 0.6, 0.1)));
   color = vec4(rgb, opacity);
 }`;
 const FRAGMENT = `#version 300 es

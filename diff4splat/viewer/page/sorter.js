@@ -51,12 +51,18 @@ function sorterMain() {
   };
 }
 
-function startSorter(header, scene, onSorted) {
-  const source = new Blob([`(${sorterMain})()`], { type: "text/javascript" });
-  const worker = new Worker(URL.createObjectURL(source));
-  worker.onmessage = ({ data }) => onSorted(data);
-  worker.postMessage({
-    means: scene.means, offsets: scene.offsets, step: header.offset_step, moving: header.moving, count: header.count,
-  });
-  return (request) => worker.postMessage(request);
+// The worker starts at once, so that it is there when the scene has been read.
+class Sorter {
+  constructor(header, onSorted) {
+    const url = URL.createObjectURL(new Blob([`(${sorterMain})()`], { type: "text/javascript" }));
+    Object.assign(this, { header, worker: new Worker(url) });
+    this.worker.onmessage = ({ data }) => onSorted(data);
+  }
+
+  load({ means, offsets }) {
+    const { offset_step: step, moving, count } = this.header;
+    this.worker.postMessage({ means, offsets, step, moving, count });
+  }
+
+  sort(request) { this.worker.postMessage(request); }
 }
