@@ -87,6 +87,6 @@ def drawn_scenes() -> dict[str, Scene]:
         "key_frames": scene(cloud(1500), key_motion(1500)),
         "cubic": scene(cloud(900), key_motion(900, "cubic")),
         "turning": scene(cloud(1200), key_motion(1200, turning=True)),
-        "faint": scene(cloud(2500, opacity=(0.02, 0.3))),
+        "faint": scene(cloud(6000, opacity=(0.02, 0.5))),
         "harmonics": scene(cloud(1000, degree=3)),
     }

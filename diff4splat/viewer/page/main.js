@@ -37,7 +37,7 @@ async function main() {
     redraw,
     leavePath() { state.follows = false; byId("hint").hidden = true; },
     setTime(timeS) { state.timeS = clamp(timeS, startS, stopS); redraw(); },
-    setMode(mode) { state.mode = mode; showLegend(mode, depthRange, renderer.largestOffset); redraw(); },
+    setMode(mode) { state.mode = mode; byId("hint").hidden = true; showLegend(mode, depthRange, renderer.largestOffset); redraw(); },
     play() {
       if (!state.isPlaying && !state.loops && state.timeS >= stopS) state.timeS = startS;
       state.isPlaying = !state.isPlaying && stopS > startS; redraw();

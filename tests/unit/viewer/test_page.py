@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import hashlib
 import json
 import re
 from dataclasses import replace
@@ -12,8 +13,11 @@ import pytest
 import torch
 from viewer_scenes import cloud, drawn_scenes, key_motion, scene
 
+from benchmarks.viewer.scenes import moving_scene
+from diff4splat.errors import InputError
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.static import StaticMotion
+from diff4splat.viewer import payload
 from diff4splat.viewer.keyframed import MAX_KEYS, keyframed
 from diff4splat.viewer.page import page, script, write_page
 from diff4splat.viewer.payload import pack_scene
@@ -44,6 +48,43 @@ def test_the_script_is_small() -> None:
 def test_the_page_needs_no_network() -> None:
     text = page(keyframed(scene(cloud(10))))
     assert not re.search(r"https?:|//[a-z]+\.[a-z]|<link|src=", text)
+
+
+def test_the_policy_names_the_script_and_the_style_and_nothing_else() -> None:
+    text = page(keyframed(scene(cloud(10), prompt=HOSTILE)))
+    rules = dict(
+        rule.split(" ", 1)
+        for rule in re.search(r'Security-Policy" content="(.*?)"', text)[1].split("; ")
+    )
+    code = re.search(r"<script>(.*?)</script>", text, re.DOTALL)[1]
+    style = re.search(r"<style>(.*?)</style>", text, re.DOTALL)[1]
+    for rule, content in (("script-src", code), ("style-src", style)):
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        assert rules.pop(rule) == f"'sha256-{digest}'"
+    assert rules.pop("worker-src") == "blob:"
+    assert set(rules.values()) == {"'none'"}
+
+
+def test_half_of_60000_gaussians_moving_fit_into_4_mb() -> None:
+    assert len(page(keyframed(moving_scene(60_000)))) < 4_000_000
+
+
+def test_what_stands_costs_nothing_per_key_time() -> None:
+    def size(keys: int) -> int:
+        motion = key_motion(30, keys=keys)
+        return sum(len(data) for _, data in pack_scene(scene(cloud(30), motion)).sections)
+
+    assert size(5) - size(2) == 3 * 10 * 19
+
+
+def test_a_scene_that_is_too_large_is_refused_and_nothing_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(payload, "MAX_BYTES", 23 * 99)
+    with pytest.raises(InputError, match="100 Gaussians"):
+        write_page(scene(cloud(100)), tmp_path / "scene.html")
+    assert not list(tmp_path.iterdir())
+    write_page(scene(cloud(99)), tmp_path / "scene.html")
 
 
 def test_sections_are_as_long_as_the_header_says() -> None:
