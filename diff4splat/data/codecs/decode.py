@@ -12,6 +12,7 @@ from diff4splat.data.clip_part import ClipPart, chosen_frames, chosen_views
 from diff4splat.data.codecs.cameras import decode_cameras
 from diff4splat.data.codecs.depth import decode_exr
 from diff4splat.data.codecs.images import decode_png
+from diff4splat.data.codecs.masks import decode_masks
 from diff4splat.data.codecs.metadata import decode_metadata
 from diff4splat.data.codecs.motion import VisibleTracks, decode_flow, decode_tracks
 from diff4splat.data.codecs.video import decode_mp4
@@ -52,6 +53,7 @@ def wanted_members(stored: Collection[str], entry: ClipEntry, part: ClipPart) ->
     for view in chosen_views(part, entry):
         names += [f"rgb{view:02d}.png", f"rgb{view:02d}.mp4", f"depth{view:02d}.exr"]
         names += [f"instances{view:02d}.png"] if part.instances else []
+        names += [f"masks{view:02d}.npz"] if part.masks else []
         names += [f"flow{view:02d}.npz"] if part.flow else []
     return [name for name in names if name in stored]
 
@@ -82,12 +84,12 @@ def decode_clip(members: Mapping[str, bytes], entry: ClipEntry, part: ClipPart) 
 def _view(job: _Job, number: int, camera: Camera, seen: VisibleTracks | None) -> View:
     instances, flow = f"instances{number:02d}.png", f"flow{number:02d}.npz"
     shape = (job.entry.frames, *job.entry.size_px)
-    depth = job.decode(f"depth{number:02d}.exr", lambda content: decode_exr(content, shape))
     return View(
         rgb=job.of_frames(_rgb(job, number)),
-        depth=job.of_frames(torch.from_numpy(depth)),
+        depth=_depth(job, f"depth{number:02d}.exr", shape),
         cameras=_cameras(job, camera),
         instances=_instances(job, instances, shape) if instances in job.members else None,
+        **_masks(job, f"masks{number:02d}.npz"),
         flow=_flow(job, flow) if flow in job.members else None,
         track_uv=None if seen is None else job.of_frames(seen.uv),
         track_visible=None if seen is None else job.of_frames(seen.visible),
@@ -112,6 +114,20 @@ def _rgb(job: _Job, number: int) -> Tensor:
     return torch.from_numpy(job.decode(image, lambda content: decode_png(content, shape)))
 
 
+def _depth(job: _Job, suffix: str, shape: tuple[int, int, int]) -> Tensor | None:
+    if suffix not in job.members and "depth" not in job.entry.layers:
+        return None
+    decoded = job.decode(suffix, lambda content: decode_exr(content, shape))
+    return job.of_frames(torch.from_numpy(decoded))
+
+
+def _masks(job: _Job, suffix: str) -> dict[str, Tensor]:
+    if suffix not in job.members:
+        return {}
+    masks = job.decode(suffix, lambda content: decode_masks(content, job.entry))
+    return {name: job.of_frames(mask) for name, mask in masks.items()}
+
+
 def _instances(job: _Job, suffix: str, shape: tuple[int, ...]) -> Tensor:
     decoded = job.decode(suffix, lambda content: decode_png(content, shape))
     return job.of_frames(torch.from_numpy(decoded))
@@ -130,6 +146,7 @@ def _tracks(job: _Job) -> tuple[Tracks, tuple[VisibleTracks | None, ...]]:
     )
     return Tracks(
         positions=job.of_frames(tracks.positions),
+        known=None if tracks.known is None else job.of_frames(tracks.known),
         instances=tracks.instances,
         found_at=_renumbered(job, tracks.found_at),
     ), seen

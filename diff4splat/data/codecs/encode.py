@@ -16,6 +16,7 @@ from diff4splat.data.clip import Clip, View
 from diff4splat.data.codecs.cameras import encode_cameras
 from diff4splat.data.codecs.depth import DepthCoding, encode_exr
 from diff4splat.data.codecs.images import encode_png
+from diff4splat.data.codecs.masks import encode_masks, has_masks
 from diff4splat.data.codecs.metadata import encode_metadata
 from diff4splat.data.codecs.motion import encode_flow, encode_tracks
 from diff4splat.data.codecs.video import encode_mp4
@@ -72,7 +73,7 @@ def _members(clip: Clip, coding: Coding) -> Iterator[tuple[str, bytes]]:
     """Small ones first: who streams the tar knows the sizes before the pixels come."""
     yield "meta.json", encode_metadata(clip.note, entry_of(clip))
     yield "camera.npz", encode_cameras(clip)
-    if clip.tracks is not None and len(clip.tracks.instances):
+    if clip.tracks is not None and clip.tracks.positions.shape[1]:
         yield "tracks.npz", encode_tracks(clip, clip.tracks)
     fps = _fps(clip.times_s)
     for number, view in enumerate(clip.views):
@@ -83,9 +84,12 @@ def _pixels(view: View, coding: Coding, fps: float) -> Iterator[tuple[str, str, 
     rgb = view.rgb.numpy()
     lossy = coding.images == "mp4"
     yield "rgb", coding.images, encode_mp4(rgb, fps) if lossy else encode_png(rgb)
-    yield "depth", "exr", encode_exr(view.depth.numpy(), coding.depth)
+    if view.depth is not None:
+        yield "depth", "exr", encode_exr(view.depth.numpy(), coding.depth)
     if view.instances is not None:
         yield "instances", "png", encode_png(view.instances.numpy())
+    if has_masks(view):
+        yield "masks", "npz", encode_masks(view)
     if view.flow is not None:
         yield "flow", "npz", encode_flow(view.flow)
 
