@@ -145,7 +145,7 @@ def _half_floats(file: Path) -> np.ndarray:
 def _flow(
     folder: Path, entry: dict[str, Any], key: str, size_px: tuple[int, int]
 ) -> FlowMap | None:
-    """u beside v in one image; absent in the last frame forward and the first one backward."""
+    """Halves u and v of one image; absent in the last frame forward and the first one backward."""
     if not mapping(entry, key).get("path"):
         return None
     file = _file(folder, entry, key)

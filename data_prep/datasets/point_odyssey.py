@@ -102,7 +102,7 @@ def _has_tracks(folder: Path) -> bool:
     if not (folder / "info.npz").is_file():
         return True
     shape = NpzFile(folder / "info.npz").array("trajs_3d", (None,))
-    return len(shape) == 3 and shape[1] >= _FEWEST_TRACKS
+    return bool(len(shape) == 3 and shape[1] >= _FEWEST_TRACKS)
 
 
 def _tracks(facts: NpzFile, frames: int) -> Callable[[range], PointTracks]:

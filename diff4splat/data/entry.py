@@ -93,7 +93,8 @@ def entry_from_json(source: dict[str, Any]) -> ClipEntry:
             f"'size_px': expected height and width from 1 to {json_fields.MAX_SIDE_PX}, "
             f"got {repr(size)[:60]}"
         )
-    is_static, tracks = take(source, "static", bool), take_count(source, "tracks", 0, json_fields.MAX_TRACKS)
+    is_static = take(source, "static", bool)
+    tracks = take_count(source, "tracks", 0, json_fields.MAX_TRACKS)
     # Clips of version 1 had masks of all objects beside their tracks.
     motion = "static" if is_static else "objects" if tracks else "unknown"
     values = {"dataset": "", "scene": "", "layers": ["depth"], "motion": motion} | source

@@ -143,7 +143,8 @@ def _tracked(
     points = _seen_points(sequence.tracks(window), sequence.views[0].cameras.size_px, options)
     if not points.known.shape[1]:
         return None, views
-    positions = rigid.transform_points(home, torch.from_numpy(points.positions))
+    world = torch.from_numpy(points.positions)
+    positions = rigid.transform_points(home, world.reshape(-1, 3)).reshape(world.shape)
     known = torch.from_numpy(points.known)
     whole = sequence.views[0].cameras.size_px
     factor = np.array([size_px[1] / whole[1], size_px[0] / whole[0]])

@@ -99,6 +99,11 @@ class ImageFile:
 
 @contextmanager
 def opened_image(file: Path) -> Iterator[Image.Image]:
+    """The image, its pixels not decoded yet.
+
+    Raises:
+        FileFormatError: missing, damaged or enormous, here or while it is decoded.
+    """
     try:
         # Pillow warns about sizes and odd metadata; neither is a reason to stop.
         with warnings.catch_warnings():
@@ -122,7 +127,11 @@ def opened_image(file: Path) -> Iterator[Image.Image]:
 
 
 def image_levels(file: Path) -> np.ndarray:
-    """uint8, ``h w 3`` or ``h w 4``."""
+    """Levels of 8 bits, ``h w 3`` or ``h w 4``.
+
+    Raises:
+        FileFormatError: missing, damaged, or of more bits.
+    """
     with opened_image(file) as image:
         if photo_validation.is_deep(image):
             raise FileFormatError(

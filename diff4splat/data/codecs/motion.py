@@ -84,7 +84,8 @@ def decode_tracks(
     with opened_npz(content) as archive:
         positions = take_array(archive, "positions", np.float32, (frames, count, 3))
         instances = _objects(archive, count)
-        known = take_bits(archive, "known", (frames, count)) if has_array(archive, "known") else None
+        gaps = has_array(archive, "known")
+        known = take_bits(archive, "known", (frames, count)) if gaps else None
         found_at = take_array(archive, "found_at", np.int32, (count, 2))
         seen = tuple(_seen(archive, view, (frames, count)) for view in views)
     beyond = (found_at < -1) | (found_at >= (entry.views, frames))

@@ -40,7 +40,7 @@ class VisibleErrors:
 
 
 def compare_at_query(clip: Clip, number: int) -> QueryErrors | None:
-    """Errors of the tracks whose query pixel is in view ``number``; None without tracks or depth."""
+    """Errors of the tracks with query pixels in view ``number``; None without tracks or depth."""
     view, tracks = clip.views[number], clip.tracks
     if tracks is None or view.track_uv is None or view.track_visible is None or view.depth is None:
         return None
