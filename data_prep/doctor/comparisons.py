@@ -137,13 +137,19 @@ def projected_tracks(clip: Clip) -> tuple[Tensor, Tensor, Tensor] | None:
 
 def _tracks(clip: Clip) -> Tensor:
     found = projected_tracks(clip)
-    return torch.zeros(0) if found is None else (found[0] - found[1]).norm(dim=-1)
+    if found is None or _made_of_each_other(clip):
+        return torch.zeros(0)
+    return (found[0] - found[1]).norm(dim=-1)
+
+
+def _made_of_each_other(clip: Clip) -> bool:
+    """Pixels and depth that a reader made of 3D tracks say nothing about these."""
+    return clip.note.track_source == "estimated"
 
 
 def _track_depth(clip: Clip) -> Tensor:
     view = clip.views[0]
-    # Depth that was made of the tracks says nothing about them.
-    if projected_tracks(clip) is None or view.depth is None or clip.note.metric == "pseudo":
+    if projected_tracks(clip) is None or view.depth is None or _made_of_each_other(clip):
         return torch.zeros(0)
     _, z = project(view.cameras.to(torch.float64), clip.tracks.positions.double())
     errors = []

@@ -97,9 +97,7 @@ def take_choice(source: dict[str, Any], key: str, known: tuple[str, ...]) -> Any
     """The text under ``key``, one of ``known``."""
     value = take(source, key, str)
     if value not in known:
-        raise FileFormatError(
-            f"'{key}': expected one of {', '.join(known)}, got {value[:60]!r}"
-        )
+        raise FileFormatError(f"'{key}': expected one of {', '.join(known)}, got {value[:60]!r}")
     return value
 
 

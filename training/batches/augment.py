@@ -56,9 +56,7 @@ def reversed_in_time(clip: Clip) -> Clip:
     times_s, tracks = clip.times_s, clip.tracks
     if tracks is not None:
         known = None if tracks.known is None else tracks.known.flip(0)
-        tracks = replace(
-            drop_projections(tracks), positions=tracks.positions.flip(0), known=known
-        )
+        tracks = replace(drop_projections(tracks), positions=tracks.positions.flip(0), known=known)
     views = tuple(_backwards(view) for view in clip.views)
     times_s = times_s[0] + (times_s[-1] - times_s).flip(0)
     return from_first_camera(replace(clip, times_s=times_s, views=views, tracks=tracks))
