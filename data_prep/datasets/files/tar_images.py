@@ -26,6 +26,8 @@ class TarImages:
             with tarfile.open(file, "r:") as archive:
                 for member in archive:
                     self._add(member)
+        except FileFormatError:
+            raise
         except (tarfile.TarError, OSError, ValueError) as error:
             raise FileFormatError(
                 f"{file}: expected a whole tar, got a cut off or damaged one; copy it again"
