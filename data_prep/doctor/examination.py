@@ -163,15 +163,15 @@ def table(findings: Findings) -> str:
 def _row(comparison: Comparison, examined: tuple[Examined, ...]) -> str:
     values = [each.errors[comparison.name] for each in examined]
     present = torch.tensor([value for value in values if value is not None], dtype=torch.float64)
-    limit = shown(comparison.limit, comparison)
+    limit = with_unit(comparison.limit, comparison)
     if not len(present):
         return f"| {comparison.meaning} | – | – | {limit} | not in these clips |"
     good = float(present.max()) <= comparison.limit
-    worst, middle = (shown(float(v), comparison) for v in (present.max(), present.median()))
+    worst, middle = (with_unit(float(v), comparison) for v in (present.max(), present.median()))
     return f"| {comparison.meaning} | {worst} | {middle} | {limit} | {'ok' if good else 'WRONG'} |"
 
 
-def shown(value: float, comparison: Comparison) -> str:
+def with_unit(value: float, comparison: Comparison) -> str:
     """A number with its unit."""
     return f"{value:.2g} {comparison.unit}".strip()
 
@@ -191,7 +191,7 @@ def _change(each: Examined) -> str:
     names = {one.name: one for one in COMPARISONS}
     mended = [name for name in each.failed if each.cause.errors[name] is not None]
     best = min(mended, key=lambda name: each.cause.errors[name] / each.errors[name])
-    before, after = (shown(e[best], names[best]) for e in (each.errors, each.cause.errors))
+    before, after = (with_unit(e[best], names[best]) for e in (each.errors, each.cause.errors))
     return f"with it undone, {names[best].meaning} falls from {before} to {after}"
 
 

@@ -96,7 +96,9 @@ def _require_view(clip: Clip, view: View, where: str) -> None:
 
 def _require_depth(depth: Tensor, where: str, shape: tuple[int, ...]) -> None:
     _require(depth, where, torch.float32, shape)
-    if not bool(torch.isfinite(depth).all() and (depth >= 0).all()):
+    # One pass over the memory; comparisons with NaN are False.
+    low, high = torch.aminmax(depth)
+    if not bool(low >= 0 and high < torch.inf):
         raise InputError(f"{where}: expected finite depth, 0 for none, got other values")
 
 
@@ -160,6 +162,8 @@ def _require_tracks(clip: Clip) -> None:
 
 
 def _require_depth_share(clip: Clip, least: float) -> None:
+    if least <= 0:
+        return
     known = sum(int((v.depth > 0).sum()) for v in clip.views if v.depth is not None)
     share = known / (len(clip.views) * clip.frames * clip.size_px[0] * clip.size_px[1])
     if share < least:

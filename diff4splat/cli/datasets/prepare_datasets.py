@@ -45,7 +45,7 @@ class PrepareDoctor:
         """
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.data_prep.doctor.examination import DoctorJob, examine, table, verdict
-        from diff4splat.data_prep.doctor.picture import picture
+        from diff4splat.data_prep.doctor.overview import draw_examined
         from diff4splat.errors import InputError
         from diff4splat.io.photos.images import write_png
 
@@ -53,7 +53,7 @@ class PrepareDoctor:
         findings = examine(job, ConsolePhases())
         print(table(findings))
         if findings.examined:
-            write_png(picture(findings.worst, verdict(findings)), self.out)
+            write_png(draw_examined(findings.worst, verdict(findings)), self.out)
             note(f"wrote {self.out}: the worst clip, read as it was")
         if not findings.is_sound:
             raise InputError(f"{self.path}: {verdict(findings)}")
@@ -81,10 +81,10 @@ class PrepareImport:
     """Largest number of cameras per clip."""
     sequences: Annotated[int | None, Number(least=1)] = None
     """Read the first N sequences only."""
-    images: Literal["png", "mp4"] = "png"
-    """PNG without loss, or MP4, ten times smaller."""
-    depth: Literal["pxr24", "half", "float"] = "pxr24"
-    """Precision of depth: 1.5e-5, 4.9e-4 or exact."""
+    images: Literal["png", "jpeg", "mp4"] = "png"
+    """PNG without loss, JPEG, which is read fastest, or MP4, which is smallest."""
+    depth: Literal["pxr24", "half", "half_plain", "float"] = "pxr24"
+    """Relative error of depth: 1.5e-5, 4.9e-4 (packed, or plain and read fastest), or none."""
     append: bool = False
     """Add to an existing folder; existing clips are kept."""
 

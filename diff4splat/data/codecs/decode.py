@@ -11,7 +11,7 @@ from diff4splat.data.clip import Clip, Flow, Tracks, View
 from diff4splat.data.clip_part import ClipPart, chosen_frames, chosen_views
 from diff4splat.data.codecs.cameras import decode_cameras
 from diff4splat.data.codecs.depth import decode_exr
-from diff4splat.data.codecs.images import decode_png
+from diff4splat.data.codecs.images import decode_jpeg, decode_png
 from diff4splat.data.codecs.masks import decode_masks
 from diff4splat.data.codecs.metadata import decode_metadata
 from diff4splat.data.codecs.motion import VisibleTracks, decode_flow, decode_tracks
@@ -51,7 +51,8 @@ def wanted_members(stored: Collection[str], entry: ClipEntry, part: ClipPart) ->
     """The suffixes, among those ``stored``, that ``decode_clip`` will need."""
     names = ["meta.json", "camera.npz", *(["tracks.npz"] if part.tracks else [])]
     for view in chosen_views(part, entry):
-        names += [f"rgb{view:02d}.png", f"rgb{view:02d}.mp4", f"depth{view:02d}.exr"]
+        names += [f"rgb{view:02d}.{suffix}" for suffix in ("png", "jpg", "mp4")]
+        names += [f"depth{view:02d}.exr"]
         names += [f"instances{view:02d}.png"] if part.instances else []
         names += [f"masks{view:02d}.npz"] if part.masks else []
         names += [f"flow{view:02d}.npz"] if part.flow else []
@@ -110,6 +111,9 @@ def _rgb(job: _Job, number: int) -> Tensor:
     movie = f"rgb{number:02d}.mp4"
     if movie in job.members:
         return torch.from_numpy(job.decode(movie, lambda content: decode_mp4(content, shape)))
+    photo = f"rgb{number:02d}.jpg"
+    if photo in job.members:
+        return torch.from_numpy(job.decode(photo, lambda content: decode_jpeg(content, shape)))
     image = f"rgb{number:02d}.png"
     return torch.from_numpy(job.decode(image, lambda content: decode_png(content, shape)))
 

@@ -11,7 +11,7 @@ from toy_datasets import TOYS
 from diff4splat.data.clip import View
 from diff4splat.data_prep.doctor import causes, examination
 from diff4splat.data_prep.doctor.examination import DoctorJob, Findings, examine, table, verdict
-from diff4splat.data_prep.doctor.picture import picture
+from diff4splat.data_prep.doctor.overview import draw_examined
 from diff4splat.errors import InputError
 from diff4splat.geometry import rigid
 from diff4splat.progress.phases import Phases
@@ -80,7 +80,7 @@ def test_the_picture_changes_with_what_is_wrong(
     copies: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sound = examined("dynamic_replica", copies)
-    good = picture(sound.worst, verdict(sound))
+    good = draw_examined(sound.worst, verdict(sound))
     as_read = examination._in_its_world
     flipped = causes._posed(causes._opengl)
     monkeypatch.setattr(
@@ -91,7 +91,7 @@ def test_the_picture_changes_with_what_is_wrong(
         ),
     )
     wrong = examined("dynamic_replica", copies)
-    bad = picture(wrong.worst, verdict(wrong))
+    bad = draw_examined(wrong.worst, verdict(wrong))
     assert good.shape == bad.shape and good.shape[1] == 1400
     red = torch.tensor([255.0, 112, 96]) / 255
     share = [float(((image - red).abs().amax(-1) < 0.02).float().mean()) for image in (good, bad)]
@@ -101,7 +101,7 @@ def test_the_picture_changes_with_what_is_wrong(
 @pytest.mark.parametrize("name", ["multicam_video", "stereo4d", "matrixcity half"])
 def test_pictures_of_what_lacks_depth_flow_or_tracks(name: str, copies: Path) -> None:
     findings = examined(name, copies)
-    assert bool(picture(findings.worst, verdict(findings)).isfinite().all())
+    assert bool(draw_examined(findings.worst, verdict(findings)).isfinite().all())
 
 
 def test_what_cannot_be_read_is_in_the_table(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from diff4splat.data_prep.doctor.comparisons import (
     projected_tracks,
     step_of,
 )
-from diff4splat.data_prep.doctor.examination import Examined, shown
+from diff4splat.data_prep.doctor.examination import Examined, with_unit
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.io.figures.depth_colors import colorize, robust_range
@@ -27,7 +27,7 @@ _GOOD, _BAD, _DIM = (126, 214, 144), (255, 112, 96), (154, 160, 172)
 Image = Float[Tensor, "h w 3"]
 
 
-def picture(examined: Examined, verdict: str) -> Image:
+def draw_examined(examined: Examined, verdict: str) -> Image:
     """Panels of the clip under the verdict."""
     panels = _panels(examined.clip)
     height, width = examined.clip.size_px
@@ -62,7 +62,7 @@ def _draw_bars(page: Canvas, examined: Examined, top: int) -> None:
         share = np.clip((np.log10(max(value, 1e-12) / each.limit) + 3) / 6, 0.01, 1)
         page.box((left, y + 4), (max(int(share * span), 4), 18), _GOOD if good else _BAD)
         page.box((left + span // 2, y), (3, 26), (255, 255, 255))
-        text = f"{shown(value, each)}   limit {shown(each.limit, each)}"
+        text = f"{with_unit(value, each)}   limit {with_unit(each.limit, each)}"
         page.text((left + span + 20, y), text, Style(size_px=18, color=_GOOD if good else _BAD))
 
 
