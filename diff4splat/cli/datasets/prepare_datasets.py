@@ -24,7 +24,7 @@ DatasetName = Literal[
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareDoctor:
-    """Prove that a copy of a data set is read as meant: a table, a picture, likely causes."""
+    """Prove that a copy of a data set is read as meant: a table, a figure, likely causes."""
 
     path: Annotated[Path, tyro.conf.Positional, InputPath(what="a copy of a data set")]
     """Folder of the data set, or of a part of it."""
@@ -35,7 +35,7 @@ class PrepareDoctor:
     frames: Annotated[int, Number(least=2, most=200)] = 9
     """Frames per clip."""
     out: OutFile = Path("doctor.png")
-    """Picture of the worst clip."""
+    """Figure of the worst clip."""
 
     def run(self) -> None:
         """Print the table, write the picture.
