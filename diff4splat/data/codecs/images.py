@@ -6,6 +6,7 @@ Axes: ``t`` frames, ``h w`` pixels, 3 colours or none (instances).
 import io
 import math
 
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, JpegImagePlugin, PngImagePlugin
@@ -77,7 +78,9 @@ def decode_jpeg(content: bytes, shape: tuple[int, ...]) -> UInt8[np.ndarray, "t 
         image = JpegImagePlugin.JpegImageFile(io.BytesIO(content))
         got = (image.size[::-1], image.mode)
         if got == ((shape[0] * shape[1], shape[2]), "RGB"):
-            return np.array(image).reshape(shape)
+            # Half the time of Pillow, which copies the pixels twice.
+            bgr = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+            return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB).reshape(shape)
     except Exception as error:  # as above
         raise FileFormatError("expected a JPEG, got a damaged or other file") from error
     raise FileFormatError(
