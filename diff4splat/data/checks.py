@@ -8,6 +8,7 @@ from torch import Tensor
 
 from diff4splat.data.clip import Clip, Flow, Tracks, View
 from diff4splat.data.json_fields import IDENTIFIER, MAX_FRAMES, MAX_SIDE_PX, MAX_VIEWS
+from diff4splat.data.scale_record import require_valid_scale
 from diff4splat.errors import InputError
 from diff4splat.geometry import rigid
 
@@ -54,6 +55,8 @@ def _require_note(clip: Clip) -> None:
         raise InputError("identifier: expected up to 80 letters, digits, '_' and '-'")
     if not note.license or not note.source:
         raise InputError("note: expected a source and a license, got an empty one; fill it in")
+    if note.scale is not None:
+        require_valid_scale(note.scale)
     numbers = [each.instance for each in note.objects]
     if len(set(numbers)) != len(numbers) or not all(1 <= number <= 255 for number in numbers):
         raise InputError(f"objects: expected different instances from 1 to 255, got {numbers}")
@@ -80,15 +83,23 @@ def _require_view(clip: Clip, view: View, where: str) -> None:
         )
     shape = (clip.frames, *clip.size_px)
     _require(view.rgb, f"{where}, rgb", torch.uint8, (*shape, 3))
-    _require(view.depth, f"{where}, depth", torch.float32, shape)
-    if not bool(torch.isfinite(view.depth).all() and (view.depth >= 0).all()):
-        raise InputError(f"{where}, depth: expected finite depth, 0 for none, got other values")
+    if view.depth is not None:
+        _require_depth(view.depth, f"{where}, depth", shape)
     _require_cameras(clip, view, f"{where}, cameras")
-    if view.instances is not None:
-        _require(view.instances, f"{where}, instances", torch.uint8, shape)
+    for name, kind in (("instances", torch.uint8), ("sky", torch.bool), ("moving", torch.bool)):
+        if (mask := getattr(view, name)) is not None:
+            _require(mask, f"{where}, {name}", kind, shape)
     if view.flow is not None:
         _require_flow(view.flow, f"{where}, flow", (clip.frames - 1, *clip.size_px))
     _require_seen_tracks(clip, view, where)
+
+
+def _require_depth(depth: Tensor, where: str, shape: tuple[int, ...]) -> None:
+    _require(depth, where, torch.float32, shape)
+    # One pass over the memory; comparisons with NaN are False.
+    low, high = torch.aminmax(depth)
+    if not bool(low >= 0 and high < torch.inf):
+        raise InputError(f"{where}: expected finite depth, 0 for none, got other values")
 
 
 def _require_cameras(clip: Clip, view: View, where: str) -> None:
@@ -120,20 +131,26 @@ def _require_seen_tracks(clip: Clip, view: View, where: str) -> None:
         return
     if uv is None or visible is None or clip.tracks is None:
         raise InputError(f"{where}: expected tracks with both uv and visible, or none of them")
-    count = len(clip.tracks.instances)
+    count = clip.tracks.positions.shape[1]
     _require(uv, f"{where}, track_uv", torch.float32, (clip.frames, count, 2))
     _require(visible, f"{where}, track_visible", torch.bool, (clip.frames, count))
     if not bool(torch.isfinite(uv).all()):
         raise InputError(f"{where}, track_uv: expected finite numbers, got NaN or infinity")
+    known = clip.tracks.known
+    if known is not None and bool((visible & ~known).any()):
+        raise InputError(f"{where}, track_visible: expected visible points to be known ones")
 
 
 def _require_tracks(clip: Clip) -> None:
     tracks: Tracks | None = clip.tracks
     if tracks is None:
         return
-    count = len(tracks.instances)
-    _require(tracks.instances, "tracks, instances", torch.uint8, (count,))
+    count = len(tracks.found_at)
     _require(tracks.positions, "tracks, positions", torch.float32, (clip.frames, count, 3))
+    if tracks.instances is not None:
+        _require(tracks.instances, "tracks, instances", torch.uint8, (count,))
+    if tracks.known is not None:
+        _require(tracks.known, "tracks, known", torch.bool, (clip.frames, count))
     _require(tracks.found_at, "tracks, found_at", torch.int64, (count, 2))
     if not bool(torch.isfinite(tracks.positions).all()):
         raise InputError("tracks, positions: expected finite numbers, got NaN or infinity")
@@ -145,8 +162,10 @@ def _require_tracks(clip: Clip) -> None:
 
 
 def _require_depth_share(clip: Clip, least: float) -> None:
-    known = sum(int((view.depth > 0).sum()) for view in clip.views)
-    share = known / sum(view.depth.numel() for view in clip.views)
+    if least <= 0:
+        return
+    known = sum(int((v.depth > 0).sum()) for v in clip.views if v.depth is not None)
+    share = known / (len(clip.views) * clip.frames * clip.size_px[0] * clip.size_px[1])
     if share < least:
         raise InputError(
             f"depth: expected some in {least:.0%} of all pixels or more, got {share:.1%}"

@@ -20,6 +20,8 @@ class ClipPart:
     views: tuple[int, ...] | None = None
     flow: bool = True
     instances: bool = True
+    masks: bool = True
+    """Of sky and of what moves."""
     tracks: bool = True
 
 

@@ -1,6 +1,7 @@
 """Values out of JSON files by key, each checked before anything uses it."""
 
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,10 @@ from diff4splat.errors import FileFormatError
 from diff4splat.io.require_file import read_bytes
 from diff4splat.paths.formats.json_text import decode_json
 
-VERSION = 1
+VERSION = 2
 """Of manifest, index and clip note alike; it changes when an old reader would go wrong."""
+OLDEST_VERSION = 1
+"""Without data sets, scenes, frame rates and scale; depth everywhere, tracks known everywhere."""
 IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,79}")
 """No dots (webdataset ends the name of a clip at the first), no slashes, nothing to escape."""
 MAX_SIDE_PX, MAX_FRAMES, MAX_VIEWS, MAX_TRACKS = 16384, 10_000, 100, 10_000_000
@@ -52,9 +55,10 @@ def loads(content: bytes, kind: str) -> dict[str, Any]:
     if not isinstance(root, dict) or root.get("format") != kind:
         raise FileFormatError(f"expected a {kind}, got JSON of another kind; check the path")
     version = take(root, "version", int)
-    if version != VERSION:
+    if not OLDEST_VERSION <= version <= VERSION:
         raise FileFormatError(
-            f"expected version {VERSION}, got {version}; read it with the diff4splat that wrote it"
+            f"expected version {OLDEST_VERSION} to {VERSION}, got {version}; read it with the "
+            "diff4splat that wrote it"
         )
     return root
 
@@ -75,6 +79,25 @@ def take_count(source: dict[str, Any], key: str, least: int, most: int) -> int:
     value = take(source, key, int)
     if not least <= value <= most:
         raise FileFormatError(f"'{key}': expected {least} to {most}, got {value}")
+    return value
+
+
+def take_number(source: dict[str, Any], key: str) -> float | None:
+    """The finite number under ``key``; None where there is none."""
+    value = source.get(key)
+    if value is None:
+        return None
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not math.isfinite(value):
+        raise FileFormatError(f"'{key}': expected a finite number, got {repr(value)[:60]}")
+    return float(value)
+
+
+def take_choice(source: dict[str, Any], key: str, known: tuple[str, ...]) -> Any:
+    """The text under ``key``, one of ``known``."""
+    value = take(source, key, str)
+    if value not in known:
+        raise FileFormatError(f"'{key}': expected one of {', '.join(known)}, got {value[:60]!r}")
     return value
 
 

@@ -31,6 +31,7 @@ OPTIONAL = (
     "mitsuba",
     "av",
     "tensorboard",
+    "h5py",
     "onnx",
     "uvicorn",
 )

@@ -62,6 +62,10 @@ prepare synth --out folder --clips 0
 prepare latents --clips nowhere --out folder
 prepare latents --clips folder --out folder --config enormous
 prepare check --folder nowhere
+prepare import nowhere --dataset spring --out folder
+prepare import folder --dataset spring --out folder --frames 1
+prepare doctor nowhere --dataset spring
+prepare doctor folder --dataset spring --out folder
 train --config nowhere --stage vae
 train --config small --stage nowhere
 train --config small --stage vae --clips nowhere

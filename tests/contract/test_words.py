@@ -41,6 +41,7 @@ GEOMETRY = {
 COMMANDS = (
     *("generate", "fit", "render", "bake", "convert", "inspect", "train", "pack", "eval", "doctor"),
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
+    *("prepare import", "prepare doctor"),
     *("report error-time", "report knobs"),
 )
 

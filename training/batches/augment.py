@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, View
+from diff4splat.data.view_labels import edited_labels
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
 from diff4splat.training.batches.temporal_crop import drop_projections, from_first_camera
@@ -54,7 +55,8 @@ def reversed_in_time(clip: Clip) -> Clip:
     """The last frame first; times run forwards again."""
     times_s, tracks = clip.times_s, clip.tracks
     if tracks is not None:
-        tracks = replace(drop_projections(tracks), positions=tracks.positions.flip(0))
+        known = None if tracks.known is None else tracks.known.flip(0)
+        tracks = replace(drop_projections(tracks), positions=tracks.positions.flip(0), known=known)
     views = tuple(_backwards(view) for view in clip.views)
     times_s = times_s[0] + (times_s[-1] - times_s).flip(0)
     return from_first_camera(replace(clip, times_s=times_s, views=views, tracks=tracks))
@@ -84,10 +86,9 @@ def _mirrored_view(view: View) -> View:
         uv = torch.stack([view.cameras.size_px[1] - uv[..., 0], uv[..., 1]], -1)
     return replace(
         view,
+        **edited_labels(view, lambda label: label.flip(2)),
         rgb=view.rgb.flip(2),
-        depth=view.depth.flip(2),
         cameras=_mirrored_cameras(view.cameras),
-        instances=None if view.instances is None else view.instances.flip(2),
         flow=None,
         track_uv=uv,
     )
@@ -108,10 +109,9 @@ def _backwards(view: View) -> View:
     order = torch.arange(len(view.cameras) - 1, -1, -1)
     return replace(
         view,
+        **edited_labels(view, lambda label: label.flip(0)),
         rgb=view.rgb.flip(0),
-        depth=view.depth.flip(0),
         cameras=view.cameras[order],
-        instances=turned(view.instances),
         flow=None,
         track_uv=turned(view.track_uv),
         track_visible=turned(view.track_visible),
@@ -128,10 +128,9 @@ def _window(view: View, corner: tuple[int, int], size_px: tuple[int, int]) -> Vi
         visible = None if visible is None else visible & inside
     return replace(
         view,
+        **edited_labels(view, lambda label: label[:, rows, columns]),
         rgb=view.rgb[:, rows, columns],
-        depth=view.depth[:, rows, columns],
         cameras=view.cameras.cropped(corner, size_px),
-        instances=None if view.instances is None else view.instances[:, rows, columns],
         flow=None,
         track_uv=uv,
         track_visible=visible,

@@ -24,7 +24,7 @@ def pixel_motion(clip: Clip, input_stride: int) -> Float[Tensor, "3 t h w"]:
     """
     view = clip.views[INPUT_VIEW]
     field = torch.zeros(3, _latent_frames(clip, input_stride), *clip.size_px)
-    if clip.tracks is not None and view.instances is not None and view.track_uv is not None:
+    if clip.motion_truth == "objects":
         _fill(field, view, clip.tracks, TIME_STRIDE * input_stride)
     depth = view.depth[0].float()
     return torch.where(depth > 0, field / depth.clamp_min(1e-6), 0.0) / UNIT

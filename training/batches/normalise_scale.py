@@ -32,7 +32,8 @@ def typical_depth(clip: Clip, min_valid_depth: float) -> float:
     Raises:
         InputError: fewer than ``min_valid_depth`` of its pixels have a depth.
     """
-    depth = clip.views[0].depth[0]
+    every = clip.views[0].depth
+    depth = torch.zeros(clip.size_px) if every is None else every[0]
     valid = valid_depth(depth)
     share = float(valid.float().mean())
     if share < min_valid_depth or not bool(valid.any()):
@@ -58,7 +59,8 @@ def rescaled(clip: Clip, factor: float) -> Clip:
 
 
 def _rescaled_view(view: View, factor: float) -> View:
-    return replace(view, depth=view.depth * factor, cameras=rescaled_cameras(view.cameras, factor))
+    depth = None if view.depth is None else view.depth * factor
+    return replace(view, depth=depth, cameras=rescaled_cameras(view.cameras, factor))
 
 
 def rescaled_cameras(cameras: Camera, factor: float) -> Camera:

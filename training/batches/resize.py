@@ -11,6 +11,7 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, View
+from diff4splat.data.view_labels import edited_labels
 from diff4splat.errors import InputError
 
 
@@ -38,12 +39,10 @@ def _resized_view(view: View, size_px: tuple[int, int]) -> View:
     uv = view.track_uv
     if uv is not None:
         uv = uv * uv.new_tensor([size_px[1] / width, size_px[0] / height])
-    instances = view.instances
     return replace(
         view,
+        **edited_labels(view, lambda label: label[:, rows][:, :, columns]),
         rgb=_shrunk(view.rgb, size_px),
-        depth=view.depth[:, rows][:, :, columns],
-        instances=None if instances is None else instances[:, rows][:, :, columns],
         cameras=view.cameras.resized(size_px),
         flow=None,
         track_uv=uv,

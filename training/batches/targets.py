@@ -102,7 +102,7 @@ def visible_cells(clip: Clip) -> Int[Tensor, "s 4"]:
     column, row = view.track_uv[frame, point].floor().long().unbind(-1)
     height, width = view.cameras.size_px
     inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    if view.instances is not None:
+    if view.instances is not None and clip.tracks.instances is not None:
         # Near an edge the pixel's centre may show another object than the point lies on.
         shown = view.instances[frame, row.clamp(0, height - 1), column.clamp(0, width - 1)]
         inside &= shown == clip.tracks.instances[point]

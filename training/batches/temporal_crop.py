@@ -10,6 +10,7 @@ from jaxtyping import Int
 from torch import Tensor
 
 from diff4splat.data.clip import Clip, Tracks
+from diff4splat.data.view_labels import edited_labels
 from diff4splat.errors import InputError
 from diff4splat.training.batches.targets import INPUT_VIEW
 
@@ -41,10 +42,9 @@ def _frames(clip: Clip, window: slice | Int[Tensor, " t"]) -> Clip:
     views = tuple(
         replace(
             view,
+            **edited_labels(view, lambda label: label[window]),
             rgb=view.rgb[window],
-            depth=view.depth[window],
             cameras=view.cameras[window],
-            instances=None if view.instances is None else view.instances[window],
             flow=None,
             track_uv=None if view.track_uv is None else view.track_uv[window],
             track_visible=None if view.track_visible is None else view.track_visible[window],
@@ -53,7 +53,8 @@ def _frames(clip: Clip, window: slice | Int[Tensor, " t"]) -> Clip:
     )
     tracks = clip.tracks
     if tracks is not None:
-        tracks = replace(drop_projections(tracks), positions=tracks.positions[window])
+        known = None if tracks.known is None else tracks.known[window]
+        tracks = replace(drop_projections(tracks), positions=tracks.positions[window], known=known)
     return replace(clip, times_s=clip.times_s[window], views=views, tracks=tracks)
 
 

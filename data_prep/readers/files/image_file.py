@@ -64,7 +64,7 @@ class ImageFile:
         if self.is_float:
             height, width, *_ = _shaped(self.file).shape
             return height, width
-        with _image(self.file) as image:
+        with opened_image(self.file) as image:
             return image.height, image.width
 
     def has_alpha(self) -> bool:
@@ -73,7 +73,7 @@ class ImageFile:
             return "A" in exr_channels(self.file)
         if self.is_float:
             return _shaped(self.file).shape[2] == 4
-        with _image(self.file) as image:
+        with opened_image(self.file) as image:
             return image.has_transparency_data
 
     def read(self) -> Pixels:
@@ -87,7 +87,7 @@ class ImageFile:
             values = _exr_colors(self.file) if exr else np.asarray(_shaped(self.file))
             whole = 1.0 if values.dtype.kind == "f" else float(np.iinfo(values.dtype).max)
         else:
-            values, whole = _levels(self.file), 255.0
+            values, whole = image_levels(self.file), 255.0
         from_levels = values.dtype.kind != "f"
         values = values.astype(np.float32) / np.float32(whole)
         return Pixels(
@@ -98,7 +98,12 @@ class ImageFile:
 
 
 @contextmanager
-def _image(file: Path) -> Iterator[Image.Image]:
+def opened_image(file: Path) -> Iterator[Image.Image]:
+    """The image, its pixels not decoded yet.
+
+    Raises:
+        FileFormatError: missing, damaged or enormous, here or while it is decoded.
+    """
     try:
         # Pillow warns about sizes and odd metadata; neither is a reason to stop.
         with warnings.catch_warnings():
@@ -121,9 +126,13 @@ def _image(file: Path) -> Iterator[Image.Image]:
         ) from error
 
 
-def _levels(file: Path) -> np.ndarray:
-    """uint8, ``h w 3`` or ``h w 4``."""
-    with _image(file) as image:
+def image_levels(file: Path) -> np.ndarray:
+    """Levels of 8 bits, ``h w 3`` or ``h w 4``.
+
+    Raises:
+        FileFormatError: missing, damaged, or of more bits.
+    """
+    with opened_image(file) as image:
         if photo_validation.is_deep(image):
             raise FileFormatError(
                 f"{file}: expected 8 bits per channel, got more; convert it to 8 bits, or to "

@@ -37,10 +37,10 @@ class ClipFrames:
             raise InputError(f"frame: expected 0 to {len(self) - 1}, got {index}")
         number, time = divmod(index, self._times)
         view = self._views[number]
-        depth = view.depth[time].float()
+        depth = None if view.depth is None else view.depth[time].float()
         known = PixelLayers(
             rgb=unit_rgb(view.rgb[time]).numpy(),
-            depth=depth.numpy() if bool((depth > 0).any()) else None,
+            depth=depth.numpy() if depth is not None and bool((depth > 0).any()) else None,
         )
         frame = pixel_layers.to_frame(pixel_layers.downscale(known, self._factor))
         flow = self._flow(view, time, index)

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
 from diff4splat.cli.export_onnx import ExportOnnx
@@ -26,6 +27,8 @@ Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, sub
 Prepare = (
     Annotated[PrepareSynthetic, subcommand("synth")]
     | Annotated[PrepareLatents, subcommand("latents")]
+    | Annotated[PrepareImport, subcommand("import")]
+    | Annotated[PrepareDoctor, subcommand("doctor")]
     | Annotated[PrepareCheck, subcommand("check")]
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
@@ -42,7 +45,7 @@ Command = (
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]
-    | Annotated[Prepare, subcommand("prepare", description="Training clips: make, encode, check.")]
+    | Annotated[Prepare, subcommand("prepare", description="Training clips: make, import, check.")]
     | Annotated[Train, subcommand("train")]
     | Annotated[Pack, subcommand("pack")]
     | Annotated[Evaluate, subcommand("eval")]

@@ -11,7 +11,8 @@ from diff4splat.data.clip import Clip, Flow, Tracks, View
 from diff4splat.data.clip_part import ClipPart, chosen_frames, chosen_views
 from diff4splat.data.codecs.cameras import decode_cameras
 from diff4splat.data.codecs.depth import decode_exr
-from diff4splat.data.codecs.images import decode_png
+from diff4splat.data.codecs.images import decode_jpeg, decode_png
+from diff4splat.data.codecs.masks import decode_masks
 from diff4splat.data.codecs.metadata import decode_metadata
 from diff4splat.data.codecs.motion import VisibleTracks, decode_flow, decode_tracks
 from diff4splat.data.codecs.video import decode_mp4
@@ -50,8 +51,10 @@ def wanted_members(stored: Collection[str], entry: ClipEntry, part: ClipPart) ->
     """The suffixes, among those ``stored``, that ``decode_clip`` will need."""
     names = ["meta.json", "camera.npz", *(["tracks.npz"] if part.tracks else [])]
     for view in chosen_views(part, entry):
-        names += [f"rgb{view:02d}.png", f"rgb{view:02d}.mp4", f"depth{view:02d}.exr"]
+        names += [f"rgb{view:02d}.{suffix}" for suffix in ("png", "jpg", "mp4")]
+        names += [f"depth{view:02d}.exr"]
         names += [f"instances{view:02d}.png"] if part.instances else []
+        names += [f"masks{view:02d}.npz"] if part.masks else []
         names += [f"flow{view:02d}.npz"] if part.flow else []
     return [name for name in names if name in stored]
 
@@ -82,12 +85,12 @@ def decode_clip(members: Mapping[str, bytes], entry: ClipEntry, part: ClipPart) 
 def _view(job: _Job, number: int, camera: Camera, seen: VisibleTracks | None) -> View:
     instances, flow = f"instances{number:02d}.png", f"flow{number:02d}.npz"
     shape = (job.entry.frames, *job.entry.size_px)
-    depth = job.decode(f"depth{number:02d}.exr", lambda content: decode_exr(content, shape))
     return View(
         rgb=job.of_frames(_rgb(job, number)),
-        depth=job.of_frames(torch.from_numpy(depth)),
+        depth=_depth(job, f"depth{number:02d}.exr", shape),
         cameras=_cameras(job, camera),
         instances=_instances(job, instances, shape) if instances in job.members else None,
+        **_masks(job, f"masks{number:02d}.npz"),
         flow=_flow(job, flow) if flow in job.members else None,
         track_uv=None if seen is None else job.of_frames(seen.uv),
         track_visible=None if seen is None else job.of_frames(seen.visible),
@@ -108,8 +111,25 @@ def _rgb(job: _Job, number: int) -> Tensor:
     movie = f"rgb{number:02d}.mp4"
     if movie in job.members:
         return torch.from_numpy(job.decode(movie, lambda content: decode_mp4(content, shape)))
+    photo = f"rgb{number:02d}.jpg"
+    if photo in job.members:
+        return torch.from_numpy(job.decode(photo, lambda content: decode_jpeg(content, shape)))
     image = f"rgb{number:02d}.png"
     return torch.from_numpy(job.decode(image, lambda content: decode_png(content, shape)))
+
+
+def _depth(job: _Job, suffix: str, shape: tuple[int, int, int]) -> Tensor | None:
+    if suffix not in job.members and "depth" not in job.entry.layers:
+        return None
+    decoded = job.decode(suffix, lambda content: decode_exr(content, shape))
+    return job.of_frames(torch.from_numpy(decoded))
+
+
+def _masks(job: _Job, suffix: str) -> dict[str, Tensor]:
+    if suffix not in job.members:
+        return {}
+    masks = job.decode(suffix, lambda content: decode_masks(content, job.entry))
+    return {name: job.of_frames(mask) for name, mask in masks.items()}
 
 
 def _instances(job: _Job, suffix: str, shape: tuple[int, ...]) -> Tensor:
@@ -130,6 +150,7 @@ def _tracks(job: _Job) -> tuple[Tracks, tuple[VisibleTracks | None, ...]]:
     )
     return Tracks(
         positions=job.of_frames(tracks.positions),
+        known=None if tracks.known is None else job.of_frames(tracks.known),
         instances=tracks.instances,
         found_at=_renumbered(job, tracks.found_at),
     ), seen

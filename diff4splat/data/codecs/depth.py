@@ -14,8 +14,8 @@ from jaxtyping import Float32
 
 from diff4splat.errors import FileFormatError, InputError
 
-DepthCoding = Literal["pxr24", "half", "float"]
-"""For truth, for training copies, and without loss."""
+DepthCoding = Literal["pxr24", "half", "half_plain", "float"]
+"""For truth, for training copies, for those that are read fast, and without loss."""
 _MOST_PER_BYTE = 2000
 _HALF_RANGE = (6.2e-5, 65504.0)
 """Below, half precision loses digits; above is infinity."""
@@ -27,9 +27,10 @@ def encode_exr(depth: Float32[np.ndarray, "t h w"], coding: DepthCoding) -> byte
     Raises:
         InputError: half precision cannot hold these depths.
     """
-    if coding == "half":
+    if coding in ("half", "half_plain"):
         depth = _halved(depth)
-    packing = OpenEXR.PXR24_COMPRESSION if coding == "pxr24" else OpenEXR.ZIP_COMPRESSION
+    packings = {"pxr24": OpenEXR.PXR24_COMPRESSION, "half_plain": OpenEXR.NO_COMPRESSION}
+    packing = packings.get(coding, OpenEXR.ZIP_COMPRESSION)
     header = {"compression": packing, "type": OpenEXR.scanlineimage}
     parts = [
         OpenEXR.Part(dict(header), {"Z": frame}, f"frame_{index:04d}")

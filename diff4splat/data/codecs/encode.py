@@ -15,7 +15,8 @@ from diff4splat.data.checks import require_first_camera, require_valid_clip
 from diff4splat.data.clip import Clip, View
 from diff4splat.data.codecs.cameras import encode_cameras
 from diff4splat.data.codecs.depth import DepthCoding, encode_exr
-from diff4splat.data.codecs.images import encode_png
+from diff4splat.data.codecs.images import encode_jpeg, encode_png
+from diff4splat.data.codecs.masks import encode_masks, has_masks
 from diff4splat.data.codecs.metadata import encode_metadata
 from diff4splat.data.codecs.motion import encode_flow, encode_tracks
 from diff4splat.data.codecs.video import encode_mp4
@@ -30,8 +31,8 @@ _DEFAULT_FPS = 10.0
 class Coding:
     """How pixels are stored."""
 
-    images: Literal["png", "mp4"] = "png"
-    """PNG without loss; MP4, ten times smaller, for sets that were video before."""
+    images: Literal["png", "jpeg", "mp4"] = "png"
+    """PNG without loss; JPEG is read fastest; MP4 is smallest, for sets that were video before."""
     depth: DepthCoding = "pxr24"
 
 
@@ -72,7 +73,7 @@ def _members(clip: Clip, coding: Coding) -> Iterator[tuple[str, bytes]]:
     """Small ones first: who streams the tar knows the sizes before the pixels come."""
     yield "meta.json", encode_metadata(clip.note, entry_of(clip))
     yield "camera.npz", encode_cameras(clip)
-    if clip.tracks is not None and len(clip.tracks.instances):
+    if clip.tracks is not None and clip.tracks.positions.shape[1]:
         yield "tracks.npz", encode_tracks(clip, clip.tracks)
     fps = _fps(clip.times_s)
     for number, view in enumerate(clip.views):
@@ -81,11 +82,17 @@ def _members(clip: Clip, coding: Coding) -> Iterator[tuple[str, bytes]]:
 
 def _pixels(view: View, coding: Coding, fps: float) -> Iterator[tuple[str, str, bytes]]:
     rgb = view.rgb.numpy()
-    lossy = coding.images == "mp4"
-    yield "rgb", coding.images, encode_mp4(rgb, fps) if lossy else encode_png(rgb)
-    yield "depth", "exr", encode_exr(view.depth.numpy(), coding.depth)
+    if coding.images == "mp4":
+        yield "rgb", "mp4", encode_mp4(rgb, fps)
+    else:
+        jpeg = coding.images == "jpeg"
+        yield "rgb", "jpg" if jpeg else "png", encode_jpeg(rgb) if jpeg else encode_png(rgb)
+    if view.depth is not None:
+        yield "depth", "exr", encode_exr(view.depth.numpy(), coding.depth)
     if view.instances is not None:
         yield "instances", "png", encode_png(view.instances.numpy())
+    if has_masks(view):
+        yield "masks", "npz", encode_masks(view)
     if view.flow is not None:
         yield "flow", "npz", encode_flow(view.flow)
 

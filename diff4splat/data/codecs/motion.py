@@ -59,9 +59,12 @@ def encode_tracks(clip: Clip, tracks: Tracks) -> bytes:
     """The member's bytes; a view that does not say where it sees the points has no arrays."""
     arrays = {
         "positions": tracks.positions.numpy(),
-        "instances": tracks.instances.numpy(),
         "found_at": tracks.found_at.numpy().astype(np.int32),
     }
+    if tracks.instances is not None:
+        arrays["instances"] = tracks.instances.numpy()
+    if tracks.known is not None:
+        arrays["known"] = pack(tracks.known.numpy())
     for number, view in enumerate(clip.views):
         if view.track_uv is not None and view.track_visible is not None:
             arrays[f"uv{number:02d}"] = view.track_uv.numpy()
@@ -80,7 +83,9 @@ def decode_tracks(
     frames, count = entry.frames, entry.tracks
     with opened_npz(content) as archive:
         positions = take_array(archive, "positions", np.float32, (frames, count, 3))
-        instances = take_array(archive, "instances", np.uint8, (count,))
+        instances = _objects(archive, count)
+        gaps = has_array(archive, "known")
+        known = take_bits(archive, "known", (frames, count)) if gaps else None
         found_at = take_array(archive, "found_at", np.int32, (count, 2))
         seen = tuple(_seen(archive, view, (frames, count)) for view in views)
     beyond = (found_at < -1) | (found_at >= (entry.views, frames))
@@ -91,10 +96,17 @@ def decode_tracks(
         )
     tracks = Tracks(
         positions=torch.from_numpy(positions),
-        instances=torch.from_numpy(instances),
+        known=None if known is None else torch.from_numpy(known),
+        instances=None if instances is None else torch.from_numpy(instances),
         found_at=torch.from_numpy(found_at.astype(np.int64)),
     )
     return tracks, seen
+
+
+def _objects(archive: ZipFile, count: int) -> np.ndarray | None:
+    if not has_array(archive, "instances"):
+        return None
+    return take_array(archive, "instances", np.uint8, (count,))
 
 
 def _seen(archive: ZipFile, view: int, shape: tuple[int, int]) -> VisibleTracks | None:

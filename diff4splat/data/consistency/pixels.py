@@ -31,7 +31,7 @@ def over_time(clip: Clip, view: View) -> Iterator[Float[Tensor, " n"]]:
     Adjacent frames would hide wrong cameras, because their displacement is small.
     """
     static = static_pixels(clip, view)
-    if static is None:
+    if static is None or view.depth is None:
         return
     step = max(1, clip.frames // 2)
     for here, there in enumerate(range(step, clip.frames)):
@@ -42,7 +42,8 @@ def over_time(clip: Clip, view: View) -> Iterator[Float[Tensor, " n"]]:
 
 def across_views(clip: Clip) -> Iterator[Bool[Tensor, " n"]]:
     """Whether points of one view lie on or behind the surface that each other view sees."""
-    for here, there in permutations(clip.views, 2):
+    with_depth = [view for view in clip.views if view.depth is not None]
+    for here, there in permutations(with_depth, 2):
         for frame in range(clip.frames):
             every = torch.ones(clip.size_px, dtype=torch.bool)
             z, sampled = _reproject(there, frame, _points(here, frame, every), every)
@@ -52,7 +53,7 @@ def across_views(clip: Clip) -> Iterator[Bool[Tensor, " n"]]:
 def flow_errors(clip: Clip, view: View) -> Iterator[Float[Tensor, " n"]]:
     """Distance in pixels between stored flow and flow from depth and cameras, per frame."""
     static = static_pixels(clip, view)
-    if static is None or view.flow is None:
+    if static is None or view.flow is None or view.depth is None:
         return
     centers = pixel_centers(clip.size_px, view.cameras.focal_px.double())
     for frame in range(clip.frames - 1):

@@ -40,9 +40,9 @@ class VisibleErrors:
 
 
 def compare_at_query(clip: Clip, number: int) -> QueryErrors | None:
-    """Errors of the tracks whose query pixel is in view ``number``; None without tracks."""
+    """Errors of the tracks with query pixels in view ``number``; None without tracks or depth."""
     view, tracks = clip.views[number], clip.tracks
-    if tracks is None or view.track_uv is None or view.track_visible is None:
+    if tracks is None or view.track_uv is None or view.track_visible is None or view.depth is None:
         return None
     chosen = (tracks.found_at[:, 0] == number).nonzero()[:, 0]
     frames = tracks.found_at[chosen, 1]
@@ -66,12 +66,14 @@ def compare_where_visible(clip: Clip, view: View) -> VisibleErrors | None:
         return None
     uv, z = _positions(view, clip.tracks)
     off = (uv - view.track_uv.double()).norm(dim=-1)[view.track_visible]
-    agrees = [
-        _at_depth(depth.double(), places[visible].double(), z_now[visible])
-        for depth, places, z_now, visible in zip(
-            view.depth, view.track_uv, z, view.track_visible, strict=True
-        )
-    ]
+    agrees = [torch.zeros(0, dtype=torch.bool)]
+    if view.depth is not None:
+        agrees += [
+            _at_depth(depth.double(), places[visible].double(), z_now[visible])
+            for depth, places, z_now, visible in zip(
+                view.depth, view.track_uv, z, view.track_visible, strict=True
+            )
+        ]
     return VisibleErrors(projection_px=off, at_depth=torch.cat(agrees))
 
 

@@ -101,8 +101,13 @@ def make_sample(clip: Clip, protocol: Protocol, task: Task) -> EvalSample:
     """The clip as ``protocol`` evaluates it.
 
     Raises:
-        InputError: too few views, a wrong number of frames, or another aspect ratio.
+        InputError: no depth, too few views, a wrong number of frames, or another aspect ratio.
     """
+    if any(view.depth is None for view in clip.views):
+        raise InputError(
+            f"clip {clip.note.identifier}: expected depth in every view, got a view without it; "
+            "leave the clip out"
+        )
     if clip.frames != protocol.frames or len(clip.views) < protocol.views:
         raise InputError(
             f"clip {clip.note.identifier}: expected {protocol.frames} frames of at least "

@@ -18,8 +18,9 @@ from PIL import Image
 from diff4splat.data.clip import Clip, Tracks
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.codecs.encode import Coding, Member, encode_clip
+from diff4splat.data.codecs.images import decode_jpeg, encode_jpeg
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
-from diff4splat.errors import InputError
+from diff4splat.errors import FileFormatError, InputError
 
 PXR24_ERROR = 2.0**-16
 
@@ -67,6 +68,24 @@ def test_half_precision_refuses_what_it_cannot_hold(value: float) -> None:
     far = replace(clip.views[0], depth=torch.full_like(clip.views[0].depth, value))
     with pytest.raises(InputError, match=r"clip 'clip-0': depth: expected .* half precision"):
         encode_clip(replace(clip, views=(far,)), Coding(depth="half"))
+
+
+def test_jpeg_images_and_plain_half_depth(tmp_path: Path) -> None:
+    clip = make_clip(views=1, size_px=(25, 33))
+    view = stored(tmp_path, clip, Coding(images="jpeg", depth="half_plain")).views[0]
+    assert (view.rgb.float() - clip.views[0].rgb.float()).abs().mean() < 3
+    assert torch.equal(view.depth, clip.views[0].depth.half().float())
+
+
+def test_jpeg_has_no_room_for_many_rows() -> None:
+    with pytest.raises(InputError, match="expected at most 65500 rows"):
+        encode_jpeg(np.zeros((66, 1000, 2, 3), np.uint8))
+
+
+@pytest.mark.parametrize("content", [b"", b"no", b"\xff\xd8\xff\xe0 damaged"])
+def test_damaged_jpeg_is_refused(content: bytes) -> None:
+    with pytest.raises(FileFormatError, match="expected a JPEG"):
+        decode_jpeg(content, (1, 2, 2, 3))
 
 
 @pytest.mark.parametrize("size_px", [(24, 32), (25, 33)])

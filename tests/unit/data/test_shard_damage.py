@@ -108,7 +108,7 @@ def clip_of(change: dict[str, object]) -> Callable[[Any], object]:
     ("change", "says"),
     [
         (lambda d: d.update(format="other"), "expected a diff4splat-clips, got JSON of another"),
-        (lambda d: d.update(version=2), "expected version 1, got 2; read it with the diff4splat"),
+        (lambda d: d.update(version=3), "expected version 1 to 2, got 3; read it with the"),
         (lambda d: d.update(version=True), "'version': expected a whole number, got True"),
         (lambda d: d.pop("shards"), "'shards': expected a list, got nothing"),
         (lambda d: d.update(shards=[1]), "'shards': expected a list of objects"),
@@ -154,7 +154,7 @@ def slot(*values: object) -> Callable[[Any], object]:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda d: d.update(version=0), "expected version 1, got 0"),
+        (lambda d: d.update(version=0), "expected version 1 to 2, got 0"),
         (lambda d: d.update(shard="b.tar"), "expected the index of shard-00000.tar, got that of"),
         (lambda d: d.update(clips=[]), "'clips': expected an object, got []"),
         (lambda d: d.update(clips={"clip-0": 1}), "'clips': expected an object of objects"),

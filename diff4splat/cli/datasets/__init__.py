@@ -1,0 +1,1 @@
+"""Commands about copies of training data sets."""
