@@ -70,6 +70,8 @@ class Fit:
     """Seed of points, frame order and splits."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Override settings, such as weights.ssim=0.2 or rates.means.first=1e-3; repeatable."""
+    compression: Literal["lossless", "standard", "small"] = "standard"
+    """Of the scene file: every bit, or fewer bytes without visible loss, or fewer still."""
     restart: bool = False
     """Start again instead of resuming from the folder."""
 
@@ -120,12 +122,13 @@ class Fit:
         )
         result = fit_scene(request)
         report = FitReport(result=result, capture=capture, settings=settings, inputs=self.inputs())
-        scene = write_results(report, self.out, log)
+        scene, scene_file = write_results(report, self.out, log, self.compression)
         for line in result.skipped_work:
             note(f"left out: {line}")
         for line in recovered(result.learned):
             note(line)
         note(summary(report))
+        note(f"scene file: {scene_file}")
         moving = len(scene.motion.moving_index)
         note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians, {moving:,} of them moving)")
         if not result.finished:
