@@ -80,7 +80,7 @@ class Generate:
     ply: bool = False
     """Also write scene.ply: the Gaussians at the first time, for other viewers."""
     compression: Literal["lossless", "standard", "small"] = "standard"
-    """Of the scene file: every bit, a tenth of the size without visible loss, or less still."""
+    """Of the scene file: every bit, a tenth of the size without visible loss, or less than that."""
     device: str = "cpu"
     """Where networks run: cpu, cuda or mps. Frames are rendered on the CPU."""
     skip_depth: bool = False

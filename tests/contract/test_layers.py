@@ -33,6 +33,7 @@ OPTIONAL = (
     "tensorboard",
     "onnx",
     "uvicorn",
+    "viser",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 
