@@ -104,8 +104,10 @@ class LiveView:
         pose = self._scene.path.cameras.world_from_camera[0].double().cpu().numpy()
         client.camera.up_direction = -pose[:3, 1]
         client.camera.position = pose[:3, 3]
-        offsets = self._scene.gaussians.means.double().cpu().numpy() - pose[:3, 3]
-        depth = float(np.median(np.linalg.norm(offsets, axis=-1))) if len(offsets) else 1.0
+        means = self._scene.gaussians.means.detach().double().cpu().numpy()
+        depth = (
+            float(np.median(np.linalg.norm(means - pose[:3, 3], axis=-1))) if len(means) else 1.0
+        )
         client.camera.look_at = pose[:3, 3] + depth * pose[:3, 2]
 
 

@@ -67,6 +67,8 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> type[FakeServer]:
 
 def test_a_scene_is_shown_to_this_machine_alone_and_at_the_sliders_time(fake: type) -> None:
     scene = coded_scenes.scene()
+    learned = scene.gaussians.means.clone().requires_grad_()
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=learned))
     with LiveView(8123, (0.0, 2.0)) as view:
         (server,) = fake.made
         assert view.address == "http://localhost:8123" and server.host == "127.0.0.1"
@@ -79,7 +81,7 @@ def test_a_scene_is_shown_to_this_machine_alone_and_at_the_sliders_time(fake: ty
         first, second = server.shown
         last = scene.state_at(2.0)
         drawn = last.opacities >= live_view.LEAST_OPACITY
-        np.testing.assert_allclose(second["centers"], last.means[drawn], rtol=1e-6)
+        np.testing.assert_allclose(second["centers"], last.means[drawn].detach(), rtol=1e-6)
         assert not np.array_equal(first["centers"], second["centers"])
         client = SimpleNamespace(camera=SimpleNamespace())
         server.connected(client)
