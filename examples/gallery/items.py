@@ -96,6 +96,6 @@ ITEMS = (
     _fit("spacetime", "Native 4D Gaussians", "Each Gaussian has a velocity and a duration."),
     _lens("fisheye", "astronaut", "Fisheye, 150 degrees", "The same scene, by ray tracing.",
           "--lens", "fisheye", "--fov", "150"),
-    _lens("depth-of-field", "coffee", "Depth of field", "Spoon and handle are sharp, the rest is soft.",
+    _lens("depth-of-field", "coffee", "Depth of field", "Only spoon and handle are sharp.",
           "--aperture-radius", "0.08", "--focus-distance", "2.4", "--samples", "16"),
 )  # fmt: skip
