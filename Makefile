@@ -10,7 +10,7 @@ PROMPT ?= in a meadow, a turquoise rounded block slides to the left
 COUNT ?= 10000
 SEED ?= 0
 
-.PHONY: demo test test-all test-browser fuzz lint clean
+.PHONY: demo gallery test test-all test-browser fuzz lint clean
 
 $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -26,6 +26,9 @@ ifdef PHOTO
 	$(BIN)/diff4splat generate $(PHOTO) --camera arc:0.2 --out demo/photo-scene
 	@echo "look at demo/photo-scene/preview.png and the video beside it"
 endif
+
+gallery: $(VENV)/ready  ## a dozen scenes on one page, gallery/index.html; minutes; goes on after a stop
+	$(BIN)/python -m examples.gallery --out gallery
 
 test: $(VENV)/ready  ## in less than ten minutes on two cores: all that needs no GPU and is not marked slow
 	$(PARALLEL) $(BIN)/pytest -q -m "not slow" -n auto --dist loadfile
@@ -46,4 +49,4 @@ lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info demo out
+	rm -rf $(VENV) build dist *.egg-info demo gallery out

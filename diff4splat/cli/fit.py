@@ -4,6 +4,7 @@ DATA ── read_capture ── fit_scene (coarse, fine) ── write_results
 """
 
 from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,13 +12,17 @@ import tyro
 
 from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
+from diff4splat.errors import ConfigError, MissingExtraError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from diff4splat.data.capture.capture import Capture
+    from diff4splat.fitting.fit_types import FitRequest, FitResult
     from diff4splat.fitting.settings import FitSettings
     from diff4splat.scene.scene import Scene
+
+DEFAULT_LIVE_PORT = 8080
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +75,22 @@ class Fit:
     """Seed of points, frame order and splits."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Override settings, such as weights.ssim=0.2 or rates.means.first=1e-3; repeatable."""
+    compression: Literal["lossless", "standard", "small"] = "standard"
+    """Of the scene file: every bit, fewer bytes without visible loss, or fewer than that."""
+    live: Annotated[tuple[int, ...] | None, Number(least=1, most=65535)] = None
+    """Show the scene in the browser while it is fitted, at this port of this machine; 8080 without
+    one. Needs viser: pip install 'diff4splat[live]'."""
     restart: bool = False
     """Start again instead of resuming from the folder."""
+
+    def check(self) -> None:
+        """Check what the live view needs."""
+        if self.live is not None and len(self.live) > 1:
+            raise ConfigError(f"--live: expected one port, got {len(self.live)}")
+        if self.live is not None and find_spec("viser") is None:
+            raise MissingExtraError(
+                "--live: expected viser, got none installed; pip install 'diff4splat[live]'"
+            )
 
     def run(self) -> None:
         """Check, then fit as the only writer of the folder."""
@@ -91,7 +110,6 @@ class Fit:
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
         from diff4splat.fitting.checkpoints.checkpoint import CHECKPOINT_FILE
-        from diff4splat.fitting.fit import fit_scene
         from diff4splat.fitting.fit_types import FitRequest
         from diff4splat.fitting.frames.frame_renderer import FrameRenderer
         from diff4splat.fitting.results import FitReport, write_results
@@ -118,18 +136,35 @@ class Fit:
             phases=log.phases,
             note=note,
         )
-        result = fit_scene(request)
+        result = self._fit_in_view(request)
         report = FitReport(result=result, capture=capture, settings=settings, inputs=self.inputs())
-        scene = write_results(report, self.out, log)
+        scene, scene_file = write_results(report, self.out, log, self.compression)
         for line in result.skipped_work:
             note(f"left out: {line}")
         for line in recovered(result.learned):
             note(line)
         note(summary(report))
+        note(f"scene file: {scene_file}")
         moving = len(scene.motion.moving_index)
         note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians, {moving:,} of them moving)")
         if not result.finished:
             note("time is up; the same command goes on")
+
+    def _fit_in_view(self, request: "FitRequest") -> "FitResult":
+        """Fit, and serve the live view meanwhile if it is asked for."""
+        from dataclasses import replace
+
+        from diff4splat.cli.common.console import note
+        from diff4splat.fitting.fit import fit_scene
+
+        if self.live is None:
+            return fit_scene(request)
+        from diff4splat.outputs.live_view import LiveView
+
+        port = self.live[0] if self.live else DEFAULT_LIVE_PORT
+        with LiveView(port, request.capture.time_range_s) as view:
+            note(f"live view: {view.address}")
+            return fit_scene(replace(request, show=view.offer))
 
     def settings(self) -> "FitSettings":
         """The settings, checked before any data are read."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from diff4splat.generation.inputs.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
     from diff4splat.outputs.card import Result
+    from diff4splat.outputs.compressed_scene import SceneFileFacts
     from diff4splat.paths.camera_path import CameraPath
     from diff4splat.progress.phases import Phases
     from diff4splat.progress.run_log import RunLog
@@ -78,6 +79,8 @@ class Generate:
     """Format of the video. Default: mp4 with H.264 where ffmpeg is installed, else webm."""
     ply: bool = False
     """Also write scene.ply: the Gaussians at the first time, for other viewers."""
+    compression: Literal["lossless", "standard", "small"] = "standard"
+    """Of the scene file: every bit, a tenth of the size without visible loss, or less than that."""
     device: str = "cpu"
     """Where networks run: cpu, cuda or mps. Frames are rendered on the CPU."""
     skip_depth: bool = False
@@ -158,15 +161,15 @@ class Generate:
             )
             if on_scene is not None:
                 on_scene(scene)
-            result, lines = self.write_results(folder, scene, input_image, log)
+            result, scene_file, lines = self.write_results(folder, scene, input_image, log)
             inputs = self.inputs(input_image, settings, pipeline.model.config.fingerprint())
-            write_card(folder / "card.json", result, inputs, log)
+            write_card(folder / "card.json", result, inputs, log, scene_file)
         for line in (*lines, f"wrote {self.out}"):
             note(line)
 
     def write_results(
         self, folder: Path, scene: "Scene", input_image: "InputImage", log: "RunLog"
-    ) -> tuple["Result", list[str]]:
+    ) -> tuple["Result", "SceneFileFacts", list[str]]:
         """Render the scene and write every file but the card; returns lines about the result."""
         from diff4splat.cli.common.console import note
         from diff4splat.cli.common.precompile import precompile_renderer
@@ -189,13 +192,16 @@ class Generate:
             render_into(movie, scene, record, log)
             result = Result.of(scene, input_image.rgb, record.first_rgb)
             facts = describe(result, self.camera, input_image.focal_source)
-            write_scene_folder(folder, result, record, facts, log.phases)
+            scene_file = write_scene_folder(
+                folder, result, record, facts, log.phases, self.compression
+            )
             if self.ply:
                 write_first_ply(scene, folder)
             with log.phases.phase("write video"):
                 notes = movie.finish()
         lines = [*notes, *(f"{name}: {value}" for name, value in facts)]
-        return result, [line for line in (*lines, empty_note(scene, record)) if line]
+        lines += [f"Scene file: {scene_file}", empty_note(scene, record)]
+        return result, scene_file, [line for line in lines if line]
 
     def read_inputs(self) -> tuple["InputImage", "CameraPath"]:
         """The photo at the model's size and the camera path, announced."""

@@ -37,6 +37,8 @@ class FitRequest:
     """Time limit of this call."""
     phases: Phases = field(default_factory=Phases)
     note: Callable[[str], None] = _silent
+    show: Callable[[Callable[[], Scene]], None] | None = None
+    """Called after every step with what makes the scene as it is now."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

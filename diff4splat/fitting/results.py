@@ -25,8 +25,9 @@ from diff4splat.fitting.settings import FitSettings
 from diff4splat.io.atomic import atomic_folder, write_text
 from diff4splat.io.cameras.optics_json import optics_json
 from diff4splat.io.photos.images import write_png
-from diff4splat.io.scene_files.scene_file import save_scene
+from diff4splat.io.scene_files.compression import Compression
 from diff4splat.outputs.card import LIBRARIES, scene_facts
+from diff4splat.outputs.compressed_scene import SceneFileFacts, write_scene
 from diff4splat.outputs.scene_folder import write_view
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import peak_memory_bytes
@@ -90,7 +91,9 @@ def preview_path(capture: Capture) -> CameraPath:
     return CameraPath(cameras=cameras, times_s=capture.times_s[index])
 
 
-def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
+def write_results(
+    report: FitReport, folder: Path, log: RunLog, compression: Compression = "standard"
+) -> tuple[Scene, SceneFileFacts]:
     """Write all files atomically; they replace those of an earlier call.
 
     Raises:
@@ -98,12 +101,12 @@ def write_results(report: FitReport, folder: Path, log: RunLog) -> Scene:
     """
     scene = fitted_scene(report)
     with atomic_folder(folder, RESULT_FILES) as staging:
-        save_scene(scene, staging / "scene.safetensors")
+        scene_file = write_scene(scene, staging / "scene.safetensors", compression)
         write_page_or_reason(scene, staging / "scene.html")
         write_view(scene, scene.path, staging / "video.mp4", None, log)
         write_png(_comparison(report, scene), staging / "comparison.png")
-        write_text(staging / "card.json", _card(report, scene, log))
-    return scene
+        write_text(staging / "card.json", _card(report, scene, log, scene_file))
+    return scene, scene_file
 
 
 def _comparison(report: FitReport, scene: Scene) -> Float[Tensor, "h w 3"]:
@@ -119,7 +122,7 @@ def _comparison(report: FitReport, scene: Scene) -> Float[Tensor, "h w 3"]:
     return comparison_sheet(truths, renderings, labels)
 
 
-def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
+def _card(report: FitReport, scene: Scene, log: RunLog, scene_file: SceneFileFacts) -> str:
     result, capture = report.result, report.capture
     card = {
         "diff4splat": __version__,
@@ -140,6 +143,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog) -> str:
         "settings": asdict(report.settings),
         "provenance": asdict(scene.provenance),
         "scene": scene_facts(scene),
+        "scene_file": asdict(scene_file),
         "seconds": {name: round(value, 3) for name, value in log.phases.seconds.items()},
         "seconds_fitting": round(result.seconds, 3),
         "peak_memory_bytes": peak_memory_bytes(),

@@ -75,6 +75,7 @@ class FitSession:
             first_step=first_step,
             save=self.save,
             fixed=fixed or {},
+            show=self.request.show,
             deadline_s=None if limit_s is None else self._start_s + limit_s,
             seconds_before=state.seconds if state else time.perf_counter() - self._start_s,
         )

@@ -16,6 +16,7 @@ from diff4splat.fitting.model.density import densify_and_prune
 from diff4splat.fitting.model.scene_model import SceneModel
 from diff4splat.fitting.objective.gradient_statistics import GradientStatistics
 from diff4splat.fitting.objective.step_objective import Objective
+from diff4splat.scene.scene import Scene
 
 EVALUATION_FRAMES = 12
 """Held-out frames evaluated during a fit."""
@@ -38,6 +39,8 @@ class StageSchedule:
     first_step: int
     """Steps of earlier stages; frames and harmonics count from the start of the fit."""
     save: Callable[["StageLoop"], None]
+    show: Callable[[Callable[[], Scene]], None] | None = None
+    """Called after every step with what makes the scene as it is now."""
     fixed: Mapping[str, Tensor] = field(default_factory=dict)
     """Tensors that a checkpoint needs to rebuild the stage."""
     deadline_s: float | None = None
@@ -91,14 +94,20 @@ class StageLoop:
             if self.step % settings.checkpoint_every == 0:
                 self.stage.save(self)
             advance()
+            if self.stage.show is not None:
+                self.stage.show(self.scene)
         return True
+
+    def scene(self) -> Scene:
+        """The scene as it is now; differentiable."""
+        return self.model.scene(self.degree, self.stage.objective.renderer.path)
 
     def evaluate(self) -> None:
         """Measure quality on a few held-out frames and log it."""
         held_out = self.stage.objective.capture.held_out.nonzero().flatten()
         at = torch.linspace(0, len(held_out) - 1, min(EVALUATION_FRAMES, len(held_out)))
         with torch.no_grad():
-            scene = self.model.scene(self.degree, self.stage.objective.renderer.path)
+            scene = self.scene()
             cameras = self.model.cameras(learning=False)
             indices = held_out[at.round().long()].tolist()
             qualities = self.stage.evaluator.frames(scene, cameras, indices)

@@ -15,6 +15,7 @@ from torch import Tensor
 from diff4splat import __version__
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.image import psnr
+from diff4splat.outputs.compressed_scene import SceneFileFacts
 from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.extent import depth_range
@@ -72,7 +73,13 @@ def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str,
     )
 
 
-def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: RunLog) -> None:
+def write_card(
+    file: Path,
+    result: Result,
+    inputs: Mapping[str, object],
+    log: RunLog,
+    scene_file: SceneFileFacts,
+) -> None:
     """Write the card whole or not at all."""
     seconds = log.phases.seconds
     card = {
@@ -81,6 +88,7 @@ def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: Ru
         "inputs": inputs,
         "provenance": asdict(result.scene.provenance),
         "scene": scene_facts(result.scene),
+        "scene_file": asdict(scene_file),
         "first_view_psnr_db": result.first_view_psnr_db,
         "relief": result.relief,
         "seconds": {name: round(value, 3) for name, value in seconds.items()},

@@ -19,8 +19,9 @@ from diff4splat.io.movies.background_movie import BackgroundMovie
 from diff4splat.io.movies.suffixes import is_movie
 from diff4splat.io.photos.images import write_png
 from diff4splat.io.ply.ply_file import write_ply
-from diff4splat.io.scene_files.scene_file import save_scene
+from diff4splat.io.scene_files.compression import Compression
 from diff4splat.outputs.card import Result
+from diff4splat.outputs.compressed_scene import SceneFileFacts, write_scene
 from diff4splat.outputs.file_names import VIEW_SUFFIXES
 from diff4splat.outputs.filming import FilmRecord, empty_note, film
 from diff4splat.paths.camera_path import CameraPath
@@ -55,8 +56,13 @@ def render_into(movie: BackgroundMovie, scene: Scene, record: FilmRecord, log: R
 
 
 def write_scene_folder(
-    folder: Path, result: Result, record: FilmRecord, facts: SheetFacts, phases: Phases
-) -> None:
+    folder: Path,
+    result: Result,
+    record: FilmRecord,
+    facts: SheetFacts,
+    phases: Phases,
+    compression: Compression = "standard",
+) -> SceneFileFacts:
     """Write what stands beside the video, but the card, which knows how long the rest took.
 
     Raises:
@@ -64,7 +70,7 @@ def write_scene_folder(
     """
     scene = result.scene
     with phases.phase("write files", 4) as advance:
-        save_scene(scene, folder / "scene.safetensors")
+        scene_file = write_scene(scene, folder / "scene.safetensors", compression)
         advance()
         write_page_or_reason(scene, folder / "scene.html")
         advance()
@@ -73,6 +79,7 @@ def write_scene_folder(
         advance()
         write_png(preview(result, record, facts), folder / "preview.png")
         advance()
+    return scene_file
 
 
 def write_first_ply(scene: Scene, folder: Path) -> None:

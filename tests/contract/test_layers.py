@@ -34,6 +34,7 @@ OPTIONAL = (
     "h5py",
     "onnx",
     "uvicorn",
+    "viser",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import coded_scenes
 import oracles_fourdgs
 import oracles_hexplane
 import oracles_io
@@ -17,6 +18,7 @@ from diff4splat.io.cameras.path_files import read_path, write_path
 from diff4splat.io.checkpoints.import_scene import import_scene
 from diff4splat.io.glb.glb_file import read_glb, write_glb
 from diff4splat.io.ply.ply_file import read_ply, write_ply
+from diff4splat.io.scene_files.compression import Compression
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.io.spz.spz_file import read_spz, write_spz
 from diff4splat.scene.scene import Scene
@@ -35,9 +37,9 @@ property float z
 """
 
 
-def _scene(made: Callable[[], Scene]) -> Reader:
+def _scene(made: Callable[[], Scene], compression: Compression = "lossless") -> Reader:
     return Reader(
-        make=lambda folder: save_scene(made(), folder / SCENE),
+        make=lambda folder: save_scene(made(), folder / SCENE, compression),
         read=lambda folder: _shown(load_scene(folder / SCENE)),
     )
 
@@ -126,6 +128,7 @@ SCENES = {
     "scene keyframes": _scene(oracles_io.scene),
     "scene spacetime": _scene(oracles_spacetime.file_scene),
     "scene hexplane": _scene(oracles_hexplane.file_scene),
+    "scene coded": _scene(coded_scenes.scene, "standard"),
     "ply": Reader(make=_write_plys, read=_read_plys),
     "spz": Reader(make=_write_spz, read=lambda folder: read_spz(folder / "a.spz")),
     "glb": Reader(make=_write_glb, read=lambda folder: read_glb(folder / "a.glb")),

@@ -5,7 +5,7 @@ docs/reference/scene-format.md. Only what moves is stored with keys; equal scene
 """
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 from torch import Tensor
@@ -13,6 +13,9 @@ from torch import Tensor
 from diff4splat.errors import FileFormatError, InputError, ShapeError
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.require_file import require_file
+from diff4splat.io.scene_files.coding.coded_tensors import decode_tensors, encode_tensor
+from diff4splat.io.scene_files.coding.plans import plan_tensors
+from diff4splat.io.scene_files.compression import TOLERANCES, Compression
 from diff4splat.io.scene_files.motion_tensors import StoredMotion, pack_motion, unpack_motion
 from diff4splat.io.scene_files.scene_metadata import SceneMetadata, decode, encode
 from diff4splat.io.scene_files.tensor_checks import take_floats
@@ -27,8 +30,11 @@ from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
 
-def save_scene(scene: Scene, file: Path | str) -> None:
-    """Write ``scene`` whole or not at all; float32 and float64 are kept as they are.
+def save_scene(scene: Scene, file: Path | str, compression: Compression = "lossless") -> None:
+    """Write ``scene`` whole or not at all.
+
+    ``lossless`` keeps every bit of float32 and float64. The others round every number to within
+    their tolerances; a scene that they cannot hold is kept without loss.
 
     Raises:
         InputError: a tensor is not finite or half precision, or the motion is of an unknown kind.
@@ -47,6 +53,8 @@ def save_scene(scene: Scene, file: Path | str) -> None:
         _assemble(tensors, metadata)  # what cannot be read back is not written
     except (FileFormatError, ShapeError, InputError) as error:
         raise InputError(f"{file}: the scene cannot be saved: {error}") from error
+    if compression != "lossless":
+        tensors, metadata = _coded(scene, tensors, metadata, compression)
     write_tensors(TensorFile(tensors=tensors, metadata=encode(metadata)), Path(file))
 
 
@@ -60,9 +68,35 @@ def load_scene(file: Path | str) -> Scene:
     require_file(file, "a scene file (.safetensors)")
     try:
         metadata = decode(read_metadata(file))
-        return _assemble(read_tensors(file), metadata)
+        return _assemble(_plain(read_tensors(file), metadata), metadata)
     except (FileFormatError, ShapeError, InputError) as error:
         raise FileFormatError(f"{file}: {error}") from error
+
+
+def _coded(
+    scene: Scene, tensors: dict[str, Tensor], metadata: SceneMetadata, compression: Compression
+) -> tuple[dict[str, Tensor], SceneMetadata]:
+    """Coded tensors and their metadata; the same as given if that cannot be read back."""
+    tolerances, stored, entries = TOLERANCES[compression], dict(tensors), {}
+    for name, plan in plan_tensors(scene, tolerances).items():
+        coded = encode_tensor(tensors[name], plan)
+        if coded is not None:
+            parts, entries[name] = coded
+            del stored[name]
+            stored |= {f"{name}.{part}": value for part, value in parts.items()}
+    settings = {"name": compression, **asdict(tolerances)}
+    coded_metadata = replace(metadata, encodings=entries, compression=settings)
+    try:
+        _assemble(_plain(stored, coded_metadata), coded_metadata)
+    except (FileFormatError, ShapeError, InputError):
+        return tensors, metadata
+    return stored, coded_metadata
+
+
+def _plain(stored: Mapping[str, Tensor], metadata: SceneMetadata) -> Mapping[str, Tensor]:
+    if not metadata.encodings:
+        return stored
+    return decode_tensors(stored, metadata.encodings, sum(t.nbytes for t in stored.values()))
 
 
 def _gaussian_tensors(gaussians: Gaussians) -> dict[str, Tensor]:

@@ -2,13 +2,13 @@
 
 The JSON object has ``motion``, ``path``, ``provenance``, ``rendering`` and ``conventions``. Readers
 ignore keys that they do not know; the version changes only when an old reader would show something
-wrong.
+wrong. Files without coded tensors are written as version 1, which every reader knows.
 """
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from diff4splat.errors import FileFormatError
@@ -17,7 +17,9 @@ from diff4splat.paths.formats.json_text import decode_json
 from diff4splat.scene.scene import DILATION_PX2, Provenance
 
 FORMAT = "diff4splat-scene"
-VERSION = 1
+VERSION = 2
+"""The newest that is read; coded tensors came with 2."""
+PLAIN_VERSION = 1
 CONVENTIONS = {
     "axes": "x right, y down, z forward (OpenCV), right-handed",
     "color": "sRGB-referred, 0.5 + harmonics, RGB in [0, 1]",
@@ -44,6 +46,10 @@ class SceneMetadata:
     provenance: Provenance
     dilation_px2: float = DILATION_PX2
     """What the scene asks renderers for; files that do not say mean the usual."""
+    encodings: Mapping[str, Any] = field(default_factory=dict)
+    """How each coded tensor was coded, see ``coding/coded_tensors.py``."""
+    compression: Mapping[str, Any] = field(default_factory=dict)
+    """Name and tolerances of what coded them, for people; readers need none of it."""
 
 
 def encode(metadata: SceneMetadata) -> dict[str, str]:
@@ -56,8 +62,13 @@ def encode(metadata: SceneMetadata) -> dict[str, str]:
     }
     if metadata.dilation_px2 != DILATION_PX2:
         document["rendering"] = {"dilation_px2": metadata.dilation_px2}
+    version = PLAIN_VERSION
+    if metadata.encodings:
+        version = VERSION
+        document["encodings"] = dict(metadata.encodings)
+        document["compression"] = dict(metadata.compression)
     text = json.dumps(document, sort_keys=True)
-    return {"format": FORMAT, "version": str(VERSION), "scene": text}
+    return {"format": FORMAT, "version": str(version), "scene": text}
 
 
 def decode(strings: Mapping[str, str]) -> SceneMetadata:
@@ -87,6 +98,8 @@ def decode(strings: Mapping[str, str]) -> SceneMetadata:
             untrained=take_value(provenance, "untrained", bool, False),
         ),
         dilation_px2=_dilation(take_value(document, "rendering", dict, {})),
+        encodings=take_value(document, "encodings", dict, {}),
+        compression=take_value(document, "compression", dict, {}),
     )
 
 

@@ -115,8 +115,8 @@ def test_damaged_bytes_never_end_in_another_exception(file: Path) -> None:
 
 def test_a_newer_version_says_so(file: Path) -> None:
     assert (
-        "written by a newer diff4splat (version 2, this one reads up to 1); update diff4splat"
-        in refusal(changed(file, version="2"))
+        "written by a newer diff4splat (version 3, this one reads up to 2); update diff4splat"
+        in refusal(changed(file, version="3"))
     )
 
 

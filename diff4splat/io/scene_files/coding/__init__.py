@@ -1,0 +1,1 @@
+"""Numbers of a scene as whole multiples of a step, compressed."""

@@ -1,0 +1,1 @@
+"""A dozen scenes on one page, each with its viewer, its video and what it cost."""
