@@ -41,7 +41,7 @@ GEOMETRY = {
 COMMANDS = (
     *("generate", "fit", "render", "bake", "convert", "inspect", "train", "pack", "eval", "doctor"),
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
-    *("report error-time", "report knobs"),
+    *("report error-time", "report knobs", "report stability"),
 )
 
 
