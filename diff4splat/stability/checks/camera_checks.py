@@ -13,8 +13,8 @@ from diff4splat.geometry import rigid
 from diff4splat.geometry.camera import Camera, pinhole, stack_cameras
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.stability.check import Check, Outcome
-from diff4splat.stability.checks.cloud import DISTANCE, SIZE_PX, camera, cloud
-from diff4splat.stability.checks.rendered import RENDER_LIMIT, measure_render
+from diff4splat.stability.subjects.cloud import DISTANCE, SIZE_PX, camera, cloud
+from diff4splat.stability.subjects.rendered import RENDER_LIMIT, measure_render
 from diff4splat.stability.compare import psnr_db
 from diff4splat.stability.plots import Thumbnail
 

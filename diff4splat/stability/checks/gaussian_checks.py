@@ -9,8 +9,8 @@ from torch import Tensor
 
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.stability.check import Check, Outcome
-from diff4splat.stability.checks.cloud import COUNT, DISTANCE, camera, cloud
-from diff4splat.stability.checks.rendered import (
+from diff4splat.stability.subjects.cloud import COUNT, DISTANCE, camera, cloud
+from diff4splat.stability.subjects.rendered import (
     RENDER_LIMIT,
     TRACE_LIMIT,
     measure_render,

@@ -13,7 +13,7 @@ from diff4splat.models.hub.model import Model, load_model
 from diff4splat.models.onnx_export.source import GraphSource
 from diff4splat.models.onnx_export.sources import graph_sources
 from diff4splat.stability.check import Check, Outcome
-from diff4splat.stability.checks.casting import DTYPES, camera_dtype, cast
+from diff4splat.stability.subjects.casting import DTYPES, camera_dtype, cast
 from diff4splat.stability.compare import all_finite, relative_error, weighted_sum
 
 GROUP = "networks"

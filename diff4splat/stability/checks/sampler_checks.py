@@ -7,7 +7,7 @@ from torch import Tensor
 
 from diff4splat.flow.samplers import SAMPLERS
 from diff4splat.stability.check import Check, Outcome
-from diff4splat.stability.checks.sampler_fields import (
+from diff4splat.stability.subjects.sampler_fields import (
     end_point_errors,
     end_points,
     exact_end_points,
