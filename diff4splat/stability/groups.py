@@ -11,7 +11,7 @@ GROUPS = {
     "is off by more than 5 %, or more than 5 % of the trajectories end more than 30 % away.",
     "networks": "Every trained network in float32, bfloat16 and float16 against itself in float64, "
     "with gradients of all weights and inputs.",
-    "sampling": "The trained networks under guidance of 1 to 30 at 1 to 64 steps: the sampled "
+    "sampling": "The trained networks under guidance of 1 to 30 at 1 to 16 steps: the sampled "
     "latents in float32 against float64.",
     "end to end": "One image and prompt to a scene, with all networks in one precision. The "
     "error is that of a view beside the input view.",

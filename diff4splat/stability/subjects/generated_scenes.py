@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.errors import InputError
 from diff4splat.generation.inputs.input_image import InputImage, load_image
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
@@ -47,7 +48,11 @@ def as_file(rgb: Float[Tensor, "h w 3"], fov_deg: float | None = None) -> InputI
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "image.png"
         write_png(rgb, file)
-        return load_image(file, SIDE_PX, fov_deg)
+        try:
+            return load_image(file, SIDE_PX, fov_deg)
+        except InputError as error:
+            # The folder is of no interest to a reader.
+            raise InputError(str(error).replace(f"{folder}/", "")) from error
 
 
 def generate(
