@@ -53,7 +53,7 @@ def measure_loss(
     got = loss(leaf, truth.float())
     exact = loss(rendered.float().double(), truth.float().double())
     return Outcome(
-        error=float((got.double() - exact).abs().max()),
+        error=float((got.detach().double() - exact).abs().max()),
         value_finite=all_finite([got]),
         gradient_finite=finite_gradients([got], {"rendered": leaf}),
         note=f"loss {float(got.detach()):.6g}",
