@@ -13,9 +13,9 @@ GROUPS = {
     "with gradients of all weights and inputs.",
     "sampling": "The trained networks under guidance of 1 to 30 at 1 to 16 steps: the sampled "
     "latents in float32 against float64.",
-    "end to end": "One image and prompt to a scene, with all networks in one precision. The "
+    "end-to-end": "One image and prompt to a scene, with all networks in one precision. The "
     "error is that of a view beside the input view.",
-    "long videos": "A thousand frames from the decoder, latent frame by latent frame, against one "
+    "long-videos": "A thousand frames from the decoder, latent frame by latent frame, against one "
     "pass in float64.",
     "images": "Inputs that are no photographs. Thumbnails: input, first view, a view from the "
     "side.",

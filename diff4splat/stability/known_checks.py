@@ -21,8 +21,8 @@ from diff4splat.stability.groups import GROUPS, require_groups
 OF_MODEL: dict[str, Callable[[str], Iterable[Check]]] = {
     "networks": network_checks,
     "sampling": sampling_checks,
-    "end to end": scene_checks,
-    "long videos": vae_checks,
+    "end-to-end": scene_checks,
+    "long-videos": vae_checks,
     "images": image_checks,
     "onnx": onnx_checks,
     "thresholds": threshold_checks,

@@ -23,6 +23,8 @@ FIELDS_OF_VIEW_DEG = (0.5, 1.0, 10.0, 60.0, 120.0, 150.0, 170.0, 175.0)
 PATHS = ("orbit:1", "orbit:100", "roll:1", "spiral:2", "forward:0.99", "forward:1", "dolly-zoom:0.9")
 QUICK = ("field of view 170°", "field of view 175°", "inside the scene")
 FRAMES = 8
+Place = tuple[float | int, ...]
+"""x, y, z in scene units."""
 OFFSETS = (1e3, 1e6)
 """A float32 at 1e6 has steps of 1/16; what is compared is the image of the rounded scene."""
 
@@ -103,7 +105,7 @@ def _path(text: str) -> Camera:
     return cameras[torch.linspace(0, len(cameras) - 1, FRAMES).long()]
 
 
-def _at(position: tuple[float, ...], target: tuple[float, ...]) -> Camera:
+def _at(position: Place, target: Place) -> Camera:
     eye, aim = (torch.tensor(point, dtype=torch.float32) for point in (position, target))
     return camera().with_pose(rigid.look_at(eye, aim, torch.tensor([0.0, 1.0, 0.0])))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
+from itertools import groupby
 
 from torch import Tensor
 
@@ -68,13 +69,24 @@ def _usable(errors: Tensor) -> list[bool]:
 
 def _usable_from(cells: tuple[tuple[bool, ...], ...]) -> str:
     """The fewest steps from which on every number of steps is usable."""
-    parts = []
-    for weight, row in zip(WEIGHTS, cells, strict=True):
+    fewest = []
+    for row in cells:
         bad = [index for index, fine in enumerate(row) if not fine]
         first = bad[-1] + 1 if bad else 0
-        steps = str(STEPS[first]) if first < len(STEPS) else "none"
-        parts.append(f"{steps} at {weight:g}")
-    return "usable from (steps at guidance): " + ", ".join(parts)
+        fewest.append(f"{STEPS[first]} steps" if first < len(STEPS) else "no number of steps")
+    runs = [(steps, list(run)) for steps, run in groupby(zip(fewest, WEIGHTS, strict=True), _first)]
+    parts = [f"{steps} at guidance {_range([pair[1] for pair in run])}" for steps, run in runs]
+    return "usable from " + ", ".join(parts)
+
+
+def _first(pair: tuple[str, float]) -> str:
+    return pair[0]
+
+
+def _range(weights: list[float]) -> str:
+    """One weight, or the first and the last of several."""
+    low, high = weights[0], weights[-1]
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 def _heat_map(
@@ -84,7 +96,7 @@ def _heat_map(
     usable: tuple[tuple[bool, ...], ...],
 ) -> HeatMap:
     return HeatMap(
-        title=f"{name} {deviation:g}",
+        title=f"{name}, deviation {deviation:g}",
         row_label="guidance",
         rows=tuple(f"{weight:g}" for weight in WEIGHTS),
         column_label="steps",

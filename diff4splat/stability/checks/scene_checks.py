@@ -14,7 +14,7 @@ from diff4splat.stability.subjects.casting import DTYPES
 from diff4splat.stability.subjects.drawn_images import objects
 from diff4splat.stability.subjects.generated_scenes import GeneratedScene, as_file, generate
 
-GROUP = "end to end"
+GROUP = "end-to-end"
 LIMITS = {"float32": 1e-3, "bfloat16": 0.05, "float16": 0.02}
 """RMS of RGB: 60, 26 and 34 dB."""
 ROUTES = {

@@ -6,7 +6,6 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from html import escape
 from importlib import resources
 
 import numpy as np
@@ -14,10 +13,9 @@ import torch
 from PIL import Image
 
 from diff4splat.error_time.tables import Machine
-from diff4splat.progress.plain_text import plain_text
 from diff4splat.stability.check import VERDICTS, Outcome, Record
 from diff4splat.stability.groups import GROUPS
-from diff4splat.stability.page.svg import curves, error_bar, heat_map
+from diff4splat.stability.page.svg import curves, error_bar, heat_map, safe_text
 from diff4splat.stability.plots import Curves, HeatMap, Thumbnail
 from diff4splat.stability.tables import count_verdicts, error_text
 
@@ -40,7 +38,7 @@ def stability_page(records: Sequence[Record], machine: Machine) -> str:
     seconds = sum(record.seconds for record in records)
     parts = {
         "STYLE": _asset("style.css"),
-        "MACHINE": _safe(f"{machine}. {len(records)} checks in {seconds:.0f} s."),
+        "MACHINE": safe_text(f"{machine}. {len(records)} checks in {seconds:.0f} s."),
         "TILES": _tiles(records),
         "OVERVIEW": _overview(by_group),
         "SECTIONS": "\n".join(_section(group, members) for group, members in by_group),
@@ -63,12 +61,12 @@ def _overview(by_group: Sequence[tuple[str, list[Record]]]) -> str:
     rows = []
     for group, members in by_group:
         squares = "".join(
-            f'<i class="{_slug(record.verdict)}" title="{_safe(record.check.name)}: '
+            f'<i class="{_slug(record.verdict)}" title="{safe_text(record.check.name)}: '
             f'{record.verdict}"></i>'
             for record in members
         )
         rows.append(
-            f'<a href="#{_slug(group)}">{_safe(group)}</a><div class="squares">{squares}</div>'
+            f'<a href="#{_slug(group)}">{safe_text(group)}</a><div class="squares">{squares}</div>'
         )
     return "".join(rows)
 
@@ -80,7 +78,7 @@ def _section(group: str, members: Sequence[Record]) -> str:
     charts = f'<div class="charts">{"".join(drawn)}</div>' if drawn else ""
     rows = "\n".join(_row(record) for record in members)
     return (
-        f'<section id="{_slug(group)}"><h2>{_safe(group)}</h2><p>{_safe(about)}</p>{charts}'
+        f'<section id="{_slug(group)}"><h2>{safe_text(group)}</h2><p>{safe_text(about)}</p>{charts}'
         "<table><thead><tr><th></th><th>check</th><th>error to float64</th><th></th>"
         "<th>value</th><th>gradient</th><th>s</th><th>note</th></tr></thead>"
         f"<tbody>{rows}</tbody></table></section>"
@@ -94,14 +92,14 @@ def _row(record: Record) -> str:
     if outcome is not None and outcome.error is not None:
         bar = error_bar(outcome.error, check.limit)
     limit = "none" if math.isinf(check.limit) else f"{check.limit:g}"
-    hint = _safe(f"{check.error_unit}; limit {limit}")
+    hint = safe_text(f"{check.error_unit}; limit {limit}")
     return (
         f'<tr class="{_slug(record.verdict)}"><td><span class="badge">{record.verdict}</span></td>'
-        f'<td class="name">{_safe(check.name)}{_thumbnails(outcome)}</td>'
+        f'<td class="name">{safe_text(check.name)}{_thumbnails(outcome)}</td>'
         f'<td class="number" title="{hint}">{error}</td><td title="{hint}">{bar}</td>'
         f"<td>{_tick(outcome and outcome.value_finite)}</td>"
         f"<td>{_tick(outcome and outcome.gradient_finite)}</td>"
-        f'<td class="number">{record.seconds:.2f}</td><td class="note">{_safe(record.note)}</td></tr>'
+        f'<td class="number">{record.seconds:.2f}</td><td class="note">{safe_text(record.note)}</td></tr>'
     )
 
 
@@ -110,8 +108,8 @@ def _thumbnails(outcome: Outcome | None) -> str:
     if not images:
         return ""
     figures = "".join(
-        f'<figure><img alt="{_safe(image.caption)}" src="data:image/png;base64,{_png(image)}">'
-        f"<figcaption>{_safe(image.caption)}</figcaption></figure>"
+        f'<figure><img alt="{safe_text(image.caption)}" src="data:image/png;base64,{_png(image)}">'
+        f"<figcaption>{safe_text(image.caption)}</figcaption></figure>"
         for image in images
     )
     return f'<div class="thumbnails">{figures}</div>'
@@ -140,11 +138,6 @@ def _tick(finite: bool | None) -> str:
 
 def _slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.lower())
-
-
-def _safe(text: str) -> str:
-    """Text inside of elements and attributes, without control characters."""
-    return escape(plain_text(text), quote=True)
 
 
 def _asset(name: str) -> str:

@@ -3,18 +3,21 @@
 import math
 from html import escape
 
+from diff4splat.progress.plain_text import plain_text
 from diff4splat.stability.plots import Curves, HeatMap
 
 CELL_PX, LABEL_PX = 22, 30
 LOWEST, HIGHEST = -6.0, 0.0
 """Decades of the heat maps' colours."""
+TITLE_CHARACTER_PX = 7
 CURVE_SIZE = (420, 170)
 LINE_COLORS = ("#2563eb", "#d97706", "#059669", "#9333ea")
 
 
 def heat_map(plot: HeatMap) -> str:
     """One coloured cell per error, crossed out where it is not usable."""
-    width = LABEL_PX + CELL_PX * len(plot.columns) + 4
+    cells = CELL_PX * len(plot.columns)
+    width = LABEL_PX + max(cells, TITLE_CHARACTER_PX * len(plot.title)) + 4
     height = 34 + CELL_PX * len(plot.rows) + 26
     parts = [_text(LABEL_PX, 12, plot.title, "title"), _text(0, 28, plot.row_label, "axis")]
     for row, (name, values) in enumerate(zip(plot.rows, plot.values, strict=True)):
@@ -76,6 +79,11 @@ def error_bar(error: float, limit: float) -> str:
     return _svg(width, height, [track, bar, mark], "error")
 
 
+def safe_text(text: str) -> str:
+    """Text for elements and attributes, without markup and control characters."""
+    return escape(plain_text(text), quote=True)
+
+
 def heat_color(value: float) -> str:
     """From pale green (1e-6 and below) over yellow to dark red (1 and above)."""
     if not math.isfinite(value):
@@ -97,11 +105,11 @@ def _share(value: float) -> float:
     return 0.0 if value <= 0 else min(max((math.log10(value) + 16) / 17, 0.0), 1.0)
 
 
-def _cell(x: float, y: float, value: float, hint: str, usable: bool) -> str:
+def _cell(x: int, y: int, value: float, hint: str, usable: bool) -> str:
     side = CELL_PX - 2
     square = (
         f'<rect x="{x}" y="{y}" width="{side}" height="{side}" rx="3" fill="{heat_color(value)}">'
-        f"<title>{escape(hint)}</title></rect>"
+        f"<title>{safe_text(hint)}</title></rect>"
     )
     if usable:
         return square
@@ -109,13 +117,13 @@ def _cell(x: float, y: float, value: float, hint: str, usable: bool) -> str:
     return square + f'<path d="M{a} {b}L{c} {d}M{a} {d}L{c} {b}" class="cross"/>'
 
 
-def _text(x: float, y: float, text: str, kind: str, color: str = "") -> str:
+def _text(x: float | int, y: float | int, text: str, kind: str, color: str = "") -> str:
     fill = f' style="fill:{color}"' if color else ""
-    return f'<text x="{x:.1f}" y="{y:.1f}" class="{kind}"{fill}>{escape(text)}</text>'
+    return f'<text x="{x:.1f}" y="{y:.1f}" class="{kind}"{fill}>{safe_text(text)}</text>'
 
 
-def _svg(width: float, height: float, parts: list[str], label: str) -> str:
+def _svg(width: int, height: int, parts: list[str], label: str) -> str:
     return (
         f'<svg width="{width}" height="{height}" viewBox="0 0 {width} {height}" role="img" '
-        f'aria-label="{escape(label, quote=True)}">{"".join(parts)}</svg>'
+        f'aria-label="{safe_text(label)}">{"".join(parts)}</svg>'
     )

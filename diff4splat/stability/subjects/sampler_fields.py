@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.analytic_mixture import GaussianMixture, random_mixture
-from diff4splat.flow.guidance import Guidance, guided, mix
+from diff4splat.flow.guidance import Guidance, guided
 from diff4splat.flow.levels import make_levels
 from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
 from diff4splat.generation.settings import GenerationSettings
@@ -65,7 +65,7 @@ def exact_end_points(deviation: float, weights: tuple[float, ...]) -> Float[Tens
 
     def velocity(state: Tensor, level: float) -> Tensor:
         plain, preferred = (part.velocity(state, level) for part in (data.plain, data.preferred))
-        return mix(plain, preferred, weight)
+        return plain + weight * (preferred - plain)
 
     start = initial_noise().repeat(len(weights), 1)
     levels = make_levels("log_snr", REFERENCE_STEPS)

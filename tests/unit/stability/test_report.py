@@ -22,9 +22,9 @@ from diff4splat.stability.tables import to_json, to_markdown
 EVIL = "<script>alert('x')</script> & \"quotes\" \x1b[31m"
 
 
-def check(outcome: Outcome | Exception, limit: float = 0.1, name: str = "case") -> Check:
+def check(outcome: Outcome | BaseException, limit: float = 0.1, name: str = "case") -> Check:
     def run() -> Outcome:
-        if isinstance(outcome, Exception):
+        if isinstance(outcome, BaseException):
             raise outcome
         return outcome
 
