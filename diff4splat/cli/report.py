@@ -75,12 +75,17 @@ class Stability:
         from diff4splat.stability.known_checks import known_checks
         from diff4splat.stability.tables import count_verdicts, to_markdown
 
-        checks, phases = known_checks(self.only, model=self.model, quick=self.quick), ConsolePhases()
+        checks, phases = (
+            known_checks(self.only, model=self.model, quick=self.quick),
+            ConsolePhases(),
+        )
         # Seconds must not count compilation.
         precompile_renderer(single_gaussian("cpu"), phases)
         precompile_tracer(phases)
         written = report.run(self.out, checks, phases)
         unusual = [record for record in written.records if record.verdict != "ok"]
         print(to_markdown(unusual) if unusual else "every check is ok")
-        counts = ", ".join(f"{n} {verdict}" for verdict, n in count_verdicts(written.records).items())
+        counts = ", ".join(
+            f"{n} {verdict}" for verdict, n in count_verdicts(written.records).items()
+        )
         note(f"{counts}; wrote {', '.join(file.name for file in written.files)} to {self.out}")

@@ -109,8 +109,7 @@ def slerp(
 ) -> Float[Tensor, "*b 4"]:
     """Constant-speed rotation along the shorter arc; ``weight`` 0 is ``start``, 1 is ``stop``.
 
-    Half a turn goes from ``start`` to ``stop`` as they are; −``stop`` is the same rotation the other
-    way round.
+    Half a turn goes from ``start`` to ``stop`` as they are; −``stop`` would be the other way round.
     """
     start, stop = normalize(start), normalize(stop)
     cosine = (start * stop).sum(-1, keepdim=True)

@@ -26,8 +26,7 @@ GROUPS = {
     "fits": "A few steps of per-scene fits on tiny captures; then positions in float32 against "
     "float64.",
     "onnx": "ONNX Runtime against PyTorch, both in float32, on ordinary and extreme inputs.",
-    "thresholds": "How many Gaussians change sides when a threshold or the image changes a "
-    "little.",
+    "thresholds": "How many Gaussians change sides when a threshold or the image changes a little.",
 }
 """Name → what its checks are, in the order of the report."""
 

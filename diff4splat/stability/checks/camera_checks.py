@@ -13,14 +13,22 @@ from diff4splat.geometry import rigid
 from diff4splat.geometry.camera import Camera, pinhole, stack_cameras
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.stability.check import Check, Outcome
-from diff4splat.stability.subjects.cloud import DISTANCE, SIZE_PX, camera, cloud
-from diff4splat.stability.subjects.rendered import RENDER_LIMIT, measure_render
 from diff4splat.stability.compare import psnr_db
 from diff4splat.stability.plots import Thumbnail
+from diff4splat.stability.subjects.cloud import DISTANCE, SIZE_PX, camera, cloud
+from diff4splat.stability.subjects.rendered import RENDER_LIMIT, measure_render
 
 GROUP = "cameras"
 FIELDS_OF_VIEW_DEG = (0.5, 1.0, 10.0, 60.0, 120.0, 150.0, 170.0, 175.0)
-PATHS = ("orbit:1", "orbit:100", "roll:1", "spiral:2", "forward:0.99", "forward:1", "dolly-zoom:0.9")
+PATHS = (
+    "orbit:1",
+    "orbit:100",
+    "roll:1",
+    "spiral:2",
+    "forward:0.99",
+    "forward:1",
+    "dolly-zoom:0.9",
+)
 QUICK = ("field of view 170°", "field of view 175°", "inside the scene")
 FRAMES = 8
 Place = tuple[float | int, ...]

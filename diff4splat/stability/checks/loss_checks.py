@@ -45,9 +45,7 @@ def loss_checks() -> Iterator[Check]:
     )
 
 
-def measure_loss(
-    loss: Callable[[Tensor, Tensor], Tensor], rendered: Maps, truth: Maps
-) -> Outcome:
+def measure_loss(loss: Callable[[Tensor, Tensor], Tensor], rendered: Maps, truth: Maps) -> Outcome:
     """In float32 against float64, for the same float32 maps."""
     leaf = rendered.float().requires_grad_()
     got = loss(leaf, truth.float())
@@ -61,7 +59,7 @@ def measure_loss(
 
 
 def _pairs() -> dict[str, tuple[Maps, Maps]]:
-    """(rendered, truth)"""
+    """Rendered and true maps."""
     ramp = _ramp()
     one = torch.zeros_like(ramp)
     one[..., 0, 0] = 4.0

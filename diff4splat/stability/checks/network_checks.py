@@ -13,8 +13,8 @@ from diff4splat.models.hub.model import Model, load_model
 from diff4splat.models.onnx_export.source import GraphSource
 from diff4splat.models.onnx_export.sources import graph_sources
 from diff4splat.stability.check import Check, Outcome
-from diff4splat.stability.subjects.casting import DTYPES, camera_dtype, cast
 from diff4splat.stability.compare import all_finite, relative_error, weighted_sum
+from diff4splat.stability.subjects.casting import DTYPES, camera_dtype, cast
 
 GROUP = "networks"
 LIMITS = {"float32": 1e-4, "bfloat16": 0.1, "float16": 0.02}

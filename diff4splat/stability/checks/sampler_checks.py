@@ -8,13 +8,13 @@ from torch import Tensor
 
 from diff4splat.flow.samplers import SAMPLERS
 from diff4splat.stability.check import Check, Outcome
+from diff4splat.stability.compare import all_finite
+from diff4splat.stability.plots import HeatMap
 from diff4splat.stability.subjects.sampler_fields import (
     end_point_errors,
     end_points,
     exact_end_points,
 )
-from diff4splat.stability.compare import all_finite
-from diff4splat.stability.plots import HeatMap
 
 GROUP = "samplers"
 DEVIATIONS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6)

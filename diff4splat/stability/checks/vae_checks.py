@@ -1,7 +1,7 @@
 """A thousand frames from the video decoder: does the error grow with the frames?
 
-Axes: ``c t h w`` latents, ``f`` frames. The decoder runs latent frame by latent frame, each with the
-caches of the one before; the exact video comes from float64 in long chunks.
+Axes: ``c t h w`` latents, ``f`` frames. The decoder runs latent frame by latent frame, each with
+the caches of the one before; the exact video comes from float64 in long chunks.
 """
 
 import copy

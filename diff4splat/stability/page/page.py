@@ -99,7 +99,8 @@ def _row(record: Record) -> str:
         f'<td class="number" title="{hint}">{error}</td><td title="{hint}">{bar}</td>'
         f"<td>{_tick(outcome and outcome.value_finite)}</td>"
         f"<td>{_tick(outcome and outcome.gradient_finite)}</td>"
-        f'<td class="number">{record.seconds:.2f}</td><td class="note">{safe_text(record.note)}</td></tr>'
+        f'<td class="number">{record.seconds:.2f}</td>'
+        f'<td class="note">{safe_text(record.note)}</td></tr>'
     )
 
 

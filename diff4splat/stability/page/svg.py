@@ -2,6 +2,7 @@
 
 import math
 from html import escape
+from itertools import pairwise
 
 from diff4splat.progress.plain_text import plain_text
 from diff4splat.stability.plots import Curves, HeatMap
@@ -25,7 +26,9 @@ def heat_map(plot: HeatMap) -> str:
         parts.append(_text(LABEL_PX - 5, y + 15, name, "tick end"))
         for column, value in enumerate(values):
             x = LABEL_PX + CELL_PX * column
-            hint = f"{plot.row_label} {name}, {plot.columns[column]} {plot.column_label}: {value:.1e}"
+            hint = (
+                f"{plot.row_label} {name}, {plot.columns[column]} {plot.column_label}: {value:.1e}"
+            )
             parts.append(_cell(x, y, value, hint, plot.usable[row][column]))
     bottom = 34 + CELL_PX * len(plot.rows)
     for column, name in enumerate(plot.columns):
@@ -88,10 +91,15 @@ def heat_color(value: float) -> str:
     """From pale green (1e-6 and below) over yellow to dark red (1 and above)."""
     if not math.isfinite(value):
         return "#111827"
-    stops = ((0, (209, 250, 229)), (0.5, (253, 230, 138)), (0.8, (249, 115, 22)), (1, (153, 27, 27)))
+    stops = (
+        (0, (209, 250, 229)),
+        (0.5, (253, 230, 138)),
+        (0.8, (249, 115, 22)),
+        (1, (153, 27, 27)),
+    )
     share = 0.0 if value <= 0 else (math.log10(value) - LOWEST) / (HIGHEST - LOWEST)
     share = min(max(share, 0.0), 1.0)
-    for (start, first), (stop, last) in zip(stops, stops[1:], strict=False):
+    for (start, first), (stop, last) in pairwise(stops):
         if share <= stop:
             weight = (share - start) / (stop - start)
             mixed = (round(a + weight * (b - a)) for a, b in zip(first, last, strict=True))

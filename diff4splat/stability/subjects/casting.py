@@ -44,6 +44,7 @@ class CastNetwork:
         self._dtype = dtype
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """As the network."""
         return self._converted(self._network)(*arguments, **named)
 
     def __getattr__(self, name: str) -> Any:
