@@ -17,7 +17,7 @@ class HeatMap:
     columns: tuple[str, ...]
     values: tuple[tuple[float, ...], ...]
     """One tuple per row."""
-    usable: tuple[tuple[bool, ...], ...]
+    within_limit: tuple[tuple[bool, ...], ...]
     """Cells within the limits; the others are crossed out."""
 
 

@@ -95,7 +95,7 @@ def _plot_record(plot: Plot) -> dict[str, object]:
             plot.row_label: plot.rows,
             plot.column_label: plot.columns,
         }
-        return names | {"values": values, "usable": plot.usable}
+        return names | {"values": values, "within_limit": plot.within_limit}
     if isinstance(plot, Curves):
         lines = {name: [_number(value) for value in y] for name, y in plot.lines}
         return {"title": plot.title, plot.x_label: plot.x, "lines": lines}

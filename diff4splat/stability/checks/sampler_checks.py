@@ -102,5 +102,5 @@ def _heat_map(
         column_label="steps",
         columns=tuple(map(str, STEPS)),
         values=values,
-        usable=usable,
+        within_limit=usable,
     )

@@ -74,7 +74,7 @@ def measure_sampling(name: str, model: str, sample: Sample) -> Outcome:
                 column_label="steps",
                 columns=tuple(map(str, STEPS)),
                 values=tuple(rows),
-                usable=tuple(tuple(value <= LIMIT for value in row) for row in rows),
+                within_limit=tuple(tuple(value <= LIMIT for value in row) for row in rows),
             ),
         ),
     )

@@ -29,7 +29,7 @@ def heat_map(plot: HeatMap) -> str:
             hint = (
                 f"{plot.row_label} {name}, {plot.columns[column]} {plot.column_label}: {value:.1e}"
             )
-            parts.append(_cell(x, y, value, hint, plot.usable[row][column]))
+            parts.append(_cell(x, y, value, hint, plot.within_limit[row][column]))
     bottom = 34 + CELL_PX * len(plot.rows)
     for column, name in enumerate(plot.columns):
         parts.append(_text(LABEL_PX + CELL_PX * (column + 0.5), bottom + 12, name, "tick middle"))

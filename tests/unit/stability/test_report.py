@@ -85,7 +85,7 @@ def test_json_is_valid_for_numbers_that_are_not_finite() -> None:
         column_label="steps",
         columns=("2", "4"),
         values=((math.inf, 0.5),),
-        usable=((False, True),),
+        within_limit=((False, True),),
     )
     record = run_check(check(Outcome(error=math.nan, plots=(heat,))))
     read = json.loads(to_json([record], report.this_machine()))["checks"][0]
@@ -128,7 +128,7 @@ def test_plots_of_extreme_numbers() -> None:
 def test_cells_that_are_not_usable_are_crossed_out() -> None:
     grid = {"rows": ("1",), "columns": ("2", "4"), "values": ((0.5, 0.01),)}
     labels = {"title": "t", "row_label": "r", "column_label": "c"}
-    assert heat_map(HeatMap(**grid, **labels, usable=((False, True),))).count("cross") == 1
+    assert heat_map(HeatMap(**grid, **labels, within_limit=((False, True),))).count("cross") == 1
 
 
 def test_every_group_has_checks() -> None:
