@@ -96,7 +96,7 @@ def _heat_map(
     usable: tuple[tuple[bool, ...], ...],
 ) -> HeatMap:
     return HeatMap(
-        title=f"{name}, deviation {deviation:g}",
+        title=f"{name}, σ {deviation:g}",
         row_label="guidance",
         rows=tuple(f"{weight:g}" for weight in WEIGHTS),
         column_label="steps",

@@ -10,7 +10,7 @@ from diff4splat.stability.plots import Curves, HeatMap
 CELL_PX, LABEL_PX = 22, 30
 LOWEST, HIGHEST = -6.0, 0.0
 """Decades of the heat maps' colours."""
-TITLE_CHARACTER_PX = 7
+TITLE_CHARACTER_PX = 6
 CURVE_SIZE = (420, 170)
 LINE_COLORS = ("#2563eb", "#d97706", "#059669", "#9333ea")
 
