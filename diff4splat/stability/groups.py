@@ -6,7 +6,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.paths.messages import unknown_name
 
 GROUPS = {
-    "samplers": "Exact velocity fields of data of ever smaller deviation σ, under stronger guidance, "
+    "samplers": "Exact velocity fields of data of deviation σ, under ever stronger guidance, "
     "on the levels that generation chooses. Crossed-out cells are not usable: the median end point "
     "is off by more than 5 %, or more than 5 % of the trajectories end more than 30 % away.",
     "networks": "Every trained network in float32, bfloat16 and float16 against itself in float64, "
