@@ -99,13 +99,22 @@ def rotate(quats: Float[Tensor, "*b 4"], vectors: Float[Tensor, "*#b 3"]) -> Flo
     return (to_matrix(quats) @ vectors[..., None]).squeeze(-1)
 
 
+HALF_TURN = 1e-4
+"""Cosine of quaternions up to which their rotations are half a turn apart, to rounding; then both
+arcs are as short, and the one from the quaternions' own signs is taken by every implementation."""
+
+
 def slerp(
     start: Float[Tensor, "*b 4"], stop: Float[Tensor, "*#b 4"], weight: Float[Tensor, "*#b"]
 ) -> Float[Tensor, "*b 4"]:
-    """Constant-speed rotation along the shorter arc; ``weight`` 0 is ``start``, 1 is ``stop``."""
+    """Constant-speed rotation along the shorter arc; ``weight`` 0 is ``start``, 1 is ``stop``.
+
+    Half a turn goes from ``start`` to ``stop`` as they are; −``stop`` would be the other way round.
+    """
     start, stop = normalize(start), normalize(stop)
     cosine = (start * stop).sum(-1, keepdim=True)
-    stop, cosine = torch.where(cosine < 0, -stop, stop), cosine.abs()
+    other_way = cosine < -HALF_TURN
+    stop, cosine = torch.where(other_way, -stop, stop), torch.where(other_way, -cosine, cosine)
     weight = weight[..., None]
     # Below about 1e-3 rad the linear blend is exact to rounding and keeps the gradient finite.
     nearby = cosine > 1 - 1e-6

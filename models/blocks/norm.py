@@ -9,6 +9,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from diff4splat.models.blocks.precision import at_least_float32
+
 EPSILON = 1e-6
 
 
@@ -21,7 +23,7 @@ class ChannelRmsNorm(nn.Module):
 
     def forward(self, features: Float[Tensor, "b c ..."]) -> Float[Tensor, "b c ..."]:
         """Squares are summed in at least float32: half precision overflows from 256 on."""
-        wide = features if features.dtype == torch.float64 else features.float()
+        wide = at_least_float32(features)
         inverse = torch.rsqrt(wide.square().mean(1, keepdim=True) + EPSILON)
         gain = self.gain.to(features.dtype).view(-1, *[1] * (features.dim() - 2))
         return (wide * inverse).to(features.dtype) * gain

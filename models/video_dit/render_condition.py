@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.patches import fill_first_pack, patchify
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.config.networks import TIME_STRIDE, TOKEN_PATCH
 from diff4splat.models.video_dit.conditions import RenderCondition
 
@@ -28,6 +29,7 @@ class RenderConditionEmbedding(nn.Module):
         """One token per 2×2 latent pixels; validity is averaged over each latent pixel."""
         latent = patchify(condition.latent, (1, TOKEN_PATCH, TOKEN_PATCH))
         side_px = condition.validity.shape[-1] // condition.latent.shape[-1]
-        share = torch.nn.functional.avg_pool3d(condition.validity, (1, side_px, side_px))
+        validity = at_least_float32(condition.validity)
+        share = torch.nn.functional.avg_pool3d(validity, (1, side_px, side_px))
         share = patchify(fill_first_pack(share), (TIME_STRIDE, TOKEN_PATCH, TOKEN_PATCH))
         return self.latent(latent) + self.validity((1 - share).to(latent))

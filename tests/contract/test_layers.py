@@ -21,7 +21,7 @@ LAYERS = [  # lower may never import higher; the same row may not import each ot
     {"generation", "error_time"},
     {"training"},
     {"fitting", "evaluation"},
-    {"configs", "serving"},
+    {"configs", "serving", "stability"},
     {"cli"},
 ]
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row}

@@ -58,6 +58,9 @@ inspect nowhere
 inspect --config enormous
 inspect --model enormous
 report error-time --repeats 0
+report stability --only nothing
+report stability --model enormous
+report stability --out photo.png
 prepare synth --out folder --clips 0
 prepare latents --clips nowhere --out folder
 prepare latents --clips folder --out folder --config enormous

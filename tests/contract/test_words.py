@@ -42,7 +42,7 @@ COMMANDS = (
     *("generate", "fit", "render", "bake", "convert", "inspect", "train", "pack", "eval", "doctor"),
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
     *("prepare import", "prepare doctor"),
-    *("report error-time", "report knobs"),
+    *("report error-time", "report knobs", "report stability"),
 )
 
 

@@ -14,7 +14,7 @@ from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
-from diff4splat.cli.report import ErrorTime, ListKnobs
+from diff4splat.cli.report import ErrorTime, ListKnobs, Stability
 from diff4splat.cli.scenes.bake import Bake
 from diff4splat.cli.scenes.convert import Convert
 from diff4splat.cli.scenes.export_html import ExportHtml, View
@@ -32,7 +32,11 @@ Prepare = (
     | Annotated[PrepareCheck, subcommand("check")]
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
-Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
+Report = (
+    Annotated[ErrorTime, subcommand("error-time")]
+    | Annotated[ListKnobs, subcommand("knobs")]
+    | Annotated[Stability, subcommand("stability")]
+)
 Command = (
     Annotated[Generate, subcommand("generate")]
     | Annotated[Fit, subcommand("fit")]
@@ -44,7 +48,7 @@ Command = (
     | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
-    | Annotated[Report, subcommand("report", description="Error against run time.")]
+    | Annotated[Report, subcommand("report", description="Error against run time; stability.")]
     | Annotated[Prepare, subcommand("prepare", description="Training clips: make, import, check.")]
     | Annotated[Train, subcommand("train")]
     | Annotated[Pack, subcommand("pack")]

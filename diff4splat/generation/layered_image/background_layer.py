@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
 from diff4splat.geometry.camera import Camera
 from diff4splat.models.ldrm.plane_prior import OPAQUE
@@ -58,7 +59,7 @@ def background_layer(
         camera=camera,
         rgb=torch.where(same, rgb, color.mT.view_as(rgb)),
         depth=BEHIND * far.depth,
-        mask=torch.ones_like(far.holds_pixel),
+        mask=is_drawable(camera),
         opacity=OPAQUE,
         footprint_px=FOOTPRINT_PX,
         displacement=None if displacement is None else displacement * same,

@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.geometry.depth import depth_from_distance, distance_from_depth
@@ -29,7 +30,7 @@ REACH_SIGMAS = 3.0
 def border_extension(
     rgb: Float[Tensor, "h w 3"], depth: Float[Tensor, "h w"], camera: Camera, margin: int
 ) -> ImageLayer:
-    """The layer of an image, with ``margin`` cells beyond each side."""
+    """The layer of an image, with ``margin`` cells beyond each side that are not too oblique."""
     grid = extended_camera(camera, margin)
     distance = distance_from_depth(camera, depth)
     maps = torch.cat([rgb.movedim(-1, 0), distance[None]])[None]
@@ -38,7 +39,7 @@ def border_extension(
         camera=grid,
         rgb=cells[:3].movedim(0, -1),
         depth=depth_from_distance(stack_cameras([grid]), BEHIND * cells[3][None])[0],
-        mask=torch.ones_like(cells[3], dtype=torch.bool),
+        mask=is_drawable(grid),
         opacity=OPACITY,
         footprint_px=FOOTPRINT_CELLS,
     )

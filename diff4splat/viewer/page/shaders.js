@@ -32,7 +32,7 @@ vec4 quaternion(uint packed) {
 }
 vec4 slerp(vec4 a, vec4 b, float w) {
   float c = dot(a, b);
-  if (c < 0.0) { b = -b; c = -c; }
+  if (c < -1e-4) { b = -b; c = -c; }
   if (c > 1.0 - 1e-6) return normalize(mix(a, b, w));
   float angle = acos(min(c, 1.0));
   return normalize((sin((1.0 - w) * angle) * a + sin(w * angle) * b) / sin(angle));

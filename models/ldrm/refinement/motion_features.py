@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.models.blocks.conv_block import CELL_PX
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.config.networks import TIME_STRIDE, ActivationConfig
 from diff4splat.models.ldrm import activations
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
@@ -44,7 +45,7 @@ def track_slot(
     rate_px: Float[Tensor, "n 2 h w"],
 ) -> tuple[Float[Tensor, "n 2 h w"], Float[Tensor, "n 4 h w"]]:
     """Rate in pixels per frame until ``frames``, initialised with ``rate_px``; and the slot."""
-    source = posed_video.key_rgb.flatten(0, 1).float()
+    source = at_least_float32(posed_video.key_rgb.flatten(0, 1))
     elapsed = (frames - posed_video.keys).repeat(depth.shape[0]).to(source)[:, None, None, None]
     target = _warped_frames(depth, posed_video, frames)
     flow = track_flow(source, target, rate_px * elapsed)
@@ -81,7 +82,7 @@ def key_depth(
     raw_distance: Float[Tensor, "*b k h w"], config: ActivationConfig
 ) -> Float[Tensor, "*b k h w"]:
     """Depth z of the key frames' pixels: their base is a plane in front of their camera."""
-    raw = raw_distance.float()
+    raw = at_least_float32(raw_distance)
     return PLANE_DEPTH * activations.bounded_factor(raw, config.log_distance_limit)
 
 
@@ -114,7 +115,7 @@ def _one_direction(
     depth: Float[Tensor, "b k h w"], posed_video: PosedVideo, sign: int, track: TrackSlot
 ) -> Float[Tensor, "b k s 4 h w"]:
     """Slots at growing distance, each initialised with the velocity of the one before."""
-    rate_px = torch.zeros_like(posed_video.key_rgb[:, :, :2].flatten(0, 1)).float()
+    rate_px = torch.zeros_like(at_least_float32(posed_video.key_rgb[:, :, :2].flatten(0, 1)))
     slots = []
     for distance in DISTANCES:
         frames = (posed_video.keys + sign * distance).clamp(0, posed_video.rgb.shape[2] - 1)
@@ -140,4 +141,4 @@ def _warped_frames(
     target = flat_cameras(camera_frames(posed_video.cameras, frames))
     pixels, _ = other_pixels(source, target, 1 / depth.flatten(0, 1)[:, None])
     neighbour = posed_video.rgb[:, :, frames].transpose(1, 2).flatten(0, 1)
-    return sampled(neighbour, pixels)[:, :, 0].float()
+    return at_least_float32(sampled(neighbour, pixels)[:, :, 0])

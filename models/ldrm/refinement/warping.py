@@ -47,9 +47,12 @@ def inside(
 def sampled(
     features: Float[Tensor, "b c h2 w2"], pixels: Float[Tensor, "b d h w 2"]
 ) -> Float[Tensor, "b c d h w"]:
-    """Bilinear samples; the border is replicated."""
-    depths = pixels.shape[1]
+    """Bilinear samples in the dtype of ``features``; the border is replicated."""
+    depths, wide = pixels.shape[1], torch.promote_types(features.dtype, pixels.dtype)
     samples = torch.nn.functional.grid_sample(
-        features, pixels.flatten(1, 2), padding_mode="border", align_corners=False
+        features.to(wide),
+        pixels.flatten(1, 2).to(wide),
+        padding_mode="border",
+        align_corners=False,
     )
-    return samples.unflatten(2, (depths, -1))
+    return samples.unflatten(2, (depths, -1)).to(features.dtype)

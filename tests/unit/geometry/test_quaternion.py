@@ -1,5 +1,7 @@
 """Rotation algebra against its own laws, SciPy-free, in float64."""
 
+import math
+
 import pytest
 import torch
 from hypothesis import given, settings
@@ -90,3 +92,20 @@ def test_nan_is_not_mistaken_for_no_rotation() -> None:
     quats = torch.tensor([[float("nan"), 0, 0, 0], [1.0, 0, 0, 0]])
     assert torch.isnan(quaternion.normalize(quats)[0]).any()
     assert torch.isfinite(quaternion.normalize(quats)[1]).all()
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("noise", [0.0, 3e-5])
+def test_half_a_turn_takes_one_way_round_whatever_is_rounded(
+    dtype: torch.dtype, noise: float
+) -> None:
+    generator = torch.Generator().manual_seed(0)
+    start = quaternion.normalize(torch.randn(200, 4, generator=generator, dtype=F64))
+    half_turn = quaternion.from_axis_angle(
+        torch.randn(200, 3, generator=generator, dtype=F64), torch.full((200,), math.pi, dtype=F64)
+    )
+    stop = quaternion.multiply(start, half_turn)
+    want = quaternion.normalize(start + stop)
+    stop = stop + noise * torch.randn(200, 4, generator=generator, dtype=F64) / 2
+    got = quaternion.slerp(start.to(dtype), stop.to(dtype), torch.full((200,), 0.5, dtype=dtype))
+    torch.testing.assert_close(got.double(), want, atol=1e-4, rtol=0)

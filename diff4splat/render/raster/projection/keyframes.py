@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diff4splat.geometry.quaternion import HALF_TURN
 from diff4splat.kernels.jit import contracted
 from diff4splat.render.raster.jit import kernel
 from diff4splat.render.raster.projection.footprint import quadruple, triple, unit
@@ -118,8 +119,8 @@ def _turned(quat, place, keys, moment):
     lower = unit(_key(keys.rotations, moment.lower, place))
     upper = unit(_key(keys.rotations, moment.upper, place))
     cosine = lower[0] * upper[0] + lower[1] * upper[1] + lower[2] * upper[2] + lower[3] * upper[3]
-    sign = -1.0 if cosine < 0 else 1.0
-    from_lower, from_upper = _arc(abs(cosine), moment.weight)
+    sign = -1.0 if cosine < -HALF_TURN else 1.0
+    from_lower, from_upper = _arc(sign * cosine, moment.weight)
     from_upper *= sign
     w2 = from_lower * lower[0] + from_upper * upper[0]
     x2 = from_lower * lower[1] + from_upper * upper[1]

@@ -1,6 +1,7 @@
 """The layer beyond the border: its grid, its colours, and that it hides nothing of the image."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -28,9 +29,11 @@ from diff4splat.generation.layered_image.border_extension import (
     farthest_covered,
     push_behind_surface,
 )
+from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import image_gaussians, layer_gaussians
+from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
-from diff4splat.geometry.camera import pinhole, project
+from diff4splat.geometry.camera import focal_from_fov, pinhole, project
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.geometry.rays import camera_rays
 from diff4splat.models.blocks.conv_block import CELL_PX
@@ -143,3 +146,27 @@ def test_any_depth_and_size_is_finite(limits: tuple[float, float], size: tuple[i
     cells = extension(random_rgb(*size), random_depth(*size, limits))
     assert is_finite(cells)
     assert bool(layer_gaussians(cells).means.isfinite().all())
+
+
+@pytest.mark.parametrize("fov_deg, least_db", [(60.0, 40.0), (150.0, 25.0), (170.0, 20.0)])
+def test_extended_layers_of_a_wide_lens_do_not_hide_the_image(
+    fov_deg: float, least_db: float
+) -> None:
+    size_px = (48, 48)
+    camera = pinhole(focal_from_fov(fov_deg, size_px[1]), size_px)
+    y, x = torch.meshgrid(*(torch.linspace(0, 1, side) for side in size_px), indexing="ij")
+    rgb = torch.stack([x, y, 1 - x], -1)
+    image = replace(input_image(rgb), camera=camera)
+    # The same distance everywhere, so that depth falls towards the border.
+    depth = 4 / camera_rays(camera).norm(dim=-1)
+    maps = ImageMaps(depth=depth, displacement=None)
+    gaussians = image_gaussians(build_layered_image(image, image, maps, MARGIN), torch.zeros(2))
+    view = render(gaussians.gaussians, camera, settings=RenderSettings(dilation_px2=0.0)).rgb
+    rmse = float((view - rgb).square().mean().sqrt())
+    assert -20 * math.log10(rmse) > least_db
+
+
+def test_lenses_of_photographs_lose_no_cell() -> None:
+    for fov_deg in (10.0, 60.0, 90.0):
+        camera = extended_camera(pinhole(focal_from_fov(fov_deg, 96), (96, 96)), MARGIN)
+        assert bool(is_drawable(camera).all())

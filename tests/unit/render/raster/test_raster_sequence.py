@@ -72,6 +72,15 @@ def test_key_frames(turning: bool, interpolation: str, moving: torch.Tensor) -> 
     assert_same_frames(scene_with(keyed(moving, interpolation), turning))
 
 
+def test_key_frames_half_a_turn_apart() -> None:
+    motion = keyed(torch.arange(COUNT))
+    rotations, half_turn = motion.rotations.clone(), torch.tensor([0.0, 0.6, 0.8, 0.0])
+    for key in range(1, 4):
+        before = quaternion.normalize(rotations[key - 1])
+        rotations[key] = quaternion.multiply(before, half_turn.expand(COUNT, 4))
+    assert_same_frames(scene_with(replace(motion, rotations=rotations)))
+
+
 @pytest.mark.parametrize("turning", [False, True])
 @pytest.mark.parametrize("bands", [1, 16])
 def test_a_scene_that_stands_still(turning: bool, bands: int) -> None:

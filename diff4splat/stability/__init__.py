@@ -1,0 +1,1 @@
+"""Stability report: extreme and degenerate inputs against float64."""

@@ -1,0 +1,1 @@
+"""Checks of the stability report, one file per group."""

@@ -1,0 +1,1 @@
+"""What the checks look at: scenes, images, velocity fields, networks in a precision."""
