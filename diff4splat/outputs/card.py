@@ -31,6 +31,7 @@ class Result:
 
     scene: Scene
     photo: Float[Tensor, "h w 3"]
+    first_view: Float[Tensor, "h w 3"]
     first_view_psnr_db: float
     """How well the photograph is copied; a flat copy has the most."""
     relief: float
@@ -46,6 +47,7 @@ class Result:
         return cls(
             scene=scene,
             photo=photo,
+            first_view=first_view,
             first_view_psnr_db=round(measured, 2),
             relief=round(depths.far / depths.near, 3),
         )
@@ -72,8 +74,14 @@ def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str,
     )
 
 
-def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: RunLog) -> None:
-    """Write the card whole or not at all."""
+def write_card(
+    file: Path,
+    result: Result,
+    inputs: Mapping[str, object],
+    log: RunLog,
+    forecast: Mapping[str, object] | None = None,
+) -> None:
+    """Write the card whole or not at all; ``forecast`` compares what was expected with the run."""
     seconds = log.phases.seconds
     card = {
         "diff4splat": __version__,
@@ -86,6 +94,7 @@ def write_card(file: Path, result: Result, inputs: Mapping[str, object], log: Ru
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
         "seconds_total": round(math.fsum(seconds.values()), 3),
         "peak_memory_bytes": peak_memory_bytes(),
+        "forecast": forecast,
         "networks_run": log.networks,
         "left_out": log.skipped.to_json(),
         "versions": {name: version(name) for name in LIBRARIES},
