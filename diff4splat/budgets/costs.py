@@ -10,6 +10,7 @@ Work is counted before anything is loaded, as amounts by name (``matched_gaussia
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 Work = Mapping[str, float]
 PARALLEL = frozenset({"matched_gaussians", "filmed_gaussians", "filmed_pixels", "fitted_pixels"})
@@ -55,11 +56,24 @@ def forecast(rates: CostRates, work: Work, speed: float, cores: float) -> Foreca
 
 def free_cores(load: float | None = None, cores: int | None = None) -> float:
     """Cores that a command with a thread per core gets beside ``load`` other running threads."""
-    count = cores or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else cores
-    count = count or os.cpu_count() or 1
-    if load is None:
-        load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-    return count * count / max(count + load, count)
+    count = cores or _own_cores()
+    busy = other_load() if load is None else load
+    return count * count / (count + max(busy, 0.0))
+
+
+def other_load() -> float:
+    """Threads that run beside this one: the mean of the last minute and of this moment."""
+    try:
+        fields = Path("/proc/loadavg").read_text().split()
+        return (float(fields[0]) + int(fields[3].split("/")[0]) - 1) / 2
+    except (OSError, ValueError, IndexError):
+        return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+
+
+def _own_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def duration(seconds: float) -> str:

@@ -6,7 +6,15 @@ from functools import cached_property
 from pathlib import Path
 
 from diff4splat.budgets.choose import Choice, broken, choose
-from diff4splat.budgets.costs import WORTH_SAYING_S, Forecast, Work, forecast, free_cores
+from diff4splat.budgets.costs import (
+    WORTH_SAYING_S,
+    Forecast,
+    Work,
+    duration,
+    forecast,
+    free_cores,
+    gigabytes,
+)
 from diff4splat.budgets.limits import Limits
 from diff4splat.budgets.speed import measure_speed_s
 from diff4splat.budgets.table import CalibrationTable, SettingValues, find_table
@@ -112,6 +120,18 @@ class Promise:
             record["expected"] |= {"loss_db": self.choice.loss_db}
         record["not_held"] = broken(self.limits, measured)
         return record
+
+    def after(self, measured: dict[str, float]) -> list[str]:
+        """What to say after the work of a command without a card: the comparison."""
+        if not self.limits.given:
+            return []
+        loss = f", {measured['loss_db']:.2g} dB lost" if "loss_db" in measured else ""
+        line = (
+            f"measured: {duration(measured['seconds'])} "
+            f"({duration(measured['cpu_seconds'])} of processor time), "
+            f"{gigabytes(measured['memory_bytes'])}{loss}"
+        )
+        return [line, *filter(None, [broken(self.limits, measured)])]
 
     def with_choice(self, choice: Choice) -> "Promise":
         """The same with a setting that was chosen."""
