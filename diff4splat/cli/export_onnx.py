@@ -23,8 +23,8 @@ class ExportOnnx:
     """Model folder, or a size: test, small or paper. A size takes its bundled weights, or random
     ones."""
     precision: Literal["float32", "float16", "int8", "int8-dynamic"] | None = None
-    """Default: float32, or what --tolerance and --budget allow. float16 and int8 store weights in a half and a quarter of the size; int8-dynamic also
-    multiplies matrices in int8."""
+    """float16 and int8 store weights in a half and a quarter of the size; int8-dynamic also
+    multiplies matrices in int8. Default: float32, or what --tolerance and --budget allow."""
     shapes_only: bool = False
     """Write graphs without weights; allocates nothing, so paper works on any machine."""
     triton: bool = False

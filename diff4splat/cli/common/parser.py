@@ -10,6 +10,8 @@ from diff4splat.cli.export_onnx import ExportOnnx
 from diff4splat.cli.fit import Fit
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
+from diff4splat.cli.limits.calibrate import Calibrate
+from diff4splat.cli.limits.forecast import Forecasts, forecasts
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
@@ -29,7 +31,11 @@ Prepare = (
     | Annotated[PrepareCheck, subcommand("check")]
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
-Report = Annotated[ErrorTime, subcommand("error-time")] | Annotated[ListKnobs, subcommand("knobs")]
+Report = (
+    Annotated[ErrorTime, subcommand("error-time")]
+    | Annotated[ListKnobs, subcommand("knobs")]
+    | Annotated[Calibrate, subcommand("calibrate")]
+)
 Command = (
     Annotated[Generate, subcommand("generate")]
     | Annotated[Fit, subcommand("fit")]
@@ -41,6 +47,7 @@ Command = (
     | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
+    | Annotated[Forecasts, subcommand("forecast")]
     | Annotated[Report, subcommand("report", description="Error against run time.")]
     | Annotated[Prepare, subcommand("prepare", description="Training clips: make, encode, check.")]
     | Annotated[Train, subcommand("train")]
@@ -52,6 +59,9 @@ Command = (
 
 def parse(arguments: list[str]) -> Command:
     """The command that ``arguments`` name, with its options; help and bad usage exit."""
+    if arguments[:1] == ["forecast"] and not {"-h", "--help"} & set(arguments[1:2]):
+        # What follows belongs to another command.
+        return forecasts(arguments[1:])
     return tyro.cli(
         Command,
         prog="diff4splat",

@@ -87,15 +87,21 @@ def promise(command: "Render") -> Promise:
 
 def apply(promised: Promise, path: "CameraPath") -> tuple["CameraPath", "RenderSettings"]:
     """The path at the chosen size, and how its frames are rendered."""
-    from diff4splat.paths.resize import resized
     from diff4splat.render.api import DEFAULTS
 
     if promised.choice is None:
         return path, DEFAULTS
     share, cutoff = _parts(promised.choice.values)
-    size_px = tuple(max(round(side * share), 1) for side in path.cameras.size_px)
-    smaller = path if share == 1.0 else resized(path, size_px)
-    return smaller, replace(DEFAULTS, alpha_cutoff=cutoff)
+    return at_share(path, share), replace(DEFAULTS, alpha_cutoff=cutoff)
+
+
+def at_share(path: "CameraPath", share: float) -> "CameraPath":
+    """The path with sides of a share of its own."""
+    from diff4splat.paths.resize import resized
+
+    if share == 1.0:
+        return path
+    return resized(path, tuple(max(round(side * share), 1) for side in path.cameras.size_px))
 
 
 def measured_loss_db(

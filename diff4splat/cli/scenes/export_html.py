@@ -12,6 +12,7 @@ from diff4splat.cli.options.constraints import InputPath, OutputFile, require_wr
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 
 PAGE_SUFFIXES = (".html", ".htm")
+NO_LIMITS = LimitOptions()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +70,7 @@ def scene_source(given: Path) -> Path:
     return inside if inside.is_file() else given
 
 
-def export_page(source: Path, file: Path, limits: LimitOptions = LimitOptions()) -> None:
+def export_page(source: Path, file: Path, limits: LimitOptions = NO_LIMITS) -> None:
     """Write the page of any scene that can be read, with what ``limits`` ask for left out.
 
     Raises:
