@@ -12,6 +12,7 @@ from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.limits.calibrate import Calibrate
 from diff4splat.cli.limits.forecast import Forecasts, forecasts
+from diff4splat.cli.limits.skipped import Skipped
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
@@ -35,6 +36,7 @@ Report = (
     Annotated[ErrorTime, subcommand("error-time")]
     | Annotated[ListKnobs, subcommand("knobs")]
     | Annotated[Calibrate, subcommand("calibrate")]
+    | Annotated[Skipped, subcommand("skipped")]
 )
 Command = (
     Annotated[Generate, subcommand("generate")]
