@@ -44,26 +44,29 @@ def render_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow
     ]
     errors = []
     for scene in scenes:
-        errors.append([_render_error(scene, values) for values in settings])
+        errors.append([render_error(scene, values) for values in settings])
         advance()
     return _worst(settings, errors)
 
 
 def bake_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, ...]:
     """Largest error of each tolerance in pixels."""
-    from diff4splat.cli.scenes.bake import unique_views
-    from diff4splat.scene.motion.bake import bake_within
-
     settings = [{"tolerance_px": px} for px in baking.TOLERANCES_PX]
     errors = []
     for scene in scenes:
-        views, row = unique_views(scene.path.cameras), []
-        for values in settings:
-            motion, _ = bake_within(scene.gaussians, scene.motion, views, values["tolerance_px"])
-            row.append(baking.frames_error(scene, replace(scene, motion=motion)))
-        errors.append(row)
+        errors.append([bake_error(scene, values["tolerance_px"]) for values in settings])
         advance()
     return _worst(settings, errors)
+
+
+def bake_error(scene: "Scene", tolerance_px: float) -> float:
+    """Of frames from key frames within a tolerance."""
+    from diff4splat.cli.scenes.bake import unique_views
+    from diff4splat.scene.motion.bake import bake_within
+
+    views = unique_views(scene.path.cameras)
+    motion, _ = bake_within(scene.gaussians, scene.motion, views, tolerance_px)
+    return baking.frames_error(scene, replace(scene, motion=motion))
 
 
 def html_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, ...]:
@@ -91,14 +94,18 @@ def onnx_rows(photos: Sequence[Path], folder: Path, advance: Advance) -> tuple[S
         row = []
         for values in settings:
             model = str(folder / f"graphs-{values['precision']}")
-            row.append(_mean_error(generated_frames(photo, plain, model), exact))
+            row.append(mean_error(generated_frames(photo, plain, model), exact))
         errors.append(row)
         advance()
     return _worst(settings, errors)
 
 
 def generated_frames(
-    photo: Path, values: SettingValues, model: str = "small", side_px: int = 256
+    photo: Path,
+    values: SettingValues,
+    model: str = "small",
+    side_px: int = 256,
+    camera: str = CAMERA,
 ) -> list["Tensor"]:
     """Frames of a generation with a setting, at its own size."""
     from diff4splat.generation.inputs.image_size import find_image_size
@@ -112,7 +119,7 @@ def generated_frames(
 
     side_px, multiple_px = find_image_size(model, round(side_px * values["side_share"]))
     image = load_image(photo, side_px, multiple_px=multiple_px, convert=True)
-    path = build_path(CAMERA, path_frame(image.camera), PathSettings(frames=FRAMES, fps=24.0))
+    path = build_path(camera, path_frame(image.camera), PathSettings(frames=FRAMES, fps=24.0))
     settings = GenerationSettings(
         color_matching_steps=values["color_matching_steps"],
         subpixel_infill=values.get("infill") != "none",
@@ -131,12 +138,13 @@ def _photo_errors(photo: Path, settings: Sequence[SettingValues], advance: Advan
     errors = []
     for values in settings:
         frames = generated_frames(photo, values)
-        errors.append(_mean_error(frames, exact) / detail)
+        errors.append(mean_error(frames, exact) / detail)
         advance()
     return errors
 
 
-def _render_error(scene: "Scene", values: SettingValues) -> float:
+def render_error(scene: "Scene", values: SettingValues) -> float:
+    """Of three frames of the scene's path at a setting of ``render``."""
     from diff4splat.render.api import DEFAULTS, render
 
     settings = replace(DEFAULTS, alpha_cutoff=values["alpha_cutoff"])
@@ -149,10 +157,11 @@ def _render_error(scene: "Scene", values: SettingValues) -> float:
         time_s = float(path.times_s[k])
         frames.append(render(scene, smaller.cameras[k], time_s, settings=settings).rgb)
         exact.append(render(scene, path.cameras[k], time_s, settings=exact_settings).rgb)
-    return _mean_error(frames, exact)
+    return mean_error(frames, exact)
 
 
-def _mean_error(frames: Sequence["Tensor"], exact: Sequence["Tensor"]) -> float:
+def mean_error(frames: Sequence["Tensor"], exact: Sequence["Tensor"]) -> float:
+    """Mean square difference over all frames."""
     pairs = list(zip(frames, exact, strict=True))
     return sum(frame_error(frame, one) for frame, one in pairs) / len(pairs)
 
