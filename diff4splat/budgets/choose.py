@@ -74,7 +74,7 @@ def choose(options: Sequence[Choice], limits: Limits) -> Choice:
     return min(fitting, key=lambda one: (one.error, one.expected.cpu_seconds))
 
 
-def broken(limits: Limits, measured: Mapping[str, float]) -> str | None:
+def broken(limits: Limits, measured: Mapping[str, float | int]) -> str | None:
     """One line about limits that the run did not hold; None if it held all."""
     allowed = {
         "loss_db": (limits.tolerance_db, "a loss of {:.3g} dB"),

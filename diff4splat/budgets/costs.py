@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-Work = Mapping[str, float]
+Work = Mapping[str, float | int]
 PARALLEL = frozenset({"matched_gaussians", "filmed_gaussians", "filmed_pixels", "fitted_pixels"})
 """Work that runs on all cores; the rest runs on one."""
 WORTH_SAYING_S = 5.0

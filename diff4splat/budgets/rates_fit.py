@@ -15,7 +15,7 @@ RIDGE = 1e-6
 """Decides between amounts that grow alike in all runs."""
 
 
-def fit_rates(work: Sequence[Work], measured: Sequence[float]) -> dict[str, float]:
+def fit_rates(work: Sequence[Work], measured: Sequence[float | int]) -> dict[str, float]:
     """A rate of at least 0 for each amount, so that Σ rate · amount is near what was measured.
 
     Each run counts by its relative error. Coordinate descent on the normal equations.

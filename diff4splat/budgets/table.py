@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from diff4splat import __version__
 from diff4splat.budgets.costs import CostRates
@@ -136,13 +137,13 @@ def _table(source: Mapping[str, object]) -> CalibrationTable:
         machine=_text(source["machine"]),
         speed_s=_number(source["speed_s"], least=1e-9),
         inputs=tuple(map(_text, source["inputs"])),
-        rates={name: _rates(one) for name, one in dict(source["rates"]).items()},
-        settings={name: _rows(rows) for name, rows in dict(source["settings"]).items()},
+        rates={name: _rates(one) for name, one in _object(source["rates"]).items()},
+        settings={name: _rows(rows) for name, rows in _object(source["settings"]).items()},
     )
 
 
 def _rates(source: Mapping[str, Mapping[str, float]]) -> CostRates:
-    seconds, memory = dict(source["seconds"]), dict(source["memory_bytes"])
+    seconds, memory = _object(source["seconds"]), _object(source["memory_bytes"])
     return CostRates(
         seconds={name: _number(rate) for name, rate in seconds.items()},
         memory_bytes={name: _number(rate) for name, rate in memory.items()},
@@ -158,10 +159,16 @@ def _rows(source: list[Mapping[str, object]]) -> tuple[SettingRow, ...]:
 
 
 def _values(source: Mapping[str, object]) -> SettingValues:
-    values = dict(source)
+    values = _object(source)
     if not all(isinstance(value, (int, float, str)) for value in values.values()):
         raise FileFormatError("expected numbers and words as settings")
     return values
+
+
+def _object(value: object) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise FileFormatError(f"expected an object, got {str(value)[:40]!r}")
+    return value
 
 
 def _text(value: object) -> str:

@@ -1,11 +1,8 @@
 """``diff4splat export onnx``: a model as ONNX graphs."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import tyro
-
-from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.constraints import OutFolder
 from diff4splat.cli.options.models import ModelName
 
@@ -22,22 +19,19 @@ class ExportOnnx:
     model: Annotated[str, ModelName()] = "small"
     """Model folder, or a size: test, small or paper. A size takes its bundled weights, or random
     ones."""
-    precision: Literal["float32", "float16", "int8", "int8-dynamic"] | None = None
+    precision: Literal["float32", "float16", "int8", "int8-dynamic"] = "float32"
     """float16 and int8 store weights in a half and a quarter of the size; int8-dynamic also
-    multiplies matrices in int8. Default: float32, or what --tolerance and --budget allow."""
+    multiplies matrices in int8."""
     shapes_only: bool = False
     """Write graphs without weights; allocates nothing, so paper works on any machine."""
     triton: bool = False
     """Also write a model repository for Triton Inference Server: OUT/triton."""
     skip_parity: bool = False
     """Do not compare ONNX Runtime with PyTorch."""
-    limits: Annotated[LimitOptions, tyro.conf.arg(name="")] = field(default_factory=LimitOptions)
 
     def run(self) -> None:
         """Export, compare, say where it is."""
         from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.limits.exporting import onnx_promise
-        from diff4splat.cli.limits.stopwatch import Stopwatch
         from diff4splat.models.hub.model import load_model
         from diff4splat.models.onnx_export.export import require_exporter
         from diff4splat.models.onnx_export.folder import (
@@ -47,12 +41,8 @@ class ExportOnnx:
         )
 
         require_exporter()
-        promised, watch = onnx_promise(self.precision, self.limits), Stopwatch.of_process()
-        for line in promised.lines():
-            note(line)
-        chosen = None if promised.choice is None else promised.choice.values["precision"]
         settings = ExportSettings(
-            precision=self.precision or chosen or "float32",
+            precision=self.precision,
             shapes_only=self.shapes_only,
             parity=not self.skip_parity,
             triton=self.triton,
@@ -62,8 +52,6 @@ class ExportOnnx:
             rows = export_model(model, self.out, settings, advance)
         for row in rows:
             note(f"{row.graph}: relative error {max(row.errors.values()):.1e}")
-        for line in promised.after(watch.read()):
-            note(line)
         use = f"diff4splat generate PHOTO --model {self.out} runs it"
         note(
             f"wrote {self.out}; " + ("shapes alone, which cannot run" if self.shapes_only else use)

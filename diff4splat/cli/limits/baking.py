@@ -22,7 +22,7 @@ PROBES = 5
 """Times at which the loss is measured: between the keys and at them."""
 
 
-def request_work(command: "Bake", values: SettingValues | None = None) -> dict[str, float]:
+def request_work(command: "Bake", values: SettingValues | None = None) -> dict[str, float | int]:
     """Counted from the scene's header; key frames grow as one over the root of the tolerance."""
     header = read_scene_header(command.scene)
     px = DEFAULT_PX if values is None else float(values["tolerance_px"])
@@ -45,7 +45,9 @@ def promise(command: "Bake") -> Promise:
     plain = costing.promise(NAME, limits, request_work(command))
     if not limits.given:
         return plain
-    fixed = {} if command.tolerance_px is None else {"tolerance_px": command.tolerance_px}
+    fixed = {"motion": read_scene_header(command.scene).motion}
+    if command.tolerance_px is not None:
+        fixed["tolerance_px"] = command.tolerance_px
     allowed = lambda values: command.keys is None and agrees(values, fixed)  # noqa: E731
     work = lambda values: request_work(command, values)  # noqa: E731
     return plain.with_choice(costing.choose(NAME, work, allowed, limits))

@@ -27,8 +27,6 @@ class Calibrate:
     """Photographs to measure on, beside four drawn worlds."""
     rates_only: bool = False
     """Measure times and memory alone, and keep the errors of the table in use: faster."""
-    onnx: bool = False
-    """Also export the model at every precision; needs the extra onnx."""
     train: bool = False
     """Also train stages of the recipe test for a few steps."""
 
@@ -51,15 +49,14 @@ class Calibrate:
     def measure(self, folder: Path, phases: "Phases") -> "CalibrationTable":
         """All rates, then all errors."""
         from diff4splat import __version__
-        from diff4splat.budgets.speed import measure_speed_s
+        from diff4splat.budgets.speed import machine_name, measure_speed_s
         from diff4splat.budgets.table import CalibrationTable, find_table
-        from diff4splat.error_time.tables import this_machine
 
         photos, rates = self.measured_rates(folder, phases)
         settings = find_table().settings if self.rates_only else self.errors(folder, photos, phases)
         return CalibrationTable(
             diff4splat=__version__,
-            machine=str(this_machine()),
+            machine=machine_name(),
             speed_s=measure_speed_s(),
             inputs=tuple(photo.stem for photo in photos),
             rates=rates,
@@ -81,7 +78,6 @@ class Calibrate:
             advance()
         every = runs.generation_runs(photos[-1], folder) + runs.fit_runs(folder)
         every += runs.scene_runs(folder)
-        every += runs.onnx_runs(folder) if self.onnx else []
         every += runs.train_runs(folder) if self.train else []
         with phases.phase("measure costs", len(every)) as advance:
             return photos, runs.measure_rates(every, advance)
@@ -104,7 +100,4 @@ class Calibrate:
             rows["render"] = errors.render_rows(scenes, advance)
             rows["export html"] = errors.html_rows(scenes, advance)
             rows["bake"] = errors.bake_rows(moving, advance)
-        if self.onnx:
-            with phases.phase("graphs", len(photos)) as advance:
-                rows["export onnx"] = errors.onnx_rows(photos, folder, advance)
         return rows

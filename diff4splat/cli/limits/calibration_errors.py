@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from diff4splat.budgets.table import SettingRow, SettingValues
 from diff4splat.cli.limits import baking, exporting, generation, rendering
 from diff4splat.cli.limits.measured import frame_error
+from diff4splat.io.scene_files.motion_tensors import pack_motion
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -20,12 +21,15 @@ Advance = Callable[[], None]
 
 
 def generation_settings() -> list[SettingValues]:
-    """Every setting of ``generate`` that a limit may choose."""
+    """Every setting of ``generate`` that a limit may choose.
+
+    Smaller images lose more by their size than by any number of steps.
+    """
+    steps_at = {1.0: (7, 5, 3, 1), 0.75: (3,), 0.5: (3,)}
     return [
         {"side_share": share, "color_matching_steps": steps, "infill": infill}
-        for share, infill, steps in product(
-            generation.SIDE_SHARES, ("subpixel", "none"), generation.MATCHING_STEPS
-        )
+        for share, choices in steps_at.items()
+        for infill, steps in product(("subpixel", "none"), choices)
     ]
 
 
@@ -50,13 +54,17 @@ def render_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow
 
 
 def bake_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, ...]:
-    """Largest error of each tolerance in pixels."""
-    settings = [{"tolerance_px": px} for px in baking.TOLERANCES_PX]
-    errors = []
-    for scene in scenes:
-        errors.append([bake_error(scene, values["tolerance_px"]) for values in settings])
-        advance()
-    return _worst(settings, errors)
+    """Largest error of each tolerance in pixels, for each kind of motion."""
+    rows: list[SettingRow] = []
+    kinds = [pack_motion(scene.motion).settings["kind"] for scene in scenes]
+    for kind in dict.fromkeys(kinds):
+        settings = [{"motion": kind, "tolerance_px": px} for px in baking.TOLERANCES_PX]
+        errors = []
+        for scene in (one for one, own in zip(scenes, kinds, strict=True) if own == kind):
+            errors.append([bake_error(scene, values["tolerance_px"]) for values in settings])
+            advance()
+        rows += _worst(settings, errors)
+    return tuple(rows)
 
 
 def bake_error(scene: "Scene", tolerance_px: float) -> float:
@@ -80,22 +88,6 @@ def html_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, 
         errors.append(
             [baking.frames_error(scene, exporting.reduced(scene, values)) for values in settings]
         )
-        advance()
-    return _worst(settings, errors)
-
-
-def onnx_rows(photos: Sequence[Path], folder: Path, advance: Advance) -> tuple[SettingRow, ...]:
-    """Largest error of generated frames with graphs of each precision against PyTorch."""
-    settings = [{"precision": precision} for precision in exporting.PRECISIONS]
-    plain = {"side_share": 1.0, "color_matching_steps": generation.DEFAULT_STEPS}
-    errors = []
-    for photo in photos:
-        exact = generated_frames(photo, plain)
-        row = []
-        for values in settings:
-            model = str(folder / f"graphs-{values['precision']}")
-            row.append(mean_error(generated_frames(photo, plain, model), exact))
-        errors.append(row)
         advance()
     return _worst(settings, errors)
 

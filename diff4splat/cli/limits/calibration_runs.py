@@ -83,19 +83,6 @@ def train_runs(folder: Path) -> list[Run]:
     ]
 
 
-def onnx_runs(folder: Path) -> list[Run]:
-    """The bundled model at each precision."""
-    from diff4splat.cli.limits.exporting import PRECISIONS
-
-    return [
-        [
-            *("export", "onnx", "--precision", precision, "--skip-parity"),
-            *("--out", str(folder / f"graphs-{precision}")),
-        ]
-        for precision in PRECISIONS
-    ]
-
-
 def draw_capture(folder: Path) -> Run:
     """The command that draws the clip which fits learn from."""
     return ["prepare", "synth", *CAPTURE, "--out", str(folder / "capture")]

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from diff4splat.cli.fit import Fit
     from diff4splat.cli.train import Train
 
-COMMANDS = ("generate", "render", "bake", "export html", "export onnx", "fit", "train")
+COMMANDS = ("generate", "render", "bake", "export html", "fit", "train")
 
 
 def command_work(arguments: Sequence[str]) -> tuple[str, dict[str, float]]:
@@ -31,7 +31,7 @@ def command_work(arguments: Sequence[str]) -> tuple[str, dict[str, float]]:
     return names[0], counted(names[0], command)
 
 
-def counted(name: str, command) -> dict[str, float]:
+def counted(name: str, command) -> dict[str, float | int]:
     """The work of a parsed command."""
     from diff4splat.cli.limits import baking, exporting, generation, rendering
     from diff4splat.cli.scenes.export_html import scene_source
@@ -41,14 +41,13 @@ def counted(name: str, command) -> dict[str, float]:
         "render": rendering.request_work,
         "bake": baking.request_work,
         "export html": lambda one: exporting.html_work(scene_source(one.scene)),
-        "export onnx": lambda one: exporting.onnx_work(one.precision or "float32"),
         "fit": fit_work,
         "train": train_work,
     }
     return counters[name](command)
 
 
-def fit_work(command: "Fit") -> dict[str, float]:
+def fit_work(command: "Fit") -> dict[str, float | int]:
     """Steps, Gaussians and pixels of a fit; the headers of the images are read."""
     settings, capture = command.settings(), command.capture()
     height, width = capture.cameras.size_px
@@ -63,7 +62,7 @@ def fit_work(command: "Fit") -> dict[str, float]:
     }
 
 
-def train_work(command: "Train") -> dict[str, float]:
+def train_work(command: "Train") -> dict[str, float | int]:
     """Steps of a stage; each stage of a recipe has its own rate."""
     recipe = command.recipe()
     steps = recipe.stage(command.stage).steps

@@ -16,7 +16,7 @@ from diff4splat.budgets.costs import (
     gigabytes,
 )
 from diff4splat.budgets.limits import Limits
-from diff4splat.budgets.speed import measure_speed_s
+from diff4splat.budgets.speed import machine_name, measure_speed_s, require_comparable
 from diff4splat.budgets.table import CalibrationTable, SettingValues, find_table
 
 
@@ -38,7 +38,7 @@ class Costing:
     @cached_property
     def speed(self) -> float:
         """How many times as slow this machine is as that of the table."""
-        return measure_speed_s() / self.table.speed_s
+        return require_comparable(measure_speed_s() / self.table.speed_s, self.table.machine)
 
     @cached_property
     def cores(self) -> float:
@@ -85,6 +85,7 @@ class Costing:
             expected=self.forecast(command, work),
             speed=self.speed,
             cores=self.cores,
+            machine="" if self.table.machine == machine_name() else self.table.machine,
         )
 
 
@@ -97,16 +98,20 @@ class Promise:
     choice: Choice | None = None
     speed: float = 1.0
     cores: float = 1.0
+    machine: str = ""
+    """Of the calibration, where it is another one."""
 
     def lines(self) -> list[str]:
         """What to say before the work: the choice, or a forecast of what takes long."""
         if self.choice is not None:
-            return [f"within {self.limits}: {self.choice}"]
+            scaled = f"measured on {self.machine}, times scaled by {self.speed:.2g}"
+            other = [f"calibration {scaled}"] if self.machine else []
+            return [f"within {self.limits}: {self.choice}", *other]
         if self.expected.seconds < WORTH_SAYING_S:
             return []
         return [f"forecast: {self.expected}"]
 
-    def record(self, measured: dict[str, float]) -> dict[str, object]:
+    def record(self, measured: dict[str, float | int]) -> dict[str, object]:
         """For the card: what was expected and what was measured."""
         record: dict[str, object] = {
             "limits": {name: value for name, value in asdict(self.limits).items() if value},
@@ -121,7 +126,7 @@ class Promise:
         record["not_held"] = broken(self.limits, measured)
         return record
 
-    def after(self, measured: dict[str, float]) -> list[str]:
+    def after(self, measured: dict[str, float | int]) -> list[str]:
         """What to say after the work of a command without a card: the comparison."""
         if not self.limits.given:
             return []

@@ -1,4 +1,4 @@
-"""Work and settings of ``diff4splat export``: what a page leaves out, and how graphs are stored."""
+"""Work and settings of ``diff4splat export html``: what a page leaves out of a scene."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -14,13 +14,12 @@ if TYPE_CHECKING:
     from diff4splat.cli.limits.options import LimitOptions
     from diff4splat.scene.scene import Scene
 
-HTML, ONNX = "export html", "export onnx"
+HTML = "export html"
 MIN_OPACITIES = (0.0, 0.005, 0.02, 0.05, 0.2)
 DEGREES = (3, 2, 1, 0)
-PRECISIONS = ("float32", "float16", "int8", "int8-dynamic")
 
 
-def html_work(source: "Path", values: SettingValues | None = None) -> dict[str, float]:
+def html_work(source: "Path", values: SettingValues | None = None) -> dict[str, float | int]:
     """Counted from the scene's header: what is read, and what is packed."""
     header = read_scene_header(source)
     bases = header.bases
@@ -62,23 +61,3 @@ def html_loss_db(exact: "Scene", page: "Scene") -> float:
     from diff4splat.cli.limits.baking import frames_error
 
     return round(loss_from_error(frames_error(exact, page)), 4)
-
-
-def onnx_work(precision: str) -> dict[str, float]:
-    """One export of the model at a precision."""
-    return {"start": 1, f"graphs {precision}": 1}
-
-
-def onnx_promise(precision: str | None, options: "LimitOptions") -> Promise:
-    """What the export is expected to need, with the precision that the limits ask for.
-
-    Raises:
-        ConfigError: no precision holds; says what is possible.
-    """
-    limits, costing = options.limits, Costing.of(options.calibration)
-    plain = costing.promise(ONNX, limits, onnx_work(precision or PRECISIONS[0]))
-    if not limits.given:
-        return plain
-    work = lambda values: onnx_work(str(values["precision"]))  # noqa: E731
-    allowed = lambda values: precision in (None, values["precision"])  # noqa: E731
-    return plain.with_choice(costing.choose(ONNX, work, allowed, limits))

@@ -17,7 +17,7 @@ class Forecasts:
     """
 
     command: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """generate, render, bake, export html, export onnx, fit or train, with its options."""
+    """generate, render, bake, export html, fit or train, with its options."""
     calibration: Annotated[Path | None, InputPath(what="a calibration table", folder=False)] = None
     """Table of measured costs. Default: that of this machine, else the one that ships."""
 

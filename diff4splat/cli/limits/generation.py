@@ -21,8 +21,6 @@ NAME = "generate"
 DEFAULT_STEPS = 7
 GAUSSIANS_PER_PX, PIXELS_ALONE, HIDDEN = 4.0, 1.0, 5000
 """With and without sub-pixel infill; those of the image's small copy in addition."""
-SIDE_SHARES = (1.0, 0.75, 0.5)
-MATCHING_STEPS = (7, 5, 3, 1, 0)
 REFERENCE_STEPS = 20
 
 
@@ -43,7 +41,7 @@ class Outcome:
         return self.promised.record(measured)
 
 
-def work(command: "Generate", frames: int, size_px: tuple[int, int]) -> dict[str, float]:
+def work(command: "Generate", frames: int, size_px: tuple[int, int]) -> dict[str, float | int]:
     """Counted work of a generation whose image has (height, width)."""
     pixels = size_px[0] * size_px[1]
     infill = command.infill != "none"
@@ -62,7 +60,7 @@ def work(command: "Generate", frames: int, size_px: tuple[int, int]) -> dict[str
     }
 
 
-def request_work(command: "Generate") -> dict[str, float]:
+def request_work(command: "Generate") -> dict[str, float | int]:
     """The same from the options alone, and the header of the photo."""
     side_px, multiple_px = _side(command)
     return work(command, frame_count(command), _size(command, side_px, multiple_px))
@@ -154,7 +152,7 @@ def photo_detail(command: "Generate") -> float:
 
 def _setting_work(
     command: "Generate", values: SettingValues, full_px: int, frames: int
-) -> dict[str, float]:
+) -> dict[str, float | int]:
     chosen = with_setting(command, values, full_px)
     side_px, multiple_px = _side(chosen)
     return work(chosen, frames, _size(command, side_px, multiple_px))

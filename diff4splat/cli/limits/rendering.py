@@ -26,7 +26,7 @@ SIDE_SHARES = (1.0, 0.75, 0.5)
 
 def work(
     header: SceneHeader, frames: int, size_px: tuple[int, int], cutoff: float = DEFAULT_CUTOFF
-) -> dict[str, float]:
+) -> dict[str, float | int]:
     """Counted work of filming a scene at (height, width)."""
     pixels = size_px[0] * size_px[1]
     footprints = reach(cutoff)
@@ -47,7 +47,7 @@ def reach(cutoff: float) -> float:
     return log(cutoff) / log(DEFAULT_CUTOFF)
 
 
-def request_work(command: "Render", values: SettingValues | None = None) -> dict[str, float]:
+def request_work(command: "Render", values: SettingValues | None = None) -> dict[str, float | int]:
     """The same from the options alone and the scene's header."""
     from diff4splat.cli.options.camera import PRESET_FRAMES
     from diff4splat.cli.scenes.render import longer_side

@@ -25,7 +25,7 @@ class Stopwatch:
         """For one job of several in a process."""
         return cls(wall_s=time.time(), cpu_s=time.process_time())
 
-    def read(self) -> dict[str, float]:
+    def read(self) -> dict[str, float | int]:
         """What the run took so far."""
         return {
             "seconds": round(time.time() - self.wall_s, 3),
