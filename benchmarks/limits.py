@@ -20,14 +20,15 @@ from pathlib import Path
 import cv2
 from skimage import data
 
-from diff4splat.budgets.limits import loss_from_error
+from diff4splat.cli.calibration import calibration_errors
+from diff4splat.cli.calibration.calibration_inputs import draw_photos
+from diff4splat.cli.calibration.measured_process import measure_process
 from diff4splat.cli.common.parser import parse
-from diff4splat.cli.limits import baking, calibration_errors, exporting, generation, rendering
-from diff4splat.cli.limits.calibration_inputs import draw_photos
+from diff4splat.cli.limits import baking, exporting, generation, rendering
 from diff4splat.cli.limits.costing import Costing, Promise
-from diff4splat.cli.limits.measured_process import measure_process
 from diff4splat.errors import ConfigError
 from diff4splat.io.scene_files.scene_file import load_scene
+from diff4splat.outputs.budgets.limits import loss_from_error
 
 PHOTOGRAPHS = ("camera", "brick", "coins", "grass", "moon", "clock")
 WORLDS = ((101, 2), (103, 7), (107, 4), (109, 1))

@@ -16,7 +16,7 @@ LAYERS = [  # lower may never import higher; the same row may not import each ot
     {"scene"},
     {"render"},
     {"io"},
-    {"data", "viewer", "budgets"},
+    {"data", "viewer"},
     {"outputs", "models", "data_prep"},
     {"generation", "error_time"},
     {"training"},

@@ -4,15 +4,15 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.calibration.calibrate import Calibrate
+from diff4splat.cli.calibration.skipped import Skipped
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
 from diff4splat.cli.export_onnx import ExportOnnx
 from diff4splat.cli.fit import Fit
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
-from diff4splat.cli.limits.calibrate import Calibrate
 from diff4splat.cli.limits.forecast import Forecasts, forecasts
-from diff4splat.cli.limits.skipped import Skipped
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from diff4splat.budgets.choose import Choice, broken, choose
-from diff4splat.budgets.costs import (
+from diff4splat.outputs.budgets.choose import Choice, broken, choose
+from diff4splat.outputs.budgets.costs import (
     WORTH_SAYING_S,
     Forecast,
     Work,
@@ -15,9 +15,9 @@ from diff4splat.budgets.costs import (
     free_cores,
     gigabytes,
 )
-from diff4splat.budgets.limits import Limits
-from diff4splat.budgets.speed import machine_name, measure_speed_s, require_comparable
-from diff4splat.budgets.table import CalibrationTable, SettingValues, find_table
+from diff4splat.outputs.budgets.limits import Limits
+from diff4splat.outputs.budgets.speed import machine_name, measure_speed_s, require_comparable
+from diff4splat.outputs.budgets.table import CalibrationTable, SettingValues, find_table
 
 
 @dataclass(frozen=True)

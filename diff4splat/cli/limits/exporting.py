@@ -3,10 +3,10 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from diff4splat.budgets.limits import loss_from_error
-from diff4splat.budgets.table import SettingValues
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import read_scene_header
+from diff4splat.outputs.budgets.limits import loss_from_error
+from diff4splat.outputs.budgets.table import SettingValues
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diff4splat.budgets.choose import agrees
-from diff4splat.budgets.limits import loss_from_error
-from diff4splat.budgets.table import SettingValues
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.stopwatch import Stopwatch
+from diff4splat.outputs.budgets.choose import agrees
+from diff4splat.outputs.budgets.limits import loss_from_error
+from diff4splat.outputs.budgets.table import SettingValues
 
 if TYPE_CHECKING:
     from torch import Tensor

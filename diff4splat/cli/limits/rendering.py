@@ -6,11 +6,11 @@ Settings are the cut-off of contributions and how many pixels are rendered for o
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from diff4splat.budgets.choose import agrees
-from diff4splat.budgets.limits import loss_from_error
-from diff4splat.budgets.table import SettingValues
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
+from diff4splat.outputs.budgets.choose import agrees
+from diff4splat.outputs.budgets.limits import loss_from_error
+from diff4splat.outputs.budgets.table import SettingValues
 
 if TYPE_CHECKING:
     from diff4splat.cli.scenes.render import Render

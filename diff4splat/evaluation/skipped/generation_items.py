@@ -91,7 +91,7 @@ def unprompted_items(source: Source) -> Iterator[Item]:
         lean=lambda: film(source.scene()),
         saved_bytes=source.weights_bytes("motion_unet", "text_encoder"),
     )
-    yield whole_item(source)
+    yield all_items(source)
 
 
 def guidance_item(source: Source) -> Item:
@@ -115,7 +115,7 @@ def fill_item(source: Source) -> Item:
     )
 
 
-def whole_item(source: Source) -> Item:
+def all_items(source: Source) -> Item:
     """Everything done that a static scene without a prompt does not need, against nothing of it."""
     return Item(
         name="all together, static and without a prompt",

@@ -63,7 +63,7 @@ def scene_items(scene: Scene) -> Iterator[Item]:
     size = sum(tensor.nbytes for tensor in _tensors(scene))
     for name, kept in (
         ("transparent Gaussians", gaussians.opacities >= TRANSPARENT),
-        ("invisible Gaussians", seen(scene)),
+        ("invisible Gaussians", in_view(scene)),
     ):
         fewer = scene.select(kept)
         dropped = size * (1 - len(fewer.gaussians) / max(count, 1))
@@ -138,7 +138,7 @@ def padded(sh: Float[Tensor, "n c 3"]) -> Float[Tensor, "n 16 3"]:
     return torch.cat([sh, sh.new_zeros(len(sh), BAND_SIZES[3] - sh.shape[1], 3)], 1)
 
 
-def seen(scene: Scene) -> Bool[Tensor, " n"]:
+def in_view(scene: Scene) -> Bool[Tensor, " n"]:
     """Gaussians that reach into any frame of the path."""
     found = torch.zeros(len(scene.gaussians), dtype=torch.bool)
     for k, time_s in enumerate(scene.path.times_s.tolist()):

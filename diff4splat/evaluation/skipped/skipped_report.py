@@ -55,11 +55,11 @@ def write_skipped(rows: Sequence[Measured], folder: Path) -> tuple[Path, ...]:
     record = {"format": FORMAT, "rows": [asdict(row) for row in rows]}
     write_text(files[0], json.dumps(record, indent=1, allow_nan=False) + "\n")
     write_text(files[1], to_markdown(rows))
-    save_picture(rows, files[2])
+    save_skipped_plot(rows, files[2])
     return files
 
 
-def save_picture(rows: Sequence[Measured], file: Path) -> None:
+def save_skipped_plot(rows: Sequence[Measured], file: Path) -> None:
     """Processor seconds with and without each item; the error stands beside the bars."""
     items = by_item(rows)
     figure = new_figure(8.0, 0.62 * len(items) + 1.1)

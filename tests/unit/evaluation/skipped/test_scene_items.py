@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from diff4splat.evaluation.skipped.measurement import Item, Measured, measure
-from diff4splat.evaluation.skipped.scene_items import scene_items, seen
+from diff4splat.evaluation.skipped.scene_items import in_view, scene_items
 from diff4splat.evaluation.skipped.skipped_report import to_markdown
 from diff4splat.geometry.camera import pinhole, stack_cameras
 from diff4splat.paths.camera_path import CameraPath
@@ -47,7 +47,7 @@ def test_gaussians_behind_and_beside_the_camera_are_not_seen(scene: Scene) -> No
     means = scene.gaussians.means.clone()
     means[:2] = away
     moved = replace(scene, gaussians=replace(scene.gaussians, means=means))
-    assert not seen(moved)[:2].any()
+    assert not in_view(moved)[:2].any()
 
 
 def test_a_wrong_result_is_reported_as_one() -> None:

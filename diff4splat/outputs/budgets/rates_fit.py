@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diff4splat.budgets.costs import Work
+from diff4splat.outputs.budgets.costs import Work
 
 SWEEPS = 5000
 RIDGE = 1e-6

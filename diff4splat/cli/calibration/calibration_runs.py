@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from diff4splat.budgets.costs import CostRates
-from diff4splat.budgets.rates_fit import fit_rates
-from diff4splat.cli.limits.calibration_inputs import CAPTURE, PROMPT
+from diff4splat.cli.calibration.calibration_inputs import CAPTURE, PROMPT
+from diff4splat.cli.calibration.measured_process import measure_process
 from diff4splat.cli.limits.command_work import command_work
-from diff4splat.cli.limits.measured_process import measure_process
+from diff4splat.outputs.budgets.costs import CostRates
+from diff4splat.outputs.budgets.rates_fit import fit_rates
 
 Run = list[str]
 GENERATE = (

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from diff4splat.cli.options.constraints import InputPath, OutputFile
 
 if TYPE_CHECKING:
-    from diff4splat.budgets.costs import CostRates
-    from diff4splat.budgets.table import CalibrationTable, SettingRow
+    from diff4splat.outputs.budgets.costs import CostRates
+    from diff4splat.outputs.budgets.table import CalibrationTable, SettingRow
     from diff4splat.progress.phases import Phases
 
 
@@ -32,10 +32,10 @@ class Calibrate:
 
     def run(self) -> None:
         """Measure and write."""
-        from diff4splat.budgets.table import user_table_file, write_table
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer
+        from diff4splat.outputs.budgets.table import user_table_file, write_table
 
         file = self.out or user_table_file()
         phases = ConsolePhases()
@@ -49,8 +49,8 @@ class Calibrate:
     def measure(self, folder: Path, phases: "Phases") -> "CalibrationTable":
         """All rates, then all errors."""
         from diff4splat import __version__
-        from diff4splat.budgets.speed import machine_name, measure_speed_s
-        from diff4splat.budgets.table import CalibrationTable, find_table
+        from diff4splat.outputs.budgets.speed import machine_name, measure_speed_s
+        from diff4splat.outputs.budgets.table import CalibrationTable, find_table
 
         photos, rates = self.measured_rates(folder, phases)
         settings = find_table().settings if self.rates_only else self.errors(folder, photos, phases)
@@ -67,9 +67,9 @@ class Calibrate:
         self, folder: Path, phases: "Phases"
     ) -> tuple[list[Path], dict[str, "CostRates"]]:
         """(photos, rates by command); scenes and fits stay in ``folder``."""
-        from diff4splat.cli.limits import calibration_inputs as inputs
-        from diff4splat.cli.limits import calibration_runs as runs
-        from diff4splat.cli.limits.measured_process import measure_process
+        from diff4splat.cli.calibration import calibration_inputs as inputs
+        from diff4splat.cli.calibration import calibration_runs as runs
+        from diff4splat.cli.calibration.measured_process import measure_process
 
         with phases.phase("draw inputs", 2) as advance:
             photos = inputs.draw_photos(folder) + inputs.copy_photos(folder, self.images)
@@ -86,7 +86,7 @@ class Calibrate:
         self, folder: Path, photos: Sequence[Path], phases: "Phases"
     ) -> dict[str, tuple["SettingRow", ...]]:
         """Rows of every command, from the scenes that the runs wrote."""
-        from diff4splat.cli.limits import calibration_errors as errors
+        from diff4splat.cli.calibration import calibration_errors as errors
         from diff4splat.io.scene_files.scene_file import load_scene
 
         names = ("scene-3", "scene-4", "scene-6", "fit-hexplane-1", "fit-spacetime-1")

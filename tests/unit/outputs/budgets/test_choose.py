@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diff4splat.budgets.choose import Choice, agrees, broken, choose, front
-from diff4splat.budgets.costs import Forecast
-from diff4splat.budgets.limits import Limits, error_from_loss
 from diff4splat.errors import ConfigError
+from diff4splat.outputs.budgets.choose import Choice, agrees, broken, choose, front
+from diff4splat.outputs.budgets.costs import Forecast
+from diff4splat.outputs.budgets.limits import Limits, error_from_loss
 
 
 def choice(seconds: float, error: float, memory_bytes: float = 1e9) -> Choice:

@@ -58,7 +58,7 @@ class Skipped:
 
     def inputs(self, folder: Path) -> "Iterator[tuple[str, object]]":
         """(name, function that gives the items) of every input."""
-        from diff4splat.cli.limits.calibration_inputs import PROMPT, draw_photos
+        from diff4splat.cli.calibration.calibration_inputs import PROMPT, draw_photos
         from diff4splat.evaluation.skipped.generation_items import Source
         from diff4splat.io.scene_files.scene_file import load_scene
 

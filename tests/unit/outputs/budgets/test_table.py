@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from diff4splat.budgets.table import (
+from diff4splat.errors import ConfigError, FileFormatError, InputError
+from diff4splat.outputs.budgets.table import (
     CalibrationTable,
     find_table,
     read_table,
     user_table_file,
     write_table,
 )
-from diff4splat.errors import ConfigError, FileFormatError, InputError
 
 COMMANDS = ("generate", "render", "bake", "export html", "fit", "train")
 

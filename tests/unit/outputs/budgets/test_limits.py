@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diff4splat.budgets.limits import (
+from diff4splat.errors import ConfigError
+from diff4splat.outputs.budgets.limits import (
     Limits,
     error_from_loss,
     loss_from_error,
@@ -14,7 +15,6 @@ from diff4splat.budgets.limits import (
     parse_limits,
     parse_tolerance,
 )
-from diff4splat.errors import ConfigError
 
 
 @pytest.mark.parametrize(

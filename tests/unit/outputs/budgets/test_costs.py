@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diff4splat.budgets.costs import CostRates, forecast, free_cores
-from diff4splat.budgets.rates_fit import fit_rates
-from diff4splat.budgets.speed import measure_speed_s, require_comparable
 from diff4splat.errors import ConfigError
+from diff4splat.outputs.budgets.costs import CostRates, forecast, free_cores
+from diff4splat.outputs.budgets.rates_fit import fit_rates
+from diff4splat.outputs.budgets.speed import measure_speed_s, require_comparable
 
 RATES = CostRates(
     seconds={"start": 2.0, "filmed_pixels": 1e-3}, memory_bytes={"start": 5e8, "gaussians": 100.0}

@@ -6,10 +6,10 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diff4splat.budgets.table import SettingRow, SettingValues
 from diff4splat.cli.limits import baking, exporting, generation, rendering
 from diff4splat.cli.limits.measured import frame_error
 from diff4splat.io.scene_files.motion_tensors import pack_motion
+from diff4splat.outputs.budgets.table import SettingRow, SettingValues
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat import __version__
-from diff4splat.budgets.costs import CostRates
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.atomic import write_text
 from diff4splat.io.require_file import read_text
+from diff4splat.outputs.budgets.costs import CostRates
 from diff4splat.paths.formats.json_text import decode_object
 
 FORMAT = "diff4splat calibration 1"
@@ -83,7 +83,9 @@ def find_table(file: Path | None = None) -> CalibrationTable:
             return read_table(own)
         except ConfigError:
             pass  # Of an older version: the one that ships fits this one.
-    return parse_table(resources.files("diff4splat.budgets").joinpath(SHIPPED).read_text(), SHIPPED)
+    return parse_table(
+        resources.files("diff4splat.outputs.budgets").joinpath(SHIPPED).read_text(), SHIPPED
+    )
 
 
 def read_table(file: Path) -> CalibrationTable:

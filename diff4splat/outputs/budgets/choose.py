@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from diff4splat.budgets.costs import Forecast, duration, gigabytes
-from diff4splat.budgets.limits import Limits, loss_from_error
-from diff4splat.budgets.table import SettingValues
 from diff4splat.errors import ConfigError
+from diff4splat.outputs.budgets.costs import Forecast, duration, gigabytes
+from diff4splat.outputs.budgets.limits import Limits, loss_from_error
+from diff4splat.outputs.budgets.table import SettingValues
 
 MARGIN = 1.25
 """Forecasts of time must fit the budget with this to spare, since they are a quarter off at times;
