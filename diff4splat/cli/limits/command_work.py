@@ -22,7 +22,8 @@ def command_work(arguments: Sequence[str]) -> tuple[str, dict[str, float]]:
     from diff4splat.cli.common.parser import parse
     from diff4splat.cli.options.constraints import check_arguments
 
-    names = [name for name in COMMANDS if " ".join(arguments[:2]).startswith(name)]
+    words = [name.split() for name in COMMANDS]
+    names = [" ".join(one) for one in words if list(arguments[: len(one)]) == one]
     if not names:
         got = " ".join(arguments[:2]) or "none"
         raise ConfigError(f"forecast: expected one of {', '.join(COMMANDS)}, got {got}")

@@ -21,7 +21,7 @@ class Item:
     """Frames with the work done."""
     lean: Callable[[], Frames]
     """The same without it."""
-    saved_bytes: float
+    saved_bytes: float | int
     """Of weights that are not read, or of tensors that are not made."""
     compared: Callable[[], Frames] | None = None
     """Frames to compare with, where the work makes another scene that is then not used."""
@@ -37,7 +37,7 @@ class Measured:
     full_s: float
     """Processor seconds."""
     lean_s: float
-    saved_bytes: float
+    saved_bytes: float | int
     error: float
     """Largest difference of RGB in [0, 1]; 0 is bit-identical."""
     mean_square: float

@@ -144,13 +144,13 @@ def in_view(scene: Scene) -> Bool[Tensor, " n"]:
     for k, time_s in enumerate(scene.path.times_s.tolist()):
         state, camera = scene.state_at(time_s), scene.path.cameras[k].to(torch.float32)
         position, depth = project(camera, state.means)
-        rim = REACH_SIGMAS * state.scales.amax(-1) * camera.focal_px.max()
-        rim = rim / depth.clamp_min(1e-3) + REACH_SIGMAS
+        reach = REACH_SIGMAS * state.scales.amax(-1)
+        rim = reach * camera.focal_px.max() / depth.clamp_min(1e-3) + REACH_SIGMAS
         height, width = camera.size_px
         inside = (position >= -rim[:, None]) & (
             position <= rim[:, None] + position.new_tensor([width, height])
         )
-        found |= inside.all(-1) & (depth + rim > 0)
+        found |= (inside.all(-1) & (depth > 0)) | (depth.abs() <= reach)
     return found
 
 

@@ -94,6 +94,6 @@ def _seconds(rows: Sequence[Measured]) -> tuple[float, float]:
 
 
 def _median(rows: Sequence[Measured], value: Callable[[Measured], float]) -> float:
-    values = sorted(map(value, rows))
+    values = sorted(float(value(row)) for row in rows)
     middle = len(values) // 2
     return values[middle] if len(values) % 2 else (values[middle - 1] + values[middle]) / 2
