@@ -35,12 +35,12 @@ WORLDS = ((101, 2), (103, 7), (107, 4), (109, 1))
 SIDE_PX = 256
 TOLERANCES_DB = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0)
 KINDS = (
-    *(("generate", "tolerance"),) * 12,
     *(("render", "tolerance"),) * 9,
     *(("bake", "tolerance"),) * 4,
     *(("export html", "tolerance"),) * 5,
     *(("generate", "budget"),) * 5,
     *(("render", "budget"),) * 5,
+    *(("generate", "tolerance"),) * 12,
 )
 SPARE = (1.3, 4.0)
 """Budgets are what the default needs by the forecast, times a number in this range."""
@@ -93,7 +93,7 @@ def make_scenes(folder: Path, photos: list[Path]) -> list[Path]:
 def within_tolerance(name: str, source: Path, loss_db: float, draw: random.Random) -> Held:
     """Choose by a tolerance, and measure the loss."""
     tolerance = ("--tolerance", f"{loss_db}dB")
-    out = source.with_name(f"out{'.safetensors' if name == 'bake' else '.html'}")
+    out = Path(f"limit-out{'.safetensors' if name == 'bake' else '.html'}")
     if name == "generate":
         camera = draw.choice(("arc:0.05", "arc:0.15", "orbit:0.02", "left:0.1", "spiral"))
         command = parse([name, str(source), "--camera", camera, *tolerance])
@@ -141,7 +141,8 @@ def baked_error(file: Path, promised: Promise) -> float:
 
 def within_budget(name: str, source: Path, draw: random.Random) -> Held:
     """Choose by a budget, run, and read time and memory."""
-    out = source.with_name("budget-out" if name == "generate" else "budget-out.webm")
+    kept = Path(tempfile.gettempdir()) / "limit"
+    out = kept if name == "generate" else kept.with_suffix(".webm")
     frames = str(draw.choice((5, 9, 17)))
     rest = (str(source), "--frames", frames, "--out", str(out))
     counter = generation if name == "generate" else rendering
@@ -200,11 +201,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--scenes", type=Path, nargs="*", help="in place of fresh ones")
     options = parser.parse_args()
     rows, refused = [], []
     with tempfile.TemporaryDirectory() as folder:
         photos = make_photos(Path(folder))
-        scenes = make_scenes(Path(folder), photos)
+        scenes = options.scenes or make_scenes(Path(folder), photos)
         for request in requests(photos, scenes, options.seed):
             try:
                 rows.append(request())
