@@ -15,7 +15,7 @@ from diff4splat.outputs.budgets.table import (
     write_table,
 )
 
-COMMANDS = ("generate", "render", "bake", "export html", "fit", "train")
+COMMANDS = ("generate", "render", "bake", "export html", "fit")
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +32,7 @@ def shipped() -> CalibrationTable:
 def test_the_table_that_ships_knows_every_command(shipped: CalibrationTable, command: str) -> None:
     rates, rows = shipped.of(command)
     assert rates.seconds and rates.memory_bytes
-    assert bool(rows) == (command not in ("fit", "train"))
+    assert bool(rows) == (command != "fit")
 
 
 def test_a_table_survives_its_file(shipped: CalibrationTable, tmp_path: Path) -> None:
