@@ -26,6 +26,12 @@ TRAIN_STAGES = (("test", "vae"), ("test", "static-low"), ("test", "video_diffusi
 TRAIN_STEPS = ("4", "16")
 
 
+MEMORY_AMOUNTS = frozenset(
+    ("start", "gaussians", "packed_gaussians", "depth_pixels", "prompted", "video_fill", "budget")
+)
+"""What is held at once; frames are written as they come, and steps leave nothing behind."""
+
+
 def generation_runs(photo: Path, folder: Path) -> list[Run]:
     """Sizes, lengths and options of ``generate``."""
     return [
@@ -102,7 +108,8 @@ def measure_rates(runs: Iterable[Run], advance: Callable[[], None]) -> dict[str,
 def rates(measured: list[tuple[dict[str, float], float, float]]) -> CostRates:
     """Rates of time and memory from (work, processor seconds, bytes) of several runs."""
     work = [one for one, _, _ in measured]
+    kept = [{name: one[name] for name in MEMORY_AMOUNTS & one.keys()} for one in work]
     return CostRates(
         seconds=fit_rates(work, [seconds for _, seconds, _ in measured]),
-        memory_bytes=fit_rates(work, [memory for _, _, memory in measured]),
+        memory_bytes=fit_rates(kept, [memory for _, _, memory in measured]),
     )

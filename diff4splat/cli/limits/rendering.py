@@ -22,6 +22,8 @@ NAME = "render"
 DEFAULT_CUTOFF = 1 / 255
 CUTOFFS = (1 / 4096, 1 / 1024, DEFAULT_CUTOFF, 1 / 64, 1 / 16)
 SIDE_SHARES = (1.0, 0.75, 0.5)
+MOVING = 3
+"""Moving Gaussians are moved, projected and sorted for each frame, static ones once per camera."""
 
 
 def work(
@@ -33,10 +35,8 @@ def work(
     return {
         "start": 1,
         "gaussians": header.gaussians * (1 + header.bases / 4),
-        "filmed_gaussians": header.gaussians * frames * footprints,
-        "moved_gaussians": header.moving * frames,
+        "filmed_gaussians": (header.gaussians + MOVING * header.moving) * frames * footprints,
         "filmed_pixels": pixels * frames,
-        "still_pixels": pixels,
     }
 
 
