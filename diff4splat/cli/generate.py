@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.camera import CameraOptions, choose_path, require_camera
 from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.models import ModelName, require_prompt_for, require_runtime
 
 if TYPE_CHECKING:
+    from diff4splat.cli.limits.generation import Outcome
     from diff4splat.generation.inputs.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
     from diff4splat.outputs.card import Result
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
     from diff4splat.progress.phases import Phases
     from diff4splat.progress.run_log import RunLog
     from diff4splat.scene.scene import Scene
+
+
+SEPARATE = ("options", "limits")
+"""Groups of options, whose members the card lists."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +79,11 @@ class Generate:
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: Annotated[float | None, Number(least=0)] = None
     """Classifier-free guidance weight, 1 is off. Default: 1 for motion, 5 for video."""
+    color_matching_steps: Annotated[int | None, Number(least=0, most=100)] = None
+    """Corrections of the colours against the photo; 0 is off. Default: 7."""
+    infill: Literal["subpixel", "none"] | None = None
+    """Gaussians between the photo's pixels (subpixel), or a quarter as many, twice as wide (none).
+    Default: subpixel."""
     min_opacity: Annotated[float, Number(least=0, most=1)] = 0.005
     """Gaussians of lower opacity are removed."""
     video: Literal["mp4", "webm", "gif", "webp"] | None = None
@@ -87,6 +98,7 @@ class Generate:
     """Do not render and write depth."""
     convert: bool = False
     """Convert images that are grey, CMYK, 16-bit or animated, or have alpha or a palette."""
+    limits: Annotated[LimitOptions, tyro.conf.arg(name="")] = field(default_factory=LimitOptions)
 
     @property
     def image(self) -> Path:
@@ -143,6 +155,21 @@ class Generate:
         ``phases`` report instead of progress bars; ``on_scene`` gets the scene before it is
         rendered.
         """
+        from diff4splat.cli.limits.generation import Outcome, promise
+        from diff4splat.cli.limits.stopwatch import Stopwatch
+
+        watch = Stopwatch.of_process() if phases is None else Stopwatch.now()
+        command, promised = promise(self)
+        outcome = Outcome(asked=self, promised=promised, watch=watch)
+        command.run_promised(outcome, phases, on_scene)
+
+    def run_promised(
+        self,
+        outcome: "Outcome",
+        phases: "Phases | None" = None,
+        on_scene: "Callable[[Scene], None] | None" = None,
+    ) -> None:
+        """Generate with the settings as they are; ``outcome`` compares with what was expected."""
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.options.device import require_device
         from diff4splat.generation.pipeline import Diff4SplatPipeline
@@ -154,6 +181,8 @@ class Generate:
         settings, log = self.settings(), RunLog(phases=phases or ConsolePhases())
         device = require_device(self.device)
         input_image, path = self.read_inputs()
+        for line in outcome.promised.lines():
+            note(line)
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
             pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device)
             scene = pipeline(
@@ -163,8 +192,9 @@ class Generate:
                 on_scene(scene)
             result, scene_file, lines = self.write_results(folder, scene, input_image, log)
             inputs = self.inputs(input_image, settings, pipeline.model.config.fingerprint())
-            write_card(folder / "card.json", result, inputs, log, scene_file)
-        for line in (*lines, f"wrote {self.out}"):
+            record = outcome.record(result)
+            write_card(folder / "card.json", result, inputs, log, scene_file, record)
+        for line in (*lines, *filter(None, [record["not_held"]]), f"wrote {self.out}"):
             note(line)
 
     def write_results(
@@ -231,8 +261,7 @@ class Generate:
             note(f"camera path: {warning}")
         size_px, depth = input_image.camera.size_px, not self.skip_depth
         needed = estimate_generation(len(path), size_px, depth, self.video == "gif")
-        if line := require_fits(needed, self.out, "fewer --frames, --skip-depth or a smaller size"):
-            note(line)
+        require_fits(needed, self.out, "fewer --frames, --skip-depth or a smaller size")
 
     def video_name(self) -> str:
         """The name of the video, which says its format."""
@@ -258,12 +287,17 @@ class Generate:
         if self.guidance is not None:
             given["guidance"] = replace(DEFAULT_GUIDANCE, weight=self.guidance)
         given = {name: value for name, value in given.items() if value is not None}
+        matching = {}
+        if self.color_matching_steps is not None:
+            matching["color_matching_steps"] = self.color_matching_steps
         return GenerationSettings(
             sampler=self.sampler,
             fill=self.fill,
             still=self.still,
             min_opacity=self.min_opacity,
             motion=MotionSettings(**given),
+            subpixel_infill=self.infill != "none",
+            **matching,
             **given,
         )
 
@@ -293,9 +327,10 @@ class Generate:
         self, input_image: "InputImage", settings: "GenerationSettings", model_fingerprint: str
     ) -> dict[str, object]:
         """Every setting as it was used, for the card."""
-        given = {name: value for name, value in asdict(self).items() if name != "options"}
+        given = {name: value for name, value in asdict(self).items() if name not in SEPARATE}
         given = {"image": self.image} | {name: given[name] for name in given if name != "images"}
-        given |= asdict(self.options) | {"generation": asdict(settings)}
+        given |= asdict(self.options) | asdict(self.limits)
+        given |= {"generation": asdict(settings)}
         given |= {"focal_source": input_image.focal_source, "notes": input_image.notes}
         given |= {"image_sha256": file_sha256(self.image), "model_fingerprint": model_fingerprint}
         return {

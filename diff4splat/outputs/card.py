@@ -32,6 +32,7 @@ class Result:
 
     scene: Scene
     photo: Float[Tensor, "h w 3"]
+    first_view: Float[Tensor, "h w 3"]
     first_view_psnr_db: float
     """How well the photograph is copied; a flat copy has the most."""
     relief: float
@@ -47,6 +48,7 @@ class Result:
         return cls(
             scene=scene,
             photo=photo,
+            first_view=first_view,
             first_view_psnr_db=round(measured, 2),
             relief=round(depths.far / depths.near, 3),
         )
@@ -79,8 +81,9 @@ def write_card(
     inputs: Mapping[str, object],
     log: RunLog,
     scene_file: SceneFileFacts,
+    forecast: Mapping[str, object] | None = None,
 ) -> None:
-    """Write the card whole or not at all."""
+    """Write the card whole or not at all; ``forecast`` compares what was expected with the run."""
     seconds = log.phases.seconds
     card = {
         "diff4splat": __version__,
@@ -94,6 +97,7 @@ def write_card(
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
         "seconds_total": round(math.fsum(seconds.values()), 3),
         "peak_memory_bytes": peak_memory_bytes(),
+        "forecast": forecast,
         "networks_run": log.networks,
         "left_out": log.skipped.to_json(),
         "versions": {name: version(name) for name in LIBRARIES},

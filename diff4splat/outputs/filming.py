@@ -12,8 +12,8 @@ from torch import Tensor
 
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.api import render, render_video
-from diff4splat.render.settings import RenderOutput
+from diff4splat.render.api import DEFAULTS, render, render_video
+from diff4splat.render.settings import RenderOutput, RenderSettings
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 
@@ -30,6 +30,7 @@ class FilmRecord:
 
     path: CameraPath
     with_depth: bool = True
+    settings: RenderSettings = DEFAULTS
     first_rgb: Float[Tensor, "h w 3"] | None = None
     sheet_rgb: list[Float[Tensor, "h w 3"]] = field(default_factory=list)
     depth: Float[Tensor, "t h w"] | None = None
@@ -68,7 +69,9 @@ def film(scene: Scene, record: FilmRecord, log: RunLog) -> Iterator[Float[Tensor
     if not record.with_depth:
         log.record_skipped("depth", "not asked for", f"{count} blended depth maps")
     with log.phases.phase("render", count) as advance, torch.no_grad():
-        frames = render_video(scene, record.path, outputs=outputs, advance=advance)
+        frames = render_video(
+            scene, record.path, outputs=outputs, settings=record.settings, advance=advance
+        )
         for index, frame in enumerate(frames):
             record.add(index, frame)
             yield frame.rgb

@@ -27,7 +27,8 @@ from diff4splat.outputs.filming import FilmRecord, empty_note, film
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import Phases
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.api import render_video
+from diff4splat.render.api import DEFAULTS, render_video
+from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 from diff4splat.viewer.page import write_page_or_reason
@@ -108,7 +109,12 @@ def preview(result: Result, record: FilmRecord, facts: SheetFacts) -> Float[Tens
 
 
 def write_view(
-    scene: Scene, path: CameraPath, file: Path, time_s: float | None, log: RunLog
+    scene: Scene,
+    path: CameraPath,
+    file: Path,
+    time_s: float | None,
+    log: RunLog,
+    settings: RenderSettings = DEFAULTS,
 ) -> tuple[str, ...]:
     """Render ``path`` into one file whose name says what it holds; returns notes about it.
 
@@ -123,10 +129,12 @@ def write_view(
         scene = replace(scene, gaussians=scene.state_at(time_s), motion=StaticMotion())
     if file.suffix.lower() == ".exr":
         with log.phases.phase("render", len(path)) as advance, torch.no_grad():
-            frames = render_video(scene, path, outputs=("depth",), advance=advance)
+            frames = render_video(
+                scene, path, outputs=("depth",), settings=settings, advance=advance
+            )
             write_depth_exr(torch.stack([frame.depth for frame in frames]), path, file)
         return ()
-    record = FilmRecord(path=path, with_depth=False)
+    record = FilmRecord(path=path, with_depth=False, settings=settings)
     notes: tuple[str, ...] = ()
     if is_movie(file):
         notes = write_film(scene, file, record, log)

@@ -4,6 +4,8 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.calibration.calibrate import Calibrate
+from diff4splat.cli.calibration.skipped import Skipped
 from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -11,6 +13,7 @@ from diff4splat.cli.export_onnx import ExportOnnx
 from diff4splat.cli.fit import Fit
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
+from diff4splat.cli.limits.forecast import Forecasts, forecasts
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
@@ -36,6 +39,8 @@ Report = (
     Annotated[ErrorTime, subcommand("error-time")]
     | Annotated[ListKnobs, subcommand("knobs")]
     | Annotated[Stability, subcommand("stability")]
+    | Annotated[Calibrate, subcommand("calibrate")]
+    | Annotated[Skipped, subcommand("skipped")]
 )
 Command = (
     Annotated[Generate, subcommand("generate")]
@@ -48,7 +53,10 @@ Command = (
     | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
     | Annotated[Inspect, subcommand("inspect")]
-    | Annotated[Report, subcommand("report", description="Error against run time; stability.")]
+    | Annotated[Forecasts, subcommand("forecast")]
+    | Annotated[
+        Report, subcommand("report", description="Error against run time; stability; calibration.")
+    ]
     | Annotated[Prepare, subcommand("prepare", description="Training clips: make, import, check.")]
     | Annotated[Train, subcommand("train")]
     | Annotated[Pack, subcommand("pack")]
@@ -59,6 +67,9 @@ Command = (
 
 def parse(arguments: list[str]) -> Command:
     """The command that ``arguments`` name, with its options; help and bad usage exit."""
+    if arguments[:1] == ["forecast"] and not {"-h", "--help"} & set(arguments[1:2]):
+        # What follows belongs to another command.
+        return forecasts(arguments[1:])
     return tyro.cli(
         Command,
         prog="diff4splat",

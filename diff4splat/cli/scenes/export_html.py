@@ -1,16 +1,18 @@
 """``diff4splat export html`` and ``diff4splat view``: a scene as a page that any browser plays."""
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.constraints import InputPath, OutputFile, require_writable
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 
 PAGE_SUFFIXES = (".html", ".htm")
+NO_LIMITS = LimitOptions()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +26,7 @@ class ExportHtml:
         Path | None, OutputFile(suffixes=PAGE_SUFFIXES), tyro.conf.arg(aliases=("-o",))
     ] = None
     """The page. Default: the scene's name with .html beside it."""
+    limits: Annotated[LimitOptions, tyro.conf.arg(name="")] = field(default_factory=LimitOptions)
 
     @property
     def file(self) -> Path:
@@ -37,7 +40,7 @@ class ExportHtml:
 
     def run(self) -> None:
         """Read, write the page, say what it could not keep."""
-        export_page(scene_source(self.scene), self.file)
+        export_page(scene_source(self.scene), self.file, self.limits)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,20 +70,33 @@ def scene_source(given: Path) -> Path:
     return inside if inside.is_file() else given
 
 
-def export_page(source: Path, file: Path) -> None:
-    """Write the page of any scene that can be read.
+def export_page(source: Path, file: Path, limits: LimitOptions = NO_LIMITS) -> None:
+    """Write the page of any scene that can be read, with what ``limits`` ask for left out.
 
     Raises:
         InputError, FileFormatError: the scene cannot be read.
         OutputError: the page cannot be written.
     """
     from diff4splat.cli.common.console import ConsolePhases, note
+    from diff4splat.cli.limits.exporting import html_loss_db, html_promise, reduced
+    from diff4splat.cli.limits.stopwatch import Stopwatch
     from diff4splat.io.checkpoints.import_scene import import_scene
     from diff4splat.viewer.page import write_page
 
+    promised, watch = html_promise(source, limits), Stopwatch.of_process()
+    for line in promised.lines():
+        note(line)
     imported = import_scene(source)
+    scene = imported.scene
+    if promised.choice is not None:
+        scene = reduced(scene, promised.choice.values)
     with ConsolePhases().phase("write page"):
-        written = write_page(imported.scene, file)
+        written = write_page(scene, file)
+    measured = watch.read()
+    if promised.limits.tolerance_db is not None:
+        measured["loss_db"] = html_loss_db(imported.scene, scene)
+    for line in promised.after(measured):
+        note(line)
     for line in (*imported.notes, *written.notes):
         note(line)
     note(f"wrote {file} ({file.stat().st_size / 1e6:.1f} MB)")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.camera import (
     CameraOptions,
     choose_path,
@@ -48,12 +49,18 @@ class Render:
     of field, rolling shutter, motion blur, and all effects combined."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
     optics: Annotated[OpticsOptions, tyro.conf.arg(name="")] = field(default_factory=OpticsOptions)
+    limits: Annotated[LimitOptions, tyro.conf.arg(name="")] = field(default_factory=LimitOptions)
 
     def check(self) -> None:
         """Check which options are given together."""
         from diff4splat.outputs.file_names import VIEW_SUFFIXES
 
         require_inputs_not_overwritten((self.scene, Path(self.camera or "")), (self.out,))
+        if self.limits.limits.given and (self.dataset or self.optics != OpticsOptions()):
+            raise ConfigError(
+                "--tolerance, --budget: expected a pinhole camera, got optics or --dataset; set "
+                "--tolerance-px, --aperture-samples and so on instead"
+            )
         if self.camera is not None:
             require_camera(self.camera, self.options)
         else:
@@ -73,12 +80,17 @@ class Render:
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.precompile import precompile_renderer
         from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
+        from diff4splat.cli.limits.rendering import apply, measured_loss_db, promise
+        from diff4splat.cli.limits.stopwatch import Stopwatch
         from diff4splat.io.movies.suffixes import is_movie
         from diff4splat.io.scene_files.scene_file import load_scene
         from diff4splat.outputs.run_estimate import estimate_frames, require_fits
         from diff4splat.outputs.scene_folder import write_view
         from diff4splat.progress.run_log import RunLog
 
+        promised, watch = promise(self), Stopwatch.of_process()
+        for line in promised.lines():
+            note(line)
         scene = load_scene(self.scene)
         require_scene_time(scene, self.time)
         path = self.chosen_path(scene)
@@ -88,6 +100,8 @@ class Render:
             return
         if self.out.suffix.lower() == ".png" and not is_movie(self.out):
             path = select_frame(path, self.frame)
+        full = path
+        path, settings = apply(promised, path)
         precompile_renderer(scene.gaussians, log.phases)
         time_s = float(path.times_s[0]) if self.time is None else self.time
         if skipped := skipped_gaussians(scene, time_s):
@@ -96,7 +110,12 @@ class Render:
         needed = estimate_frames(len(path), size_px, suffix == ".exr", suffix == ".gif")
         if line := require_fits(needed, self.out.parent, "choose fewer --frames"):
             note(line)
-        for line in write_view(scene, path, self.out, self.time, log):
+        for line in write_view(scene, path, self.out, self.time, log, settings):
+            note(line)
+        measured = watch.read()
+        if promised.limits.tolerance_db is not None:
+            measured["loss_db"] = measured_loss_db(scene, (full, path), settings)
+        for line in promised.after(measured):
             note(line)
         note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
 

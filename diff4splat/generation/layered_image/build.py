@@ -51,13 +51,19 @@ class ImageMaps:
 
 
 def build_layered_image(
-    small: InputImage, image: InputImage, maps: ImageMaps, border_cells: int
+    small: InputImage, image: InputImage, maps: ImageMaps, border_cells: int, infill: bool = True
 ) -> LayeredImage:
-    """The layers of ``image``; ``small`` is the copy that ``maps`` belong to."""
+    """The layers of ``image``; ``small`` is the copy that ``maps`` belong to.
+
+    Without ``infill`` between the pixels, theirs are twice as wide.
+    """
     pixels = pixel_layer(small, image, maps)
     hidden = hidden_layers(small, maps, border_cells)
     if small.camera.size_px != image.camera.size_px:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
+    if not infill:
+        wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
+        return LayeredImage(layers=(wide, *hidden))
     return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
 
 

@@ -1,0 +1,1 @@
+"""Measurements of commands in processes of their own: calibration, and what runs leave out."""

@@ -1,0 +1,39 @@
+"""Fixed inputs of a calibration: drawn worlds, a small capture, and photographs of the user."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+WORLDS = ((7, 3), (11, 0), (19, 5), (23, 8))
+"""(seed, index) of worlds of the test split, which no model was trained on."""
+SIDE_PX, TIMES, TRACKS = 256, 5, 8
+PROMPT = "a rounded block slides to the left"
+CAPTURE = ("--rig", "--size", "64", "--frames", "9", "--views", "5", "--clips", "1")
+
+
+def draw_photos(folder: Path, worlds: Sequence[tuple[int, int]] = WORLDS) -> list[Path]:
+    """The first frame of each world as a PNG."""
+    from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
+    from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
+    from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
+    from diff4splat.io.photos.images import write_png
+
+    files = []
+    for seed, index in worlds:
+        recipe = WorldRecipe(
+            seed=seed,
+            split="held_out",
+            still_share=0.0,
+            frames=TIMES,
+            size_px=(SIDE_PX, SIDE_PX),
+            views=1,
+        )
+        clip = draw_clip(make_world(recipe, index), DrawSettings(tracks=TRACKS, flow=False))
+        files.append(folder / f"world-{seed}-{index}.png")
+        write_png(clip.views[0].rgb[0].float() / 255, files[-1])
+    return files
+
+
+def copy_photos(folder: Path, photos: Sequence[Path]) -> list[Path]:
+    """The user's photographs beside them, under their own names."""
+    return [Path(shutil.copy(photo, folder / photo.name)) for photo in photos]

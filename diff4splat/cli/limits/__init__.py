@@ -1,0 +1,1 @@
+"""Forecasts of commands, and settings within a tolerance or a budget."""

@@ -1,0 +1,1 @@
+"""What a run leaves out, measured: seconds, bytes and error with and without it."""

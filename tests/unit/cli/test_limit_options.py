@@ -1,0 +1,58 @@
+"""Limits that cannot be used are refused before anything is loaded or written."""
+
+from pathlib import Path
+
+import pytest
+
+from diff4splat.cli.common.parser import parse
+from diff4splat.cli.limits.command_work import command_work
+from diff4splat.cli.limits.rendering import reach
+from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
+from diff4splat.cli.main import run_command
+from diff4splat.errors import Diff4SplatError
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--tolerance", "0.5"), "expected a number and dB"),
+        (("--tolerance", "35dB"), "a loss of 1.2 dB"),
+        (("--budget", "3parsec"), "expected a number and ms or s"),
+        (("--budget", "1s,2s"), "name each once"),
+        (("--budget", "1s", "--calibration", "no.json"), "no.json"),
+    ],
+)
+@pytest.mark.parametrize("command", ["render", "bake", "export html"])
+def test_refusals(command: str, options: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    scene, out = tmp_path / "scene.safetensors", tmp_path / "out.safetensors"
+    scene.write_bytes(b"x")
+    if command != "bake":
+        out = out.with_suffix(".html" if command.startswith("export") else ".webm")
+    with pytest.raises(Diff4SplatError, match=message):
+        run_command([*command.split(), str(scene), "--out", str(out), *options])
+    assert sorted(tmp_path.iterdir()) == [scene]
+
+
+def test_a_forecast_takes_the_options_of_another_command() -> None:
+    parsed = parse(["forecast", "generate", "x.jpg", "--resolution", "64"])
+    assert parsed.command == ("generate", "x.jpg", "--resolution", "64")
+    named = parse(["forecast", "--calibration", "t.json", "bake", "x"])
+    assert (named.calibration, named.command) == (Path("t.json"), ("bake", "x"))
+
+
+@pytest.mark.parametrize("arguments", [[], ["eval"], ["rendered"], ["export", "onnx"]])
+def test_commands_without_a_forecast(arguments: list[str]) -> None:
+    with pytest.raises(Diff4SplatError, match="forecast: expected one of generate"):
+        command_work(arguments)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff" * 64, b"\x08" + b"\0" * 7 + b"[1, 2, 3]"])
+def test_headers_that_are_none_count_nothing(content: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "scene.safetensors"
+    file.write_bytes(content)
+    assert read_scene_header(file) == SceneHeader()
+
+
+def test_footprints_grow_with_a_smaller_cutoff() -> None:
+    assert reach(1 / 255) == 1
+    assert reach(1 / 16) < 1 < reach(1 / 4096)
