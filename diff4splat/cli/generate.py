@@ -65,8 +65,13 @@ class Generate:
     """Nothing moves, with or without a prompt."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Steps of the sampler. Default: 1 for motion, 8 for video."""
-    sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
-    """ODE solver of the flow. `diff4splat report error-time` compares the solvers."""
+    sampler: Literal["euler", "midpoint", "heun", "multistep2", "dpmpp2m", "unipc", "adaptive"] = (
+        "multistep2"
+    )
+    """ODE solver of the flow; adaptive chooses the steps by --latent-tolerance. `diff4splat report
+    error-time` compares the solvers."""
+    latent_tolerance: Annotated[float, Number(above=0)] = 0.1
+    """Error per step that --sampler adaptive allows, in units of the video latents."""
     shift: Annotated[float | None, Number(above=0)] = None
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: Annotated[float | None, Number(least=0)] = None
@@ -253,6 +258,7 @@ class Generate:
         given = {name: value for name, value in given.items() if value is not None}
         return GenerationSettings(
             sampler=self.sampler,
+            latent_tolerance=self.latent_tolerance,
             fill=self.fill,
             still=self.still,
             min_opacity=self.min_opacity,
