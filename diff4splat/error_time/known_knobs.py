@@ -1,6 +1,7 @@
 """The knobs that come with the library; other packages register theirs beside them."""
 
 from diff4splat.error_time import camera_knobs, flow_knobs, render_knobs, scene_knobs
+from diff4splat.error_time.declared import declared_settings
 from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 
 _BUILDERS = (
@@ -26,6 +27,8 @@ def register_known_knobs(registry: KnobRegistry) -> None:
     """Add every knob of this package to ``registry``."""
     for build in _BUILDERS:
         registry.register(build())
+    for setting in declared_settings():
+        registry.register(setting)
 
 
 def known_knobs() -> tuple[ApproximationSetting, ...]:

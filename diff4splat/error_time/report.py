@@ -8,8 +8,9 @@ from diff4splat.error_time.error_plot import save_error_time_plot
 from diff4splat.error_time.knobs import KnobRegistry
 from diff4splat.error_time.known_knobs import register_known_knobs
 from diff4splat.error_time.sweep import SweepResult, steps_of, sweep
-from diff4splat.error_time.tables import this_machine, to_markdown, write_tables
+from diff4splat.error_time.tables import to_markdown, write_tables
 from diff4splat.io.figures.plots import require_matplotlib
+from diff4splat.progress.machine import this_machine
 from diff4splat.progress.phases import Phases
 
 
