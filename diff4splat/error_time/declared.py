@@ -3,13 +3,15 @@
 A subject runs one value of a declaration on the fixed inputs, and compares with the reference.
 """
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
 from diff4splat.approximations.declaration import Approximation
 from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.fitting import approximations as fitting
+from diff4splat.fitting.settings import DensitySettings, FitSettings
 from diff4splat.generation import approximations as generation
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.render import approximations as rendering
@@ -18,51 +20,58 @@ DECLARING = (generation, rendering, fitting)
 """Modules with ``APPROXIMATIONS``, ``USER_CHOICES`` and ``SETTINGS_CLASSES``."""
 
 
+SHORT_FIT = FitSettings(
+    coarse_steps=100,
+    fine_steps=200,
+    points=4000,
+    density=DensitySettings(budget=4000, every=50),
+    harmonics=0,
+)
+"""Some ten seconds; long enough that settings differ by more than the noise of a fit."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Subject:
-    """What is run with a settings object, and how its result is compared."""
+    """What is run with a settings object, and how its result is compared.
 
+    ``module`` is imported with the first run. It has ``run`` and ``error``, and may have
+    ``more_errors``, and ``truth`` where that is known and no reference is run.
+    """
+
+    module: str
     base: Any
     """Settings of which a value replaces some."""
-    run: Callable[[Any], Any]
-    error: Callable[[Any, Any], float]
     error_unit: str
-    more_errors: Callable[[Any, Any], Mapping[str, float]] = lambda result, reference: {}
-    truth: Callable[[], Any] | None = None
-    """What results are compared with, where that is known; else the result of the reference."""
+    known_truth: bool = False
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """One function of the module; nothing where there is none."""
+        module = import_module(f"diff4splat.error_time.subjects.{self.module}")
+        function = getattr(module, name, None)
+        return None if function is None else function(*arguments)
 
 
-def subjects() -> Mapping[str, Subject]:
-    """By the name that declarations use."""
-    from diff4splat.error_time.subjects import fits, motion, scenes, video
-
-    images = {"run": scenes.generated_scenes, "error": scenes.image_rmse}
-    images |= {"error_unit": "RMSE of RGB in [0, 1]", "more_errors": scenes.scene_errors}
-    return {
-        "video": Subject(
-            base=GenerationSettings(),
-            run=video.sampled_latents,
-            error=video.latent_error,
-            error_unit="latent error over the latents' deviation",
-            more_errors=video.video_errors,
-        ),
-        "motion": Subject(
-            base=GenerationSettings(),
-            run=motion.sampled_motion,
-            error=motion.motion_error,
-            error_unit="field error over the fields' deviation",
-        ),
-        "scene": Subject(base=GenerationSettings(), **images),
-        "video-scene": Subject(base=GenerationSettings(fill="video"), **images),
-        "fit": Subject(
-            base=fits.SHORT_FIT,
-            run=fits.fitted_frames,
-            error=fits.frame_rmse,
-            error_unit="RMSE of RGB in [0, 1] to the true frames",
-            more_errors=fits.frame_errors,
-            truth=fits.true_frames,
-        ),
-    }
+RGB_UNIT = "RMSE of RGB in [0, 1]"
+SUBJECTS: Mapping[str, Subject] = {
+    "video": Subject(
+        module="video",
+        base=GenerationSettings(),
+        error_unit="latent error over the latents' deviation",
+    ),
+    "motion": Subject(
+        module="motion",
+        base=GenerationSettings(),
+        error_unit="field error over the fields' deviation",
+    ),
+    "scene": Subject(module="scenes", base=GenerationSettings(), error_unit=RGB_UNIT),
+    "video-scene": Subject(
+        module="scenes", base=GenerationSettings(fill="video"), error_unit=RGB_UNIT
+    ),
+    "fit": Subject(
+        module="fits", base=SHORT_FIT, error_unit=f"{RGB_UNIT} to the true frames", known_truth=True
+    ),
+}
+"""By the name that declarations use."""
 
 
 def declarations() -> tuple[Approximation, ...]:
@@ -82,32 +91,30 @@ class _References:
 
     made: dict[Hashable, Any] = field(default_factory=dict)
 
-    def run(self, subject: str, settings: Any) -> Any:
-        key = (subject, settings)
+    def of(self, one: Approximation) -> Any:
+        """The truth, or the result of the reference."""
+        subject = SUBJECTS[one.subject]
+        settings = None if subject.known_truth else one.apply(subject.base, one.reference)
+        key = (one.subject, settings)
         if key not in self.made:
-            chosen = subjects()[subject]
-            self.made[key] = chosen.truth() if chosen.truth else chosen.run(settings)
+            known = subject.known_truth
+            self.made[key] = subject.call("truth") if known else subject.call("run", settings)
         return self.made[key]
 
 
 def _measurable(one: Approximation, references: _References) -> ApproximationSetting:
-    def subject() -> Subject:
-        return subjects()[one.subject]
-
-    def run(value: Any) -> Any:
-        return subject().run(one.apply(subject().base, value))
-
+    subject = SUBJECTS[one.subject]
     return ApproximationSetting(
         name=one.name,
         summary=one.summary,
-        error_unit=subject().error_unit,
+        error_unit=subject.error_unit,
         settings=one.values,
         default=one.default,
-        reference="the truth" if subject().truth else one.reference,
-        run=run,
-        run_reference=lambda: references.run(one.subject, one.apply(subject().base, one.reference)),
-        error=lambda result, reference: subject().error(result, reference),
-        more_errors=lambda result, reference: subject().more_errors(result, reference),
+        reference="the truth" if subject.known_truth else one.reference,
+        run=lambda value: subject.call("run", one.apply(subject.base, value)),
+        run_reference=lambda: references.of(one),
+        error=lambda *results: subject.call("error", *results),
+        more_errors=lambda *results: subject.call("more_errors", *results) or {},
         series=one.series,
         label=one.label,
         label_meaning=one.label_meaning,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from diff4splat.error_time.declared import DECLARING, declarations
+from diff4splat.error_time.declared import DECLARING, SUBJECTS, declarations
 from diff4splat.error_time.known_knobs import known_knobs
 
 ROOT = Path(__file__).parents[2]
@@ -68,9 +68,7 @@ def test_every_name_that_is_declared_exists() -> None:
 
 @pytest.mark.parametrize("one", declarations(), ids=lambda one: one.name)
 def test_every_value_makes_settings_that_are_accepted(one) -> None:
-    from diff4splat.error_time.declared import subjects
-
-    base = subjects()[one.subject].base
+    base = SUBJECTS[one.subject].base
     for value in (*one.values, one.reference):
         assert type(one.apply(base, value)) is type(base)
     assert one.apply(base, one.default) == one.apply(one.apply(base, one.values[0]), one.default)

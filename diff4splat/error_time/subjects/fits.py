@@ -19,21 +19,12 @@ from diff4splat.error_time.subjects.errors import mean_psnr_db
 from diff4splat.error_time.subjects.inputs import WORLDS, world_clip
 from diff4splat.fitting.fit import fit_scene
 from diff4splat.fitting.fit_types import FitRequest
-from diff4splat.fitting.settings import DensitySettings, FitSettings
+from diff4splat.fitting.settings import FitSettings
 from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.render.api import render
 
 VIEWS, HELD_OUT, TIMES, SIDE_PX = 8, 2, 6, 64
-SHORT_FIT = FitSettings(
-    coarse_steps=100,
-    fine_steps=200,
-    points=4000,
-    density=DensitySettings(budget=4000, every=50),
-    harmonics=0,
-)
-"""Some ten seconds; long enough that settings differ by more than the noise of a fit."""
-
 Frames = Float[Tensor, "f h w 3"]
 
 
@@ -51,7 +42,7 @@ class _DrawnFrames:
         return Frame(rgb=self.rgb[index])
 
 
-def fitted_frames(settings: FitSettings) -> Frames:
+def run(settings: FitSettings) -> Frames:
     """The held-out frames as the fit shows them."""
     capture = drawn_capture()
     with TemporaryDirectory() as folder:
@@ -65,21 +56,21 @@ def fitted_frames(settings: FitSettings) -> Frames:
     return torch.stack(shown)
 
 
-def true_frames() -> Frames:
+def truth() -> Frames:
     """The same frames as they were drawn."""
     capture = drawn_capture()
     every = capture.held_out.nonzero().flatten().tolist()
     return torch.stack([capture.frames.read(index).rgb for index in every])
 
 
-def frame_rmse(frames: Frames, truth: Frames) -> float:
+def error(frames: Frames, true_frames: Frames) -> float:
     """Root mean square difference."""
-    return float((frames - truth).square().mean().sqrt())
+    return float((frames - true_frames).square().mean().sqrt())
 
 
-def frame_errors(frames: Frames, truth: Frames) -> dict[str, float]:
+def more_errors(frames: Frames, true_frames: Frames) -> dict[str, float]:
     """The same in dB."""
-    return {"image [dB]": mean_psnr_db(frames, truth)}
+    return {"image [dB]": mean_psnr_db(frames, true_frames)}
 
 
 @cache

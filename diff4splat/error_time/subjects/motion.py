@@ -14,7 +14,7 @@ from diff4splat.generation.settings import GenerationSettings
 
 
 @torch.no_grad()
-def sampled_motion(settings: GenerationSettings) -> Tensor:
+def run(settings: GenerationSettings) -> Tensor:
     """Fields of all inputs, ``b 3 t hc wc``."""
     model = shipped_model()
     fields = []
@@ -34,7 +34,7 @@ def prompts() -> tuple[Tensor, ...]:
     return tuple(encoder.encode_prompt(one.prompt) for one in requests(GenerationSettings()))
 
 
-def motion_error(fields: Tensor, reference: Tensor) -> float:
+def error(fields: Tensor, reference: Tensor) -> float:
     """RMS distance over the deviation of the reference, mean over inputs."""
     wrong, true = (fields - reference).flatten(1), reference.flatten(1)
     return float((wrong.square().mean(1).sqrt() / true.std(1).clamp_min(1e-12)).mean())

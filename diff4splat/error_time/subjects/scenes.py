@@ -37,7 +37,7 @@ class Views:
 
 
 @torch.no_grad()
-def generated_scenes(settings: GenerationSettings, model: Model | None = None) -> tuple[Scene, ...]:
+def run(settings: GenerationSettings, model: Model | None = None) -> tuple[Scene, ...]:
     """The scene of every input."""
     pipeline = Diff4SplatPipeline(model or shipped_model())
     return tuple(
@@ -45,7 +45,7 @@ def generated_scenes(settings: GenerationSettings, model: Model | None = None) -
     )
 
 
-def image_rmse(scenes: Sequence[Scene], reference: Sequence[Scene]) -> float:
+def error(scenes: Sequence[Scene], reference: Sequence[Scene]) -> float:
     """Root mean square difference of all views."""
     pairs = [
         (views(one).rgb, views(other).rgb) for one, other in zip(scenes, reference, strict=True)
@@ -53,7 +53,7 @@ def image_rmse(scenes: Sequence[Scene], reference: Sequence[Scene]) -> float:
     return float(torch.stack([(a - b).square().mean() for a, b in pairs]).mean().sqrt())
 
 
-def scene_errors(scenes: Sequence[Scene], reference: Sequence[Scene]) -> dict[str, float]:
+def more_errors(scenes: Sequence[Scene], reference: Sequence[Scene]) -> dict[str, float]:
     """Image, depth and motion."""
     pairs = [(views(one), views(other)) for one, other in zip(scenes, reference, strict=True)]
     depth = [relative_depth(a.depth, b.depth) for a, b in pairs]

@@ -27,14 +27,14 @@ Latents = Float[Tensor, "b c t h w"]
 
 
 @torch.no_grad()
-def sampled_latents(settings: GenerationSettings) -> Latents:
+def run(settings: GenerationSettings) -> Latents:
     """Of all inputs, one after the other, as a generation does it."""
     dit = shipped_model().networks.dit
     every = conditions()
     return torch.cat([sample_video(dit, one, settings, seed=0).latent for one in every])
 
 
-def latent_error(latents: Latents, reference: Latents) -> float:
+def error(latents: Latents, reference: Latents) -> float:
     """RMS distance over the deviation of the reference, mean over inputs."""
     wrong, true = (latents - reference)[:, :, 1:].flatten(1), reference[:, :, 1:].flatten(1)
     relative = wrong.square().mean(1).sqrt() / true.std(1).clamp_min(1e-12)
@@ -42,7 +42,7 @@ def latent_error(latents: Latents, reference: Latents) -> float:
 
 
 @torch.no_grad()
-def video_errors(latents: Latents, reference: Latents) -> dict[str, float]:
+def more_errors(latents: Latents, reference: Latents) -> dict[str, float]:
     """The same latents decoded."""
     vae = shipped_model().networks.vae
     return {
