@@ -51,6 +51,8 @@ class Subject:
         return None if function is None else function(*arguments)
 
 
+ALL_INPUTS, FEW_INPUTS = tuple(range(8)), (1, 4)
+"""Four photographs and four worlds; one of each for a quick look."""
 RGB_UNIT = "RMSE of RGB in [0, 1]"
 SUBJECTS: Mapping[str, Subject] = {
     "video": Subject(
@@ -79,9 +81,9 @@ def declarations() -> tuple[Approximation, ...]:
     return tuple(one for module in DECLARING for one in module.APPROXIMATIONS)
 
 
-def declared_settings() -> tuple[ApproximationSetting, ...]:
+def declared_settings(inputs: tuple[int, ...] = ALL_INPUTS) -> tuple[ApproximationSetting, ...]:
     """Every declaration as a setting of the report; nothing is loaded before the first run."""
-    references = _References()
+    references = _References(inputs=inputs)
     return tuple(_measurable(one, references) for one in declarations())
 
 
@@ -89,6 +91,7 @@ def declared_settings() -> tuple[ApproximationSetting, ...]:
 class _References:
     """Results of references, each made once for all settings of a subject."""
 
+    inputs: tuple[int, ...]
     made: dict[Hashable, Any] = field(default_factory=dict)
 
     def of(self, one: Approximation) -> Any:
@@ -98,7 +101,9 @@ class _References:
         key = (one.subject, settings)
         if key not in self.made:
             known = subject.known_truth
-            self.made[key] = subject.call("truth") if known else subject.call("run", settings)
+            self.made[key] = (
+                subject.call("truth") if known else subject.call("run", settings, self.inputs)
+            )
         return self.made[key]
 
 
@@ -111,7 +116,7 @@ def _measurable(one: Approximation, references: _References) -> ApproximationSet
         settings=one.values,
         default=one.default,
         reference="the truth" if subject.known_truth else one.reference,
-        run=lambda value: subject.call("run", one.apply(subject.base, value)),
+        run=lambda value: subject.call("run", one.apply(subject.base, value), references.inputs),
         run_reference=lambda: references.of(one),
         error=lambda *results: subject.call("error", *results),
         more_errors=lambda *results: subject.call("more_errors", *results) or {},

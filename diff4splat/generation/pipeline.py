@@ -107,9 +107,11 @@ class Diff4SplatPipeline:
         with log.phases.phase("load networks"):
             self.model = with_parts(self.model, request.plan.parts)
             self.model.networks.to(self.device)
-        return self._generate(request, log)
+        return self.generate(request, log)
 
-    def _generate(self, request: Request, log: RunLog) -> Scene:
+    @torch.no_grad()
+    def generate(self, request: Request, log: RunLog) -> Scene:
+        """A prepared request, with its networks loaded."""
         model, small = self._running(request.plan), request.small
         frames = model.config.latent_grid(len(request.small_path), small.camera.size_px)[0]
         with one_thread():

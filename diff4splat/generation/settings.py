@@ -14,7 +14,7 @@ MAX_STEPS = 1000
 LAST_LEVEL = 0.02
 """Where eight steps end that are even in log signal-to-noise ratio (docs/results/samplers.md)."""
 ADAPTIVE_STEPS = 16
-"""Typical number at the default tolerance (docs/results/error-time.md)."""
+"""Typical number at the default tolerance."""
 ENOUGH_STEPS = 6
 """With fewer, evenly spaced in log signal-to-noise ratio throws guided samples off their course."""
 

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture, Frame
 from diff4splat.error_time.subjects.errors import mean_psnr_db
-from diff4splat.error_time.subjects.inputs import WORLDS, world_clip
+from diff4splat.error_time.subjects.inputs import WORLDS, Inputs, world_clip
 from diff4splat.fitting.fit import fit_scene
 from diff4splat.fitting.fit_types import FitRequest
 from diff4splat.fitting.settings import FitSettings
@@ -42,8 +42,9 @@ class _DrawnFrames:
         return Frame(rgb=self.rgb[index])
 
 
-def run(settings: FitSettings) -> Frames:
+def run(settings: FitSettings, inputs: Inputs) -> Frames:
     """The held-out frames as the fit shows them."""
+    del inputs  # one world is fitted
     capture = drawn_capture()
     with TemporaryDirectory() as folder:
         result = fit_scene(FitRequest(capture=capture, settings=settings, folder=Path(folder)))

@@ -21,6 +21,9 @@ from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.io.pixels import unit_rgb
 
+Inputs = tuple[int, ...]
+"""Which of the eight."""
+
 PHOTOGRAPHS = ("astronaut", "chelsea", "coffee", "rocket")
 WORLDS = (3, 5, 8, 11)
 """Indices of drawn worlds in each of which something moves."""
@@ -44,14 +47,16 @@ class ImageInput:
 
 
 @cache
-def image_inputs() -> tuple[ImageInput, ...]:
-    """All eight.
+def image_input(index: int) -> ImageInput:
+    """One of the eight: photographs, then worlds.
 
     Raises:
         MissingExtraError: scikit-image is not installed.
     """
+    if index >= len(PHOTOGRAPHS):
+        return _world(WORLDS[index - len(PHOTOGRAPHS)])
     require_photographs()
-    return (*map(_photograph, PHOTOGRAPHS), *map(_world, WORLDS))
+    return _photograph(PHOTOGRAPHS[index])
 
 
 def require_photographs() -> None:

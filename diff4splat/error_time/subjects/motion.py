@@ -8,30 +8,30 @@ from functools import cache
 import torch
 from torch import Tensor
 
-from diff4splat.error_time.subjects.model import requests, shipped_model
+from diff4splat.error_time.subjects.inputs import Inputs
+from diff4splat.error_time.subjects.model import request, shipped_model
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.settings import GenerationSettings
 
 
 @torch.no_grad()
-def run(settings: GenerationSettings) -> Tensor:
-    """Fields of all inputs, ``b 3 t hc wc``."""
-    model = shipped_model()
-    fields = []
-    for request, text in zip(requests(GenerationSettings()), prompts(), strict=True):
-        frames = model.config.latent_grid(len(request.small_path), request.small.camera.size_px)[0]
-        asked = MotionRequest(text=text, seed=0, settings=settings)
-        sample = sample_motion(model.networks.motion_unet, request.small, frames, asked)
+def run(settings: GenerationSettings, inputs: Inputs) -> Tensor:
+    """Fields of the inputs, ``b 3 t hc wc``."""
+    model, fields = shipped_model(), []
+    for index in inputs:
+        asked = request(index)
+        frames = model.config.latent_grid(len(asked.small_path), asked.small.camera.size_px)[0]
+        motion = MotionRequest(text=prompt(index), seed=0, settings=settings)
+        sample = sample_motion(model.networks.motion_unet, asked.small, frames, motion)
         fields.append(sample.field)
     return torch.stack(fields)
 
 
 @cache
 @torch.no_grad()
-def prompts() -> tuple[Tensor, ...]:
-    """The encoded prompt of every input."""
-    encoder = shipped_model().networks.text_encoder
-    return tuple(encoder.encode_prompt(one.prompt) for one in requests(GenerationSettings()))
+def prompt(index: int) -> Tensor:
+    """The encoded prompt of an input."""
+    return shipped_model().networks.text_encoder.encode_prompt(request(index).prompt)
 
 
 def error(fields: Tensor, reference: Tensor) -> float:

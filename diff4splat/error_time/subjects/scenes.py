@@ -7,14 +7,13 @@ Axes: ``h w`` pixels. Errors are means over inputs and over three views along th
     motion    distance of the rendered flow from the first to the last time, pixels
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from diff4splat.error_time.subjects.errors import mean_psnr_db, relative_depth
-from diff4splat.error_time.subjects.inputs import image_inputs
+from diff4splat.error_time.subjects.inputs import Inputs, image_input
 from diff4splat.error_time.subjects.model import shipped_model
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
@@ -22,6 +21,8 @@ from diff4splat.models.hub.model import Model
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.scene import Scene
+
+Scenes = list[Scene]
 
 SHARES = (0.0, 0.3, 0.8)
 """Along the path and in time."""
@@ -36,16 +37,19 @@ class Views:
     flow_px: Tensor
 
 
-@torch.no_grad()
-def run(settings: GenerationSettings, model: Model | None = None) -> tuple[Scene, ...]:
-    """The scene of every input."""
-    pipeline = Diff4SplatPipeline(model or shipped_model())
-    return tuple(
-        pipeline(one.image, one.path, one.prompt, settings=settings) for one in image_inputs()
-    )
+def run(settings: GenerationSettings, inputs: Inputs) -> Scenes:
+    """The scene of each input."""
+    return generate(shipped_model(), settings, inputs)
 
 
-def error(scenes: Sequence[Scene], reference: Sequence[Scene]) -> float:
+def generate(model: Model, settings: GenerationSettings, inputs: Inputs) -> Scenes:
+    """The same by a model that may have other networks."""
+    pipeline = Diff4SplatPipeline(model)
+    every = [image_input(index) for index in inputs]
+    return [pipeline(one.image, one.path, one.prompt, settings=settings) for one in every]
+
+
+def error(scenes: Scenes, reference: Scenes) -> float:
     """Root mean square difference of all views."""
     pairs = [
         (views(one).rgb, views(other).rgb) for one, other in zip(scenes, reference, strict=True)
@@ -53,7 +57,7 @@ def error(scenes: Sequence[Scene], reference: Sequence[Scene]) -> float:
     return float(torch.stack([(a - b).square().mean() for a, b in pairs]).mean().sqrt())
 
 
-def more_errors(scenes: Sequence[Scene], reference: Sequence[Scene]) -> dict[str, float]:
+def more_errors(scenes: Scenes, reference: Scenes) -> dict[str, float]:
     """Image, depth and motion."""
     pairs = [(views(one), views(other)) for one, other in zip(scenes, reference, strict=True)]
     depth = [relative_depth(a.depth, b.depth) for a, b in pairs]

@@ -14,8 +14,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.error_time.subjects.errors import mean_psnr_db
-from diff4splat.error_time.subjects.model import requests, shipped_model
-from diff4splat.generation.inputs.request import Request
+from diff4splat.error_time.subjects.inputs import Inputs
+from diff4splat.error_time.subjects.model import request, shipped_model
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.priors import image_depth
 from diff4splat.generation.settings import GenerationSettings
@@ -27,10 +27,10 @@ Latents = Float[Tensor, "b c t h w"]
 
 
 @torch.no_grad()
-def run(settings: GenerationSettings) -> Latents:
-    """Of all inputs, one after the other, as a generation does it."""
+def run(settings: GenerationSettings, inputs: Inputs) -> Latents:
+    """Latents of the inputs, one after the other, as a generation does it."""
     dit = shipped_model().networks.dit
-    every = conditions()
+    every = map(conditions, inputs)
     return torch.cat([sample_video(dit, one, settings, seed=0).latent for one in every])
 
 
@@ -52,22 +52,18 @@ def more_errors(latents: Latents, reference: Latents) -> dict[str, float]:
 
 @cache
 @torch.no_grad()
-def conditions() -> tuple[Conditions, ...]:
-    """What the video of each input is generated from: depth prior, layered image, its render."""
-    return tuple(map(_conditions, requests(GenerationSettings())))
-
-
-def _conditions(request: Request) -> Conditions:
-    model = shipped_model()
-    maps = ImageMaps(depth=image_depth(model, request.small), displacement=None)
+def conditions(index: int) -> Conditions:
+    """What the video of an input is generated from: depth prior, layered image, its render."""
+    model, asked = shipped_model(), request(index)
+    maps = ImageMaps(depth=image_depth(model, asked.small), displacement=None)
     border_cells = model.config.refinement.border_cells
-    layered = build_layered_image(request.small, request.small, maps, border_cells)
-    path = request.small_path
+    layered = build_layered_image(asked.small, asked.small, maps, border_cells)
+    path = asked.small_path
     rendered = render_layered_image(layered, path, path.times_s)
-    image = request.small.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
+    image = asked.small.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
     return Conditions(
         image_latent=model.networks.vae.encode(image).mean,
         plucker=plucker_map(relative_to_first(path.cameras)).movedim(0, 1)[None],
-        text=model.networks.text_encoder.encode_prompt(request.prompt),
+        text=model.networks.text_encoder.encode_prompt(asked.prompt),
         render=encode_condition(model, rendered),
     )
