@@ -12,7 +12,6 @@ from pathlib import Path
 
 import torch
 
-from diff4splat.error_time.tables import this_machine
 from diff4splat.evaluation.protocols.datasets import open_clips
 from diff4splat.evaluation.protocols.protocol_json import load_protocol
 from diff4splat.generation.video.video_to_scene import scene_from_video
@@ -20,6 +19,7 @@ from diff4splat.io.atomic import write_text
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.model import load_model
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.progress.machine import this_machine
 
 
 def held_out_video(side: int) -> tuple[torch.Tensor, CameraPath]:

@@ -72,9 +72,13 @@ class Generate:
     """Nothing moves, with or without a prompt."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Steps of the sampler. Default: 1 for motion, 8 for video."""
-    sampler: Literal["euler", "midpoint", "heun", "multistep2"] = "multistep2"
+    sampler: Literal["euler", "midpoint", "heun", "multistep2", "dpmpp2m", "unipc", "adaptive"] = (
+        "multistep2"
+    )
     """ODE solver of motion and video; without a prompt and `--fill video` nothing is sampled.
-    `diff4splat report error-time` compares the solvers."""
+    adaptive chooses the steps by --latent-tolerance. `report error-time` compares the solvers."""
+    latent_tolerance: Annotated[float, Number(above=0)] = 0.1
+    """Error per step that --sampler adaptive allows, in units of the video latents."""
     shift: Annotated[float | None, Number(above=0)] = None
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: Annotated[float | None, Number(least=0)] = None
@@ -292,6 +296,7 @@ class Generate:
             matching["color_matching_steps"] = self.color_matching_steps
         return GenerationSettings(
             sampler=self.sampler,
+            latent_tolerance=self.latent_tolerance,
             fill=self.fill,
             still=self.still,
             min_opacity=self.min_opacity,

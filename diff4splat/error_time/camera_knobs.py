@@ -66,6 +66,7 @@ def chunk_knob() -> ApproximationSetting:
     tolerances = (3.0, 1.0, 0.3, 0.1)
     return ApproximationSetting(
         name="rows-per-chunk",
+        fields=("PhotoSettings.rows_per_chunk", "PhotoSettings.tolerance_px"),
         summary="reading several lines as if what moves went straight and kept its shape",
         error_unit=_ERROR_UNIT,
         settings=(
@@ -100,6 +101,7 @@ def trace_light_knob() -> ApproximationSetting:
     """When a ray has seen enough layers."""
     return ApproximationSetting(
         name="trace-light-cutoff",
+        fields=("TraceSettings.light_cutoff",),
         summary="ending rays where little light comes through from behind",
         error_unit=_ERROR_UNIT,
         settings=tuple(10.0**-power for power in (1, 2, 3, 4, 5, 6, 7)),
@@ -115,6 +117,7 @@ def trace_light_knob() -> ApproximationSetting:
 def _samples_knob(name: str, summary: str, default: int, run) -> ApproximationSetting:
     return ApproximationSetting(
         name=name,
+        fields=("PhotoSettings.samples",),
         summary=summary,
         error_unit=_ERROR_UNIT,
         settings=(1, 2, 4, 8, 16, 32, 64, 128, 256),

@@ -4,13 +4,11 @@ The values of a setting range from fast to exact. ``run`` computes a result with
 ``error`` compares it with the result of the reference value; 0 means identical.
 """
 
-import re
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from torch import Tensor
-
+from diff4splat.approximations.declaration import Approximation, require_values
 from diff4splat.errors import ConfigError
 from diff4splat.paths.messages import unknown_name
 
@@ -30,9 +28,20 @@ class ApproximationSetting:
     """One of ``settings``."""
     reference: Hashable
     """The exact value; need not be in ``settings``."""
-    run: Callable[[Any], Tensor]
-    error: Callable[[Tensor, Tensor], float]
+    run: Callable[[Any], Any]
+    run_reference: Callable[[], Any] | None = None
+    """The result of ``reference``, if something else makes it or keeps it."""
+    error: Callable[[Any, Any], float]
     """(result, result of the reference) to an error of 0 or above."""
+    more_errors: Callable[[Any, Any], Mapping[str, float]] = lambda result, reference: {}
+    """The same by other measures, under their names with units."""
+    repeats: int | None = None
+    """Timed runs after the first; 0 times the first itself, where one takes seconds. None is what
+    the report is asked for."""
+    fields: tuple[str, ...] = ()
+    """``Class.field`` of the settings that it covers."""
+    declared: Approximation | None = None
+    """The declaration beside the code, for settings that commands take."""
     series: Callable[[Any], str] = lambda _: ""
     """Values of one series form one curve in the plot."""
     label: Callable[[Any], str] = str
@@ -41,16 +50,7 @@ class ApproximationSetting:
     """Meaning of the labels, if they are plain numbers."""
 
     def __post_init__(self) -> None:
-        if not re.fullmatch("[a-z0-9]+(-[a-z0-9]+)*", self.name):
-            raise ConfigError(
-                f"knob name: expected lower-case letters, digits and '-', got {self.name!r}"
-            )
-        if not self.settings or len(set(self.settings)) != len(self.settings):
-            raise ConfigError(f"knob {self.name}: expected at least one setting, each only once")
-        if self.default not in self.settings:
-            raise ConfigError(
-                f"knob {self.name}: expected the default among its settings, got {self.default}"
-            )
+        require_values(self.name, self.settings, self.default)
 
 
 @dataclass(slots=True)

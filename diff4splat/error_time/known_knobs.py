@@ -1,6 +1,7 @@
 """The knobs that come with the library; other packages register theirs beside them."""
 
-from diff4splat.error_time import camera_knobs, flow_knobs, render_knobs, scene_knobs
+from diff4splat.error_time import camera_knobs, flow_knobs, network_knobs, render_knobs, scene_knobs
+from diff4splat.error_time.declared import ALL_INPUTS, declared_settings
 from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 
 _BUILDERS = (
@@ -22,10 +23,12 @@ _BUILDERS = (
 )
 
 
-def register_known_knobs(registry: KnobRegistry) -> None:
-    """Add every knob of this package to ``registry``."""
+def register_known_knobs(registry: KnobRegistry, inputs: tuple[int, ...] = ALL_INPUTS) -> None:
+    """Add every knob to ``registry``; those of the shipped networks run on ``inputs``."""
     for build in _BUILDERS:
         registry.register(build())
+    for setting in (*declared_settings(inputs), *network_knobs.network_settings(inputs)):
+        registry.register(setting)
 
 
 def known_knobs() -> tuple[ApproximationSetting, ...]:

@@ -78,6 +78,7 @@ def tile_knob() -> ApproximationSetting:
     """How many pixels share one list of Gaussians."""
     return ApproximationSetting(
         name="tile-size",
+        fields=("RenderSettings.tile_px",),
         summary="cutting the image into tiles, which should change nothing",
         error_unit=_ERROR_UNIT,
         settings=TILE_SIZES_PX,
@@ -94,6 +95,7 @@ def support_knob() -> ApproximationSetting:
     denominators = (16, 64, 128, 255, 512, 1024, 10_000)
     return ApproximationSetting(
         name="support-cutoff",
+        fields=("RenderSettings.alpha_cutoff",),
         summary="cutting off Gaussians where they contribute little",
         error_unit=_ERROR_UNIT,
         settings=tuple(Fraction(1, number) for number in denominators),
@@ -109,6 +111,7 @@ def light_knob() -> ApproximationSetting:
     """When a pixel has seen enough layers."""
     return ApproximationSetting(
         name="light-cutoff",
+        fields=("RenderSettings.light_cutoff",),
         summary="stopping where little light comes through from behind",
         error_unit=_ERROR_UNIT,
         settings=tuple(10.0**-power for power in (1, 2, 3, 4, 5, 6, 7, 9)),
@@ -130,6 +133,7 @@ def dilation_knob() -> ApproximationSetting:
     )
     return ApproximationSetting(
         name="dilation",
+        fields=("RenderSettings.dilation_px2", "RenderSettings.antialias"),
         summary="blurring footprints instead of averaging over pixels",
         error_unit=_ERROR_UNIT,
         settings=(Dilation(variance_px2=0.0), *settings),

@@ -4,12 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from diff4splat.error_time.declared import ALL_INPUTS, FEW_INPUTS
 from diff4splat.error_time.error_plot import save_error_time_plot
 from diff4splat.error_time.knobs import KnobRegistry
 from diff4splat.error_time.known_knobs import register_known_knobs
+from diff4splat.error_time.resume import PartialReport
 from diff4splat.error_time.sweep import SweepResult, steps_of, sweep
-from diff4splat.error_time.tables import this_machine, to_markdown, write_tables
+from diff4splat.error_time.tables import to_markdown, write_tables
 from diff4splat.io.figures.plots import require_matplotlib
+from diff4splat.progress.machine import this_machine
 from diff4splat.progress.phases import Phases
 
 
@@ -32,10 +35,13 @@ def run(
     repeats: int = 3,
     phases: Phases | None = None,
     registry: KnobRegistry | None = None,
+    quick: bool = False,
 ) -> ErrorTimeReport:
     """Measure the named knobs, or all, and write everything into the folder ``out``.
 
-    ``registry`` defaults to the knobs of this package.
+    A run that was stopped goes on after the last complete knob.
+
+    ``registry`` defaults to the known knobs; ``quick`` runs them on two of the eight inputs.
 
     Raises:
         ConfigError: an unknown knob, or ``repeats`` below 1.
@@ -45,15 +51,22 @@ def run(
     phases = Phases() if phases is None else phases
     if registry is None:
         registry = KnobRegistry()
-        register_known_knobs(registry)
+        register_known_knobs(registry, FEW_INPUTS if quick else ALL_INPUTS)
     knobs = registry.knobs(tuple(names))
     require_matplotlib()
-    results = []
+    results, partial = [], PartialReport(out, {"repeats": repeats, "quick": quick})
     for knob in knobs:
-        with phases.phase(knob.name, steps_of(knob, repeats)) as advance:
-            results.append(sweep(knob, repeats, advance))
+        known = partial.known(knob)
+        if len(known) < len(knob.settings):
+            with phases.phase(knob.name, steps_of(knob, repeats, len(known))) as advance:
+                result = sweep(knob, repeats, advance, known=known)
+        else:
+            result = sweep(knob, repeats, known=known)
+        results.append(result)
+        partial.add(result)
     files = list(write_tables(out, results))
     for result in results:
         files.append(out / f"error-time-{result.knob.name}.png")
         save_error_time_plot(result, files[-1])
+    partial.remove()
     return ErrorTimeReport(results=tuple(results), files=tuple(files))

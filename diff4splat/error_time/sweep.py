@@ -8,11 +8,12 @@ make a run slower. The first run of each setting warms up caches and gives the e
 import math
 import statistics
 import time
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.errors import ConfigError
+from diff4splat.progress.peak_memory import PeakMemory
 
 Clock = Callable[[], float]
 
@@ -29,6 +30,10 @@ class Measurement:
     median_s: float
     error: float
     """Infinite where the result is not finite."""
+    more_errors: Mapping[str, float] = field(default_factory=dict)
+    """By other measures, under their names with units."""
+    peak_bytes: int | None = None
+    """Memory that the first run took at most beyond what was in use; None where unknown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,49 +93,77 @@ def sweep(
     repeats: int = 3,
     advance: Callable[[], None] = lambda: None,
     clock: Clock = time.perf_counter,
+    known: Mapping[Hashable, Measurement] | None = None,
 ) -> SweepResult:
-    """Run the reference once and every setting ``1 + repeats`` times.
+    """Run the reference once and every setting ``1 + repeats`` times, or as the knob says.
 
-    ``advance`` is called ``steps_of(knob, repeats)`` times.
+    ``advance`` is called ``steps_of`` times. Settings in ``known`` are not run again.
 
     Raises:
         ConfigError: ``repeats`` is below 1.
     """
     if repeats < 1:
         raise ConfigError(f"repeats: expected at least 1, got {repeats}")
-    reference = knob.run(knob.reference)
-    advance()
-    errors = []
-    for setting in knob.settings:
-        errors.append(_finite(knob.error(knob.run(setting), reference)))
-        advance()
-    seconds: list[list[float]] = [[] for _ in knob.settings]
+    repeats, known = _repeats(knob, repeats), known or {}
+    missing = [setting for setting in knob.settings if setting not in known]
+    firsts = dict(_first_runs(knob, missing, advance, clock)) if missing else {}
+    seconds: dict[Hashable, list[float]] = {one: [] for one in missing}
     for _ in range(repeats):
-        for setting, taken in zip(knob.settings, seconds, strict=True):
+        for setting, taken in seconds.items():
             began = clock()
             knob.run(setting)
             taken.append(clock() - began)
             advance()
-    measured = zip(knob.settings, seconds, errors, strict=True)
-    return SweepResult(knob=knob, repeats=repeats, rows=tuple(_row(knob, *row) for row in measured))
+    made = {one: _timed(firsts[one], seconds[one]) for one in missing}
+    rows = (known[one] if one in known else made[one] for one in knob.settings)
+    return SweepResult(knob=knob, repeats=repeats, rows=tuple(rows))
 
 
-def steps_of(knob: ApproximationSetting, repeats: int) -> int:
-    """How many runs ``sweep`` makes."""
-    return 1 + len(knob.settings) * (1 + repeats)
+def steps_of(knob: ApproximationSetting, repeats: int, known: int = 0) -> int:
+    """How many runs ``sweep`` makes, with ``known`` settings left out."""
+    missing = len(knob.settings) - known
+    return 1 + missing * (1 + _repeats(knob, repeats)) if missing else 0
 
 
-def _row(
-    knob: ApproximationSetting, setting: Hashable, seconds: list[float], error: float
-) -> Measurement:
-    return Measurement(
-        setting=setting,
-        label=knob.label(setting),
-        series=knob.series(setting),
-        seconds=min(seconds),
-        median_s=statistics.median(seconds),
-        error=error,
-    )
+def _repeats(knob: ApproximationSetting, repeats: int) -> int:
+    return repeats if knob.repeats is None else knob.repeats
+
+
+def _first_runs(
+    knob: ApproximationSetting,
+    settings: list[Hashable],
+    advance: Callable[[], None],
+    clock: Clock,
+) -> Iterator[tuple[Hashable, Measurement]]:
+    """Errors and memory of every setting; the first run also warms up."""
+    reference = knob.run_reference() if knob.run_reference else knob.run(knob.reference)
+    advance()
+    for setting in settings:
+        with PeakMemory() as memory:
+            began = clock()
+            result = knob.run(setting)
+            taken = clock() - began
+        yield (
+            setting,
+            Measurement(
+                setting=setting,
+                label=knob.label(setting),
+                series=knob.series(setting),
+                seconds=taken,
+                median_s=taken,
+                error=_finite(knob.error(result, reference)),
+                more_errors=knob.more_errors(result, reference),
+                peak_bytes=memory.peak_bytes,
+            ),
+        )
+        advance()
+
+
+def _timed(first: Measurement, seconds: list[float]) -> Measurement:
+    """``first`` with the seconds of the runs after it, if there are any."""
+    if not seconds:
+        return first
+    return replace(first, seconds=min(seconds), median_s=statistics.median(seconds))
 
 
 def _finite(error: float) -> float:

@@ -5,51 +5,16 @@ Seconds in JSON, milliseconds in Markdown. An error that is not finite is ``null
 
 import json
 import math
-import os
-import platform
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
-import torch
-
-from diff4splat import __version__
 from diff4splat.error_time.sweep import Measurement, SweepResult
 from diff4splat.io.atomic import write_text
+from diff4splat.progress.machine import Machine, this_machine
 
 FORMAT = "diff4splat error-time 1"
 NOTE = "Seconds are of this machine and of one run; compare them only within this report."
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Machine:
-    """What the seconds depend on."""
-
-    diff4splat: str
-    torch: str
-    python: str
-    system: str
-    cores: int
-    threads: int
-    """Threads that PyTorch computes with."""
-
-    def __str__(self) -> str:
-        return (
-            f"diff4splat {self.diff4splat}, torch {self.torch}, Python {self.python}, "
-            f"{self.system}, {self.cores} cores, {self.threads} thread(s)"
-        )
-
-
-def this_machine() -> Machine:
-    """Versions and thread counts of this process."""
-    return Machine(
-        diff4splat=__version__,
-        torch=torch.__version__,
-        python=platform.python_version(),
-        system=f"{platform.system()} {platform.machine()}",
-        cores=os.cpu_count() or 1,
-        threads=torch.get_num_threads(),
-    )
 
 
 def to_json(results: Sequence[SweepResult], machine: Machine) -> str:
@@ -87,6 +52,7 @@ def _knob_record(result: SweepResult) -> dict[str, object]:
         "default": str(knob.default),
         "reference": str(knob.reference),
         "repeats": result.repeats,
+        "fields": list(knob.fields),
         "rows": [_row_record(row, row in front) for row in result.rows],
     }
 
@@ -99,22 +65,39 @@ def _row_record(row: Measurement, on_front: bool) -> dict[str, object]:
         "seconds": row.seconds,
         "median_s": row.median_s,
         "error": row.error if math.isfinite(row.error) else None,
+        "more_errors": {name: _number(value) for name, value in row.more_errors.items()},
+        "peak_bytes": row.peak_bytes,
         "pareto": on_front,
     }
 
 
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
 def _section(result: SweepResult) -> list[str]:
     knob, front = result.knob, result.pareto()
-    rows = [_table_line(row, row in front, row is result.default) for row in result.rows]
+    more = list(result.rows[0].more_errors)
+    columns = ["setting", "ms", knob.error_unit, *more, "MB", "Pareto"]
+    if all(row.peak_bytes is None for row in result.rows):
+        columns.remove("MB")
+    runs = f"Fastest of {result.repeats} runs" if result.repeats else "One run"
     return [
         *("", f"## {knob.name}", "", f"Approximates: {knob.summary}."),
-        f"Reference: {knob.reference}. Fastest of {result.repeats} runs.",
-        *("", f"| setting | ms | {knob.error_unit} | Pareto |", "| --- | ---: | ---: | :-: |"),
-        *rows,
+        f"Reference: {knob.reference}. {runs}.",
+        *("", f"| {' | '.join(columns)} |", f"| --- | {'---: | ' * (len(columns) - 2)}:-: |"),
+        *(_table_line(row, row in front, row is result.default, columns) for row in result.rows),
     ]
 
 
-def _table_line(row: Measurement, on_front: bool, is_default: bool) -> str:
+def _table_line(row: Measurement, on_front: bool, is_default: bool, columns: Sequence[str]) -> str:
     name = f"**{row.setting}** (default)" if is_default else str(row.setting)
-    error = f"{row.error:.2e}" if math.isfinite(row.error) else "not finite"
-    return f"| {name} | {row.seconds * 1e3:.3g} | {error} | {'●' if on_front else ''} |"
+    cells = [name, f"{row.seconds * 1e3:.3g}", _shown(row.error, ".2e")]
+    cells += [_shown(value, ".3g") for value in row.more_errors.values()]
+    if "MB" in columns:
+        cells.append("" if row.peak_bytes is None else f"{row.peak_bytes / 1e6:.0f}")
+    return f"| {' | '.join([*cells, '●' if on_front else ''])} |"
+
+
+def _shown(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "not finite"

@@ -1,11 +1,13 @@
 """Noise levels that a sampler visits: Python floats (float64) from 1 (noise) down to 0 (data).
 
-``n`` steps need n + 1 levels. Three rules:
+``n`` steps need n + 1 levels. Four rules:
 
     uniform   level_i = 1 - i / n
     log_snr   log((1 - level) / level) evenly spaced between its values at 1 - edge and edge, with
               edge = EDGE / n, and the two outermost levels then moved to 1 and 0 (the spacing is
               that of DPM-Solver, Lu et al., arXiv 2206.00927)
+    last      no level between 0 and ``last``: networks that predict clean latents have no velocity
+              that tends to a limit there, so that the end of the flow is where one stops
     shift k   level → k · level / (1 + (k - 1) · level), on top of either: k > 1 spends more steps
               on noisy levels (Esser et al., arXiv 2403.03206, §5.3.2)
 
@@ -25,8 +27,10 @@ EDGE = 0.16
 Schedule = Literal["uniform", "log_snr"]
 
 
-def make_levels(schedule: Schedule, steps: int, shift: float = 1.0) -> tuple[float, ...]:
-    """The levels of a named schedule, shifted.
+def make_levels(
+    schedule: Schedule, steps: int, shift: float = 1.0, last: float = 0.0
+) -> tuple[float, ...]:
+    """The levels of a named schedule, none between 0 and ``last``, shifted.
 
     Raises:
         ConfigError: unknown schedule, fewer than one step, or a shift that is not above 0.
@@ -34,23 +38,27 @@ def make_levels(schedule: Schedule, steps: int, shift: float = 1.0) -> tuple[flo
     rules = {"uniform": uniform_levels, "log_snr": log_snr_levels}
     if schedule not in rules:
         raise ConfigError(f"schedule: expected one of {', '.join(rules)}, got {schedule!r}")
-    return shift_levels(rules[schedule](steps), shift)
+    if not 0 <= last < 0.5:
+        raise ConfigError(f"last level: expected 0 or above and below 0.5, got {last:g}")
+    return shift_levels(rules[schedule](steps, last), shift)
 
 
-def uniform_levels(steps: int) -> tuple[float, ...]:
-    """Evenly spaced from 1 to 0."""
+def uniform_levels(steps: int, last: float = 0.0) -> tuple[float, ...]:
+    """Evenly spaced from 1 to 0, or to ``last`` and then 0."""
     _require_steps(steps)
-    return tuple((steps - i) / steps for i in range(steps + 1))
+    if last * steps <= 1:
+        return tuple((steps - i) / steps for i in range(steps + 1))
+    return (*(1 - (1 - last) * i / (steps - 1) for i in range(steps)), 0.0)
 
 
-def log_snr_levels(steps: int) -> tuple[float, ...]:
+def log_snr_levels(steps: int, last: float = 0.0) -> tuple[float, ...]:
     """Evenly spaced in log signal-to-noise ratio: small steps at both ends, where flows are stiff.
 
-    The last step starts from level EDGE / steps; a fixed edge would leave an error that more steps
-    do not remove.
+    The last step starts from level EDGE / steps, or from ``last`` if that is more; for an exact
+    field a fixed edge would leave an error that more steps do not remove.
     """
     _require_steps(steps)
-    reach = math.log(steps / EDGE - 1)
+    reach = math.log(min(steps / EDGE, 1 / last if last else math.inf) - 1)
     inner = (1 / (1 + math.exp(reach * (2 * i / steps - 1))) for i in range(1, steps))
     return (1.0, *inner, 0.0)
 

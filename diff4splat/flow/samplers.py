@@ -8,6 +8,7 @@ With a = level, b = next level, h = b - a < 0, v = velocity and clean = state - 
     multistep2  exact integral of d state / d level = (state - clean(level)) / level for a ``clean``
                 that is linear in the level (exponential Adams, predictor and corrector):
                 state = b/a state + (1 - b/a) clean + slope (b ln(a/b) - a + b)
+    dpmpp2m, unipc   the same in the log signal-to-noise ratio (``log_snr_samplers``)
 
 The exact flow of thin data is stiff near level 0, with a rate of 1 / level. Euler and multistep2
 integrate that part exactly; a Runge-Kutta stage close to level 0 amplifies its own error by
@@ -19,54 +20,22 @@ The state is float32 or float64 whatever the network computes in: against a bflo
 steps vanish (2 % error at 200 steps, 13 % at 1000).
 """
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.errors import ConfigError, ShapeError
+from diff4splat.errors import ConfigError
+from diff4splat.flow.checked_velocity import checked, solver_state
 from diff4splat.flow.levels import require_levels
+from diff4splat.flow.linear_clean import follow
+from diff4splat.flow.log_snr_samplers import dpmpp2m_step, unipc_step
 from diff4splat.flow.path import clean_from_velocity
+from diff4splat.flow.sampler_types import Memory, Sampler, VelocityFn
 
-VelocityFn = Callable[[Tensor, float], Tensor]
-"""(noisy state, level) to velocity in the same shape; casts its input as its network needs."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Memory:
-    """What a multistep method keeps of its last step."""
-
-    state: Tensor
-    level: float
-    clean: Tensor
-    """Prediction of the data from ``state``."""
-
-
-StepFn = Callable[
-    [VelocityFn, Tensor, tuple[float, float], Memory | None], tuple[Tensor, Memory | None]
-]
-"""(velocity, state, (level, next level), memory) to the next state and memory."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sampler:
-    """One step rule with the order of accuracy and the cost it must show in tests."""
-
-    name: str
-    order: int
-    calls_per_step: int
-    calls_into_zero: int
-    """Calls of a step that ends at level 0."""
-    step: StepFn
-
-    def calls(self, levels: Sequence[float]) -> int:
-        """Network evaluations along ``levels``."""
-        last = self.calls_into_zero if levels[-1] == 0 else self.calls_per_step
-        return self.calls_per_step * (len(levels) - 2) + last
+__all__ = ["SAMPLERS", "Memory", "Sampler", "VelocityFn", "find_sampler", "integrate"]
 
 
 def integrate(
@@ -85,12 +54,10 @@ def integrate(
         ShapeError: ``start`` is not floating point, or ``velocity`` answers in another shape.
     """
     require_levels(levels)
-    if not start.is_floating_point():
-        raise ShapeError(f"start: expected floating-point numbers, got {start.dtype}")
-    state = start.to(torch.promote_types(start.dtype, torch.float32))
+    state = solver_state(start)
     memory = None
     for pair in pairwise(levels):
-        state, memory = sampler.step(_checked(velocity), state, pair, memory)
+        state, memory = sampler.step(checked(velocity), state, pair, memory)
         if advance is not None:
             advance()
     return state
@@ -105,19 +72,6 @@ def find_sampler(name: str) -> Sampler:
     if name not in SAMPLERS:
         raise ConfigError(f"sampler: expected one of {', '.join(SAMPLERS)}, got {name!r}")
     return SAMPLERS[name]
-
-
-def _checked(velocity: VelocityFn) -> VelocityFn:
-    """``velocity`` in the state's dtype; an answer that would broadcast is refused."""
-
-    def call(state: Tensor, level: float) -> Tensor:
-        answer = velocity(state, level)
-        if answer.shape != state.shape:
-            want, got = tuple(state.shape), tuple(answer.shape)
-            raise ShapeError(f"velocity: expected the state's shape {want}, got {got}")
-        return answer.to(state.dtype)
-
-    return call
 
 
 def _euler(
@@ -157,19 +111,11 @@ def _multistep2(
         last_step = level - memory.level
         change = clean - memory.clean
         # Corrector: repeat the last step now that the clean prediction at its end is known.
-        state = _follow(memory.state, (memory.level, level), memory.clean, change / last_step)
+        state = follow(memory.state, (memory.level, level), memory.clean, change / last_step)
         # Predictor: extrapolating further than the last change diverges where steps grow.
         slope = change / min(last_step, next_level - level)
     memory = Memory(state=state, level=level, clean=clean)
-    return _follow(state, pair, clean, slope), memory
-
-
-def _follow(state: Tensor, pair: tuple[float, float], clean: Tensor, slope: Tensor) -> Tensor:
-    """Exact step when the clean prediction is ``clean`` + ``slope`` · (level - first level)."""
-    level, next_level = pair
-    kept = next_level / level
-    bend = next_level * -math.log(kept) if kept > 0 else 0.0
-    return kept * state + (1 - kept) * clean + (bend - level + next_level) * slope
+    return follow(state, pair, clean, slope), memory
 
 
 SAMPLERS = {
@@ -179,5 +125,7 @@ SAMPLERS = {
         Sampler(name="midpoint", order=2, calls_per_step=2, calls_into_zero=2, step=_midpoint),
         Sampler(name="heun", order=2, calls_per_step=2, calls_into_zero=1, step=_heun),
         Sampler(name="multistep2", order=2, calls_per_step=1, calls_into_zero=1, step=_multistep2),
+        Sampler(name="dpmpp2m", order=2, calls_per_step=1, calls_into_zero=1, step=dpmpp2m_step),
+        Sampler(name="unipc", order=2, calls_per_step=1, calls_into_zero=1, step=unipc_step),
     )
 }

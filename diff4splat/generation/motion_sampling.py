@@ -16,7 +16,8 @@ from torch import Tensor
 
 from diff4splat.flow.guidance import UNGUIDED, CallCount, guided
 from diff4splat.flow.path import velocity_from_clean
-from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
+from diff4splat.flow.samplers import VelocityFn
+from diff4splat.flow.solve import ADAPTIVE, FIXED_DEFAULT, solve
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
 from diff4splat.generation.settings import GenerationSettings
@@ -85,11 +86,14 @@ def sample_motion(
     # Drawn on the CPU, so every device starts alike.
     generator = torch.Generator().manual_seed(request.seed)
     noise = torch.randn(1, 3, frames - 1, *grid, generator=generator).to(rgb)
-    field = integrate(
-        find_sampler(request.settings.sampler),
+    settings = request.settings
+    fixed = settings.sampler == ADAPTIVE and settings.motion.steps == 1
+    field = solve(
+        # One step is the mean of all samples, which no tolerance is asked about.
+        FIXED_DEFAULT if fixed else settings.sampler,
         _velocity(network, rgb, request, calls),
         noise,
-        request.settings.motion.levels,
+        (settings.motion.levels, settings.step_control),
         advance,
     )
     # Which pixels move is not sampled: image and text decide.

@@ -107,9 +107,11 @@ class Diff4SplatPipeline:
         with log.phases.phase("load networks"):
             self.model = with_parts(self.model, request.plan.parts)
             self.model.networks.to(self.device)
-        return self._generate(request, log)
+        return self.generate(request, log)
 
-    def _generate(self, request: Request, log: RunLog) -> Scene:
+    @torch.no_grad()
+    def generate(self, request: Request, log: RunLog) -> Scene:
+        """A prepared request, with its networks loaded."""
         model = self._running(request.plan)
         copies = Copies(image=request.image, small=request.small)
         size_px = request.small.camera.size_px

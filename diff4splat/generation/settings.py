@@ -3,13 +3,18 @@
 from dataclasses import dataclass
 
 from diff4splat.errors import ConfigError
+from diff4splat.flow.adaptive import StepControl
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, UNGUIDED, Guidance
 from diff4splat.flow.levels import Schedule, make_levels, require_levels
-from diff4splat.flow.samplers import find_sampler
+from diff4splat.flow.solve import ADAPTIVE, require_solver
 from diff4splat.models.config.model import Fill
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
+LAST_LEVEL = 0.02
+"""Where eight steps end that are even in log signal-to-noise ratio (docs/results/samplers.md)."""
+ADAPTIVE_STEPS = 16
+"""Typical number at the default tolerance."""
 ENOUGH_STEPS = 6
 """With fewer, evenly spaced in log signal-to-noise ratio throws guided samples off their course."""
 
@@ -52,6 +57,10 @@ class GenerationSettings:
     """None takes the better one for the number of steps (docs/results/samplers.md)."""
     shift: float = 1.0
     """Above 1 spends more steps on noisy levels (Wan 2.1: 3)."""
+    last_level: float = LAST_LEVEL
+    """More steps end no nearer to clean latents: what the network predicts there has no limit."""
+    latent_tolerance: float = 0.1
+    """Error per step of the sampler ``adaptive``, in units of the latent; it sets the steps."""
     guidance: Guidance = DEFAULT_GUIDANCE
     """Used only when there is a prompt."""
     motion: MotionSettings = MotionSettings()
@@ -76,7 +85,8 @@ class GenerationSettings:
             raise ConfigError(f"--steps: expected 1 to {MAX_STEPS}, got {self.steps}")
         if self.fill not in (None, "none", "video"):
             raise ConfigError(f"--fill: expected none or video, got {self.fill!r}")
-        find_sampler(self.sampler)
+        require_solver(self.sampler)
+        StepControl(tolerance=self.latent_tolerance, last_level=self.last_level)
         require_levels(self.levels)
         if not 0 <= self.color_matching_steps <= 100:
             raise ConfigError(
@@ -93,7 +103,19 @@ class GenerationSettings:
     def levels(self) -> tuple[float, ...]:
         """Noise levels that the sampler visits."""
         measured: Schedule = "log_snr" if self.steps >= ENOUGH_STEPS else "uniform"
-        return make_levels(self.schedule or measured, self.steps, self.shift)
+        return make_levels(self.schedule or measured, self.steps, self.shift, self.last_level)
+
+    @property
+    def expected_steps(self) -> int:
+        """Of the video model, for progress; an adaptive step size decides while it runs."""
+        return ADAPTIVE_STEPS if self.sampler == ADAPTIVE else self.steps
+
+    @property
+    def step_control(self) -> StepControl:
+        """Of the sampler ``adaptive``; the worst latent frame counts."""
+        return StepControl(
+            tolerance=self.latent_tolerance, last_level=self.last_level, kept_axes=(0, 2)
+        )
 
 
 def why_unguided(guidance: Guidance) -> str:

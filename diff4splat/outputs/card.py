@@ -69,7 +69,7 @@ def describe(result: Result, camera: str, focal_source: str) -> tuple[tuple[str,
         ("Gaussians", f"{len(scene.gaussians):,}, {moving:,} of them moving"),
         (
             "First view",
-            f"{result.first_view_psnr_db:.1f} dB against the photograph; says nothing of other views",
+            f"{result.first_view_psnr_db:.1f} dB against the photograph; other views are worse",
         ),
         ("Relief", f"{result.relief:.2f} times as deep at the far as at the near end; flat is 1"),
     )

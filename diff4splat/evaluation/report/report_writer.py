@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from diff4splat import __version__
-from diff4splat.error_time.tables import this_machine
 from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, columns_of
 from diff4splat.evaluation.records import ItemResult
 from diff4splat.evaluation.report.summary import Mean, Summary
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.evaluation.systems.baselines import BASELINES
+from diff4splat.progress.machine import this_machine
 
 FORMAT = "diff4splat-evaluation-results 1"
 DIRECTION_ARROWS = {"higher": "↑", "lower": "↓", "neither": ""}

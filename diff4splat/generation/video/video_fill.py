@@ -122,7 +122,7 @@ def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill | 
 def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
     settings = request.settings
     rendered, conditions = _conditions(model, request, log)
-    with log.phases.phase("sample video", settings.steps) as advance:
+    with log.phases.phase("sample video", settings.expected_steps) as advance:
         sample = sample_video(model.networks.dit, conditions, settings, request.seed, advance)
     if sample.calls.saved:
         why = "no prompt" if request.text is None else why_unguided(settings.guidance)

@@ -13,7 +13,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
-from diff4splat.flow.samplers import VelocityFn, find_sampler, integrate
+from diff4splat.flow.samplers import VelocityFn
+from diff4splat.flow.solve import solve
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.protocols import VideoVelocity
 from diff4splat.models.video_dit.conditions import DitConditions, RenderCondition
@@ -52,11 +53,11 @@ def sample_video(
         ConfigError: an unknown sampler or schedule.
     """
     calls = CallCount()
-    latent = integrate(
-        find_sampler(settings.sampler),
+    latent = solve(
+        settings.sampler,
         _velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
-        settings.levels,
+        (settings.levels, settings.step_control),
         advance,
     )
     return VideoSample(latent=latent, calls=calls)

@@ -14,11 +14,12 @@ from diff4splat.error_time import report as error_time
 from diff4splat.error_time.error_plot import save_error_time_plot
 from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 from diff4splat.error_time.sweep import Measurement, SweepResult
-from diff4splat.error_time.tables import this_machine, to_json, to_markdown
+from diff4splat.error_time.tables import to_json, to_markdown
 from diff4splat.errors import ConfigError, InputError, MissingExtraError, OutputError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.outputs.path_plot import save_path_preview, speeds, turn_rates
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.progress.machine import this_machine
 from diff4splat.progress.phases import Phases
 
 

@@ -16,7 +16,8 @@ from diff4splat.error_time.flow_knobs import (
 from diff4splat.error_time.knobs import KnobRegistry
 from diff4splat.error_time.known_knobs import known_knobs, register_known_knobs
 from diff4splat.error_time.sweep import sweep
-from diff4splat.error_time.tables import this_machine, to_json
+from diff4splat.error_time.tables import to_json
+from diff4splat.progress.machine import this_machine
 
 
 @pytest.fixture(autouse=True)

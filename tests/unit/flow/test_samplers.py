@@ -23,6 +23,10 @@ from diff4splat.flow.levels import log_snr_levels, make_levels, uniform_levels
 from diff4splat.flow.samplers import SAMPLERS, Sampler, find_sampler, integrate
 
 samplers = pytest.mark.parametrize("sampler", SAMPLERS.values(), ids=SAMPLERS)
+IN_LEVEL = [name for name in SAMPLERS if name not in ("dpmpp2m", "unipc")]
+samplers_in_level = pytest.mark.parametrize(
+    "sampler", [SAMPLERS[n] for n in IN_LEVEL], ids=IN_LEVEL
+)
 STEPS = [64, 128, 256]
 
 
@@ -43,7 +47,7 @@ def final_error(sampler: Sampler, field: Callable, exact: torch.Tensor, path: tu
     return float((integrate(sampler, field, start, levels) - exact).abs())
 
 
-@samplers
+@samplers_in_level
 @pytest.mark.parametrize(
     ("field", "solution", "last"), [(decay, decay_solution, 0.0), (square, square_solution, 0.5)]
 )
@@ -57,7 +61,7 @@ def test_shows_its_declared_order(
     assert slope_of(errors, STEPS) == pytest.approx(sampler.order, abs=0.1)
 
 
-@samplers
+@samplers_in_level
 @pytest.mark.parametrize("std", [0.5, 1.0])
 def test_reaches_its_order_on_gaussian_data(sampler: Sampler, std: float) -> None:
     """At least: on Gaussian data the leading error of the midpoint rule cancels."""

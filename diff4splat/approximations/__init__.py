@@ -1,0 +1,1 @@
+"""Declarations of approximations, beside the code that they belong to."""

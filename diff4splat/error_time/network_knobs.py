@@ -1,0 +1,109 @@
+"""Approximations of the shipped networks themselves, on whole scenes of the fixed inputs.
+
+precision-NETWORK   weights in bfloat16, float16 or int8 with one scale per output channel;
+                    computed in float32, as ONNX graphs of this project do
+network-resolution  pixels of the copy of the image that the networks see
+vae-chunks          latent frames that the decoder takes at a time: exact
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from diff4splat.error_time.knobs import ApproximationSetting
+
+PRECISIONS = ("float32", "bfloat16", "float16", "int8")
+NETWORKS = ("text_encoder", "monocular_depth", "motion_unet", "dit", "vae", "ldrm")
+RGB_UNIT = "RMSE of RGB in [0, 1]"
+
+
+def network_settings(inputs: tuple[int, ...]) -> tuple[ApproximationSetting, ...]:
+    """All of them; nothing is loaded before the first run."""
+    return (
+        *(_precision(part, inputs) for part in NETWORKS),
+        _resolution(inputs),
+        _vae_chunks(inputs),
+    )
+
+
+def _precision(part: str, inputs: tuple[int, ...]) -> ApproximationSetting:
+    name = part.replace("_", "-")
+
+    def run(precision: str) -> Any:
+        from diff4splat.error_time.subjects import networks
+
+        return networks.scenes_in_precision(part, precision, inputs)
+
+    return _of_scenes(
+        f"precision-{name}",
+        f"weights of {name} in fewer bits",
+        {"settings": PRECISIONS, "default": "float32", "reference": "float32"},
+        run,
+    )
+
+
+def _resolution(inputs: tuple[int, ...]) -> ApproximationSetting:
+    def run(factor: int) -> Any:
+        from diff4splat.error_time.subjects import networks
+
+        return networks.scenes_at_factor(factor, inputs)
+
+    return _of_scenes(
+        "network-resolution",
+        "networks that see a smaller copy of the image",
+        {"settings": (4, 2, 1), "default": 2, "reference": 1},
+        run,
+        label=lambda factor: f"{128 // factor} px",
+    )
+
+
+def _vae_chunks(inputs: tuple[int, ...]) -> ApproximationSetting:
+    def run(frames: int) -> Any:
+        from diff4splat.error_time.subjects import networks
+
+        return networks.decoded_in_chunks(frames, inputs)
+
+    def error(result: Any, reference: Any) -> float:
+        return float((result - reference).square().mean().sqrt())
+
+    return ApproximationSetting(
+        name="vae-chunks",
+        summary="decoding a few latent frames at a time: nothing, as its memory is carried on",
+        error_unit=RGB_UNIT,
+        settings=(1, 2, 4, 16),
+        default=16,
+        reference=16,
+        run=run,
+        error=error,
+        repeats=1,
+        label_meaning="latent frames",
+    )
+
+
+def _of_scenes(
+    name: str,
+    summary: str,
+    values: dict[str, Any],
+    run: Callable[[Any], Any],
+    label: Callable[[Any], str] = str,
+) -> ApproximationSetting:
+    def error(result: Any, reference: Any) -> float:
+        from diff4splat.error_time.subjects import scenes
+
+        return scenes.error(result, reference)
+
+    def more_errors(result: Any, reference: Any) -> Any:
+        from diff4splat.error_time.subjects import scenes
+
+        return scenes.more_errors(result, reference)
+
+    return ApproximationSetting(
+        name=name,
+        summary=summary,
+        error_unit=RGB_UNIT,
+        run=run,
+        error=error,
+        more_errors=more_errors,
+        label=label,
+        repeats=0,
+        **values,
+    )
