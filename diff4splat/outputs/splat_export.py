@@ -32,8 +32,8 @@ def export_moment(scene: Scene, time_s: float, file: Path) -> float:
     """
     form, state = SPLAT_FORMATS[file.suffix.lower()], scene.state_at(time_s)
     with atomic_path(file) as temporary:
-        form.write(state, temporary, time_s)
-        measured = worst_psnr_db(scene, state, form.read(temporary))
+        form.write(state, temporary, time_s, 3)
+        measured = worst_psnr_db(scene, state, form.read(temporary).gaussians)
         if not measured >= form.least_psnr_db:
             raise OutputError(
                 f"{file}: expected images as in the scene, at least {form.least_psnr_db:g} dB, got "

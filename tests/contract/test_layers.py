@@ -33,6 +33,8 @@ OPTIONAL = (
     "tensorboard",
     "onnx",
     "uvicorn",
+    "zstandard",
+    "pxr",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 
