@@ -53,10 +53,11 @@ def write_ply_sequence(
     folder: Path | str,
     times_s: Sequence[float],
     advance: Callable[[], None] = lambda: None,
+    compare: Callable[[Sequence[Path]], None] = lambda files: None,
 ) -> list[Path]:
     """Write ``frame_0000.ply`` and so on, one per time; all of them appear, or none.
 
-    ``advance`` is called after each.
+    ``advance`` is called after each, ``compare`` with all of them before they appear.
 
     Raises:
         InputError: no times, or a state that is not finite.
@@ -72,6 +73,7 @@ def write_ply_sequence(
             encoded = _encode_frame(scene, times_s, index, target)
             (staging / target.name).write_bytes(encoded)
             advance()
+        compare([staging / target.name for target in targets])
     return targets
 
 
