@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from diff4splat.errors import ConfigError
+from diff4splat.io.onnx_package import onnx_package
 
 LEAST_ELEMENTS = 40_000
 """Smaller weights stay: with them scenes of ``small`` are at 34 dB instead of 39, and they hardly
@@ -41,22 +42,23 @@ def convert_precision(file: Path, precision: str) -> None:
 
 
 def _to_float16(file: Path) -> None:
-    import onnx
-    from onnx import TensorProto, numpy_helper
+    onnx = onnx_package()
 
     model = onnx.load(file)
     graph = model.graph
     for stored in [entry for entry in graph.initializer if _is_large(entry)]:
-        half = numpy_helper.to_array(stored).astype(np.float16)
+        half = onnx.numpy_helper.to_array(stored).astype(np.float16)
         graph.initializer.remove(stored)
-        graph.initializer.append(numpy_helper.from_array(half, f"{stored.name}_float16"))
+        graph.initializer.append(onnx.numpy_helper.from_array(half, f"{stored.name}_float16"))
         inputs, outputs = [f"{stored.name}_float16"], [stored.name]
-        graph.node.insert(0, onnx.helper.make_node("Cast", inputs, outputs, to=TensorProto.FLOAT))
+        graph.node.insert(
+            0, onnx.helper.make_node("Cast", inputs, outputs, to=onnx.TensorProto.FLOAT)
+        )
     _save(model, file)
 
 
 def _to_int8_dynamic(file: Path) -> None:
-    import onnx
+    onnx = onnx_package()
     from onnxruntime.quantization import QuantType, quantize_dynamic
 
     model = onnx.load(file)
@@ -80,8 +82,7 @@ def _no_advice(record: logging.LogRecord) -> bool:
 
 
 def _to_int8_weights(file: Path) -> None:
-    import onnx
-    from onnx import numpy_helper
+    onnx = onnx_package()
 
     model = onnx.load(file)
     graph, axes = model.graph, _weight_axes(model.graph)
@@ -89,10 +90,10 @@ def _to_int8_weights(file: Path) -> None:
         if stored.name not in axes:
             continue
         name, axis = stored.name, axes[stored.name]
-        whole, scale = quantized(numpy_helper.to_array(stored), axis)
+        whole, scale = quantized(onnx.numpy_helper.to_array(stored), axis)
         graph.initializer.remove(stored)
-        graph.initializer.append(numpy_helper.from_array(whole, f"{name}_int8"))
-        graph.initializer.append(numpy_helper.from_array(scale, f"{name}_scale"))
+        graph.initializer.append(onnx.numpy_helper.from_array(whole, f"{name}_int8"))
+        graph.initializer.append(onnx.numpy_helper.from_array(scale, f"{name}_scale"))
         inputs = [f"{name}_int8", f"{name}_scale"]
         graph.node.insert(0, onnx.helper.make_node("DequantizeLinear", inputs, [name], axis=axis))
     _save(model, file)
@@ -106,9 +107,9 @@ def _small_products(graph: object) -> list[str]:
 
 def _is_large(entry: object) -> bool:
     """Whether it is float32 and worth fewer bits."""
-    from onnx import TensorProto
+    onnx = onnx_package()
 
-    return entry.data_type == TensorProto.FLOAT and math.prod(entry.dims) >= LEAST_ELEMENTS
+    return entry.data_type == onnx.TensorProto.FLOAT and math.prod(entry.dims) >= LEAST_ELEMENTS
 
 
 def quantized(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
@@ -135,7 +136,7 @@ def _weight_axes(graph: object) -> dict[str, int]:
 
 
 def _save(model: object, file: Path) -> None:
-    import onnx
+    onnx = onnx_package()
 
     data = file.with_name(f"{file.name}.data")
     external = data.exists()

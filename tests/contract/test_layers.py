@@ -36,6 +36,8 @@ OPTIONAL = (
     "onnx",
     "uvicorn",
     "viser",
+    "zstandard",
+    "pxr",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 

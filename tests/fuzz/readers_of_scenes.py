@@ -5,6 +5,8 @@ from functools import partial
 from pathlib import Path
 
 import coded_scenes
+import foreign_files
+import numpy as np
 import oracles_fourdgs
 import oracles_hexplane
 import oracles_io
@@ -65,6 +67,30 @@ def _write_plys(folder: Path) -> None:
 
 def _write_spz(folder: Path) -> None:
     write_spz(random_gaussians(4, dtype=torch.float32), folder / "a.spz")
+
+
+def _write_spz4(folder: Path) -> None:
+    write_spz(random_gaussians(4, dtype=torch.float32), folder / "a.spz", version=4)
+
+
+def _write_foreign_plys(folder: Path) -> None:
+    cloud = random_gaussians(4, dtype=torch.float32)
+    (folder / "sharp.ply").write_bytes(foreign_files.sharp_ply(cloud))
+    (folder / "anysplat.ply").write_bytes(foreign_files.anysplat_ply(cloud))
+
+
+def _write_sequence(folder: Path) -> None:
+    for number, state in enumerate(foreign_files.moving_cloud(6, 3)):
+        write_ply(state, folder / f"frame_{number}.ply", comments=(f"time_s {number / 8:g}",))
+
+
+def _write_point_maps(folder: Path) -> None:
+    np.savez(folder / "a.npz", **foreign_files.point_maps())
+    np.savez_compressed(folder / "b.npz", **foreign_files.point_maps(1))
+
+
+def _import_each(folder: Path) -> None:
+    read_each(folder, lambda file: _shown(import_scene(file).scene))
 
 
 def _write_glb(folder: Path) -> None:
@@ -130,6 +156,20 @@ SCENES = {
     "scene hexplane": _scene(oracles_hexplane.file_scene),
     "scene coded": _scene(coded_scenes.scene, "standard"),
     "ply": Reader(make=_write_plys, read=_read_plys),
+    "ply of other programs": Reader(make=_write_foreign_plys, read=_import_each),
+    "ply compressed": Reader(
+        make=lambda folder: (folder / "a.ply").write_bytes(foreign_files.compressed_ply()),
+        read=_import_each,
+    ),
+    "ply spacetime": Reader(
+        make=lambda folder: (folder / "a.ply").write_bytes(foreign_files.spacetime_ply(3)),
+        read=_import_each,
+    ),
+    "ply sequence": Reader(
+        make=_write_sequence, read=lambda folder: _shown(import_scene(folder).scene)
+    ),
+    "point maps": Reader(make=_write_point_maps, read=_import_each),
+    "spz 4": Reader(make=_write_spz4, read=lambda folder: read_spz(folder / "a.spz")),
     "spz": Reader(make=_write_spz, read=lambda folder: read_spz(folder / "a.spz")),
     "glb": Reader(make=_write_glb, read=lambda folder: read_glb(folder / "a.glb")),
     "camera paths": Reader(make=_write_paths, read=_read_paths),

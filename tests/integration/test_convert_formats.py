@@ -12,6 +12,7 @@ from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.io.splats.formats import SPLAT_FORMATS
 from diff4splat.io.splats.suffixes import SPLAT_SUFFIXES
 from diff4splat.outputs import splat_export
+from diff4splat.outputs.export_check import CheckRow, ExportCheck
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_there_and_back(
     out, again = tmp_path / f"a{suffix}", tmp_path / "again.safetensors"
     assert run(["convert", str(scene_file), "--out", str(out), "--time", "0.1"]) == 0
     said = capsys.readouterr().err
-    found = re.search(r"read again and rendered: ([\d.]+) dB", said)
+    found = re.search(r"read again by diff4splat and rendered: ([\d.]+) dB", said)
     assert float(found[1]) >= SPLAT_FORMATS[suffix].least_psnr_db
     assert "motion is left out" in said
     assert run(["convert", str(out), "-o", str(again)]) == 0
@@ -48,7 +49,9 @@ def test_there_and_back(
 def test_a_file_that_shows_something_else_never_appears(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
 ) -> None:
-    monkeypatch.setattr(splat_export, "worst_psnr_db", lambda *_: 37.0)
+    rows = (CheckRow(frame=0, time_s=0.0, psnr_db=37.0),)
+    low = ExportCheck(reader="a test", floor_db=38.0, rows=rows)
+    monkeypatch.setattr(splat_export, "check_states", lambda *_: low)
     assert run(["convert", str(scene_file), "--out", str(tmp_path / "a.spz")]) == 2
     assert "at least 38 dB, got 37.0 dB" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 class Render:
     """Render a scene along any camera path, at any time."""
 
-    scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene file", folder=False)]
-    """A scene file."""
+    scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene or checkpoint")]
+    """A scene file, or whatever `diff4splat convert` reads."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",))] = Path("render.mp4")
     """A video (.mp4, .webm, .gif, .webp), images (%04d.png), one image (.png) or depth (.exr); with
     --dataset, a folder."""
@@ -82,8 +82,8 @@ class Render:
         from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
         from diff4splat.cli.limits.rendering import apply, measured_loss_db, promise
         from diff4splat.cli.limits.stopwatch import Stopwatch
+        from diff4splat.io.checkpoints.import_scene import import_scene
         from diff4splat.io.movies.suffixes import is_movie
-        from diff4splat.io.scene_files.scene_file import load_scene
         from diff4splat.outputs.run_estimate import estimate_frames, require_fits
         from diff4splat.outputs.scene_folder import write_view
         from diff4splat.progress.run_log import RunLog
@@ -91,7 +91,10 @@ class Render:
         promised, watch = promise(self), Stopwatch.of_process()
         for line in promised.lines():
             note(line)
-        scene = load_scene(self.scene)
+        imported = import_scene(self.scene)
+        scene = imported.scene
+        for line in imported.notes:
+            note(line)
         require_scene_time(scene, self.time)
         path = self.chosen_path(scene)
         log = RunLog(phases=ConsolePhases())

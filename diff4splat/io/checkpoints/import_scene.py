@@ -1,36 +1,36 @@
-"""Scenes from files of other programs: checkpoints that move, and Gaussians of one moment."""
+"""Scenes from files of other programs: chosen by what a file or folder holds."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import torch
-from jaxtyping import Float
-from torch import Tensor
-
 from diff4splat import __version__
-from diff4splat.errors import InputError
-from diff4splat.geometry.camera import focal_from_fov, pinhole
+from diff4splat.errors import FileFormatError, InputError
 from diff4splat.io.checkpoints.fourdgs_checkpoint import read_fourdgs_checkpoint
 from diff4splat.io.checkpoints.native_4dgs_checkpoint import read_native_4dgs_checkpoint
 from diff4splat.io.checkpoints.native_4dgs_import import from_raw_4d
+from diff4splat.io.imports.camera_path import default_path, static_path
+from diff4splat.io.imports.ply_sequence import numbered_files, read_ply_sequence
+from diff4splat.io.imports.point_maps import read_point_maps
+from diff4splat.io.ply.ply_file import read_spacetime_ply
 from diff4splat.io.scene_files.scene_file import load_scene
 from diff4splat.io.splats.formats import SPLAT_FORMATS
-from diff4splat.paths.camera_path import CameraPath
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.flip_book import flip_book
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.spacetime_conversion import to_spacetime
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 
 CHECKPOINT_SUFFIXES = (".pth", ".pt")
+POINT_MAP_SUFFIX, SCENE_NAME = ".npz", "scene.safetensors"
 FOURDGS_TIME_RANGE_S, NATIVE_TIME_RANGE_S = (0.0, 1.0), (-0.5, 0.5)
 """Default time ranges of the two programs."""
 MOMENT_TIME_RANGE_S = (0.0, 1.0)
 """How long the default path of a file of one moment lasts."""
-FPS, SIZE_PX, FOV_DEG = 24, (360, 640), 60.0
-"""Frame rate, image size and horizontal field of view of the default camera path."""
-_RADIUS_QUANTILE, _DISTANCE_IN_RADII = 0.9, 3.0
+FPS = 24.0
+"""Of numbered files and point maps that name no times."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,24 +43,45 @@ class ImportedScene:
 
 def is_checkpoint(source: Path) -> bool:
     """Whether ``source`` is a folder of 4DGaussians or a torch file."""
-    return source.is_dir() or source.suffix.lower() in CHECKPOINT_SUFFIXES
+    if source.is_dir():
+        return not (source / SCENE_NAME).is_file() and len(numbered_files(source)) < 2
+    return source.suffix.lower() in CHECKPOINT_SUFFIXES
 
 
-def import_scene(source: Path, time_range_s: tuple[float, float] | None = None) -> ImportedScene:
-    """Load a scene file, a checkpoint that moves, or a PLY, SPZ or GLB file of one moment.
+def import_scene(
+    source: Path,
+    time_range_s: tuple[float, float] | None = None,
+    fps: float = FPS,
+    advance: Callable[[], None] = lambda: None,
+) -> ImportedScene:
+    """Load a scene file, a checkpoint, Gaussians of one moment or several, or point maps.
 
     ``time_range_s`` is the time range of a checkpoint in seconds; None is the program's default.
+    ``fps`` gives times to files that name none. ``advance`` is called after each numbered file.
 
     Raises:
         FileFormatError: the input is missing, damaged, or of another format.
         InputError: the time range is impossible, or given for a scene file.
+        MissingExtraError: the format needs a package that is not installed.
     """
-    if not is_checkpoint(source):
-        if time_range_s is not None:
-            raise InputError("time range: expected with a checkpoint only, got a scene file")
-        if source.suffix.lower() in SPLAT_FORMATS:
-            return _import_moment(source)
-        return ImportedScene(scene=load_scene(source))
+    if is_checkpoint(source):
+        return _import_checkpoint(source, time_range_s)
+    if time_range_s is not None:
+        raise InputError("time range: expected with a checkpoint only, got a scene file")
+    if source.is_dir():
+        if (source / SCENE_NAME).is_file():
+            return ImportedScene(scene=load_scene(source / SCENE_NAME))
+        gaussians, motion, note = read_ply_sequence(numbered_files(source), fps, advance)
+        return ImportedScene(scene=_scene(gaussians, motion, "PLY sequence"), notes=(note,))
+    suffix = source.suffix.lower()
+    if suffix == POINT_MAP_SUFFIX:
+        return _import_point_maps(source, fps)
+    if suffix in SPLAT_FORMATS:
+        return _import_moment(source)
+    return ImportedScene(scene=load_scene(source))
+
+
+def _import_checkpoint(source: Path, time_range_s: tuple[float, float] | None) -> ImportedScene:
     if time_range_s is not None:
         _require_time_range(time_range_s)
     if source.is_dir():
@@ -68,35 +89,30 @@ def import_scene(source: Path, time_range_s: tuple[float, float] | None = None) 
     return _import_native(source, time_range_s or NATIVE_TIME_RANGE_S)
 
 
-def default_path(means: Float[Tensor, "n 3"], time_range_s: tuple[float, float]) -> CameraPath:
-    """A static camera outside the scene that looks along the z axis at the centre.
-
-    Checkpoints have no camera path. The path covers ``time_range_s`` at ``FPS`` frames per second.
-    """
-    start_s, stop_s = time_range_s
-    frames = max(2, round((stop_s - start_s) * FPS) + 1)
-    pose = torch.eye(4).repeat(frames, 1, 1)
-    pose[:, :3, 3] = _camera_position(means.float())
-    camera = pinhole(focal_from_fov(FOV_DEG, SIZE_PX[1]), SIZE_PX)
-    times_s = torch.linspace(start_s, stop_s, frames)
-    return CameraPath(cameras=camera.with_pose(pose), times_s=times_s)
-
-
-def _camera_position(means: Float[Tensor, "n 3"]) -> Float[Tensor, " 3"]:
-    """Three radii before the median of ``means``; a radius holds nine tenths of them."""
-    if len(means) == 0:
-        return torch.zeros(3)
-    center = means.median(0).values
-    distances = (means - center).norm(dim=-1).sort().values
-    radius = float(distances[int(_RADIUS_QUANTILE * (len(distances) - 1))]) or 1.0
-    return center - torch.tensor([0.0, 0.0, _DISTANCE_IN_RADII * radius])
-
-
 def _import_moment(file: Path) -> ImportedScene:
-    gaussians = SPLAT_FORMATS[file.suffix.lower()].read(file)
-    kind = file.suffix.lower().removeprefix(".").upper()
+    suffix = file.suffix.lower()
+    if suffix == ".ply" and (moving := read_spacetime_ply(file)) is not None:
+        scene = _scene(moving.gaussians, moving.motion, "Spacetime Gaussians")
+        return ImportedScene(scene=scene, notes=moving.notes)
+    content = SPLAT_FORMATS[suffix].read(file)
+    if not len(content.gaussians):
+        raise FileFormatError(f"{file}: expected at least one Gaussian, got none; export it again")
     motion = StaticMotion(time_range_s=MOMENT_TIME_RANGE_S)
-    return ImportedScene(scene=_scene(gaussians, motion, f"{kind} file"))
+    scene = _scene(content.gaussians, motion, f"{suffix.removeprefix('.').upper()} file")
+    if content.camera is None:
+        return ImportedScene(scene=scene, notes=content.notes)
+    path = static_path(content.camera, MOMENT_TIME_RANGE_S)
+    return ImportedScene(scene=replace(scene, path=path), notes=content.notes)
+
+
+def _import_point_maps(file: Path, fps: float) -> ImportedScene:
+    frames, times_s = read_point_maps(file, fps)
+    if len(frames) == 1:
+        motion: Motion = StaticMotion(time_range_s=MOMENT_TIME_RANGE_S)
+        return ImportedScene(scene=_scene(frames[0], motion, "point map"))
+    gaussians, motion = flip_book(frames, times_s)
+    note = f"{len(frames)} point maps are kept one by one: nothing is known of their motion"
+    return ImportedScene(scene=_scene(gaussians, motion, "point maps"), notes=(note,))
 
 
 def _import_fourdgs(folder: Path, time_range_s: tuple[float, float]) -> ImportedScene:

@@ -26,7 +26,9 @@ _LARGEST_LOG = 88.0
 """exp of more is infinite in float32."""
 _FLAT_SCALE = 1e-6
 """Third standard deviation of surfels (2DGS), whose files have only two."""
-_REST_COUNTS = (0, 9, 24, 45)
+_REST_COUNTS = (0, 9, 24, 45, 72)
+_KEPT_REST = 15
+"""Coefficients per channel that we use, up to degree 3."""
 _REQUIRED = (
     *("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
     *("scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3"),
@@ -69,7 +71,8 @@ def from_columns(columns: Mapping[str, np.ndarray]) -> Gaussians:
             raise FileFormatError(_missing(name, columns))
     rest_names = _rest_names(columns)
     dc = _read(columns, ["f_dc_0", "f_dc_1", "f_dc_2"])
-    rest = _read(columns, rest_names).reshape(len(dc), 3, len(rest_names) // 3)
+    kept = _kept(rest_names)
+    rest = _read(columns, kept).reshape(len(dc), 3, len(kept) // 3)
     return Gaussians(
         means=_read(columns, ["x", "y", "z"]).float(),
         quats=quaternion.normalize(_read(columns, ["rot_0", "rot_1", "rot_2", "rot_3"])).float(),
@@ -79,10 +82,23 @@ def from_columns(columns: Mapping[str, np.ndarray]) -> Gaussians:
     )
 
 
+def has_fourth_degree(columns: Mapping[str, np.ndarray]) -> bool:
+    """Whether there are harmonics of degree 4, which ``from_columns`` leaves out."""
+    return f"f_rest_{3 * _KEPT_REST}" in columns
+
+
 def _missing(name: str, columns: Mapping[str, np.ndarray]) -> str:
-    if "packed_position" in columns:
-        return "expected plain Gaussians, got a compressed PLY; expand it with SplatTransform"
-    return f"expected property '{name}', got a PLY without it; it does not hold Gaussians"
+    kind = "a point cloud or mesh" if "x" in columns else "other data"
+    return (
+        f"expected property '{name}', got {kind} without it; it does not hold Gaussians, "
+        "which the program that trained them can export"
+    )
+
+
+def _kept(rest_names: list[str]) -> list[str]:
+    """Those up to degree 3, of each channel."""
+    per_channel = len(rest_names) // 3
+    return [name for i, name in enumerate(rest_names) if i % max(per_channel, 1) < _KEPT_REST]
 
 
 def _rest_names(columns: Mapping[str, np.ndarray]) -> list[str]:
@@ -90,7 +106,7 @@ def _rest_names(columns: Mapping[str, np.ndarray]) -> list[str]:
     names = [f"f_rest_{i}" for i in range(count)]
     if count not in _REST_COUNTS or any(name not in columns for name in names):
         raise FileFormatError(
-            f"expected 0, 9, 24 or 45 properties f_rest_0, f_rest_1, ..., got {count}"
+            f"expected 0, 9, 24, 45 or 72 properties f_rest_0, f_rest_1, ..., got {count}"
         )
     return names
 

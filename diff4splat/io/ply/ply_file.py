@@ -5,6 +5,7 @@ no normals or harmonics, extra properties and elements). ``ply_columns`` has the
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,20 @@ import numpy as np
 from diff4splat import __version__
 from diff4splat.errors import FileFormatError, InputError, OutputError
 from diff4splat.io.atomic import atomic_folder, atomic_path
-from diff4splat.io.ply.ply_body import read_columns
-from diff4splat.io.ply.ply_columns import column_names, from_columns, to_table
+from diff4splat.io.ply.compressed_ply import from_compressed, is_compressed
+from diff4splat.io.ply.ply_body import read_columns, read_elements
+from diff4splat.io.ply.ply_columns import column_names, from_columns, has_fourth_degree, to_table
+from diff4splat.io.ply.ply_extras import camera_of, is_linear, time_of, with_srgb
 from diff4splat.io.ply.ply_header import read_header
+from diff4splat.io.ply.spacetime_ply import (
+    from_spacetime_columns,
+    has_color_network,
+    is_spacetime,
+)
 from diff4splat.io.require_file import read_bytes
+from diff4splat.io.splats.content import SplatContent
 from diff4splat.scene.gaussians import Gaussians
+from diff4splat.scene.motion.polynomial import PolynomialMotion
 from diff4splat.scene.scene import Scene
 
 _COMMENTS = (
@@ -43,10 +53,11 @@ def write_ply_sequence(
     folder: Path | str,
     times_s: Sequence[float],
     advance: Callable[[], None] = lambda: None,
+    compare: Callable[[Sequence[Path]], None] = lambda files: None,
 ) -> list[Path]:
     """Write ``frame_0000.ply`` and so on, one per time; all of them appear, or none.
 
-    ``advance`` is called after each.
+    ``advance`` is called after each, ``compare`` with all of them before they appear.
 
     Raises:
         InputError: no times, or a state that is not finite.
@@ -62,10 +73,16 @@ def write_ply_sequence(
             encoded = _encode_frame(scene, times_s, index, target)
             (staging / target.name).write_bytes(encoded)
             advance()
+        compare([staging / target.name for target in targets])
     return targets
 
 
 def read_ply(file: Path | str) -> Gaussians:
+    """The Gaussians of ``read_ply_content``."""
+    return read_ply_content(file).gaussians
+
+
+def read_ply_content(file: Path | str) -> SplatContent:
     """Read Gaussians, in float32, with activated values and unit quaternions.
 
     Raises:
@@ -74,9 +91,60 @@ def read_ply(file: Path | str) -> Gaussians:
     file = Path(file)
     data = read_bytes(file, "a PLY file")
     try:
-        return from_columns(read_columns(data, read_header(data), "vertex"))
+        return _decoded(data)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MovingPly:
+    """Gaussians of one file with their motion."""
+
+    gaussians: Gaussians
+    motion: PolynomialMotion
+    notes: tuple[str, ...]
+
+
+def read_spacetime_ply(file: Path) -> MovingPly | None:
+    """Spacetime Gaussians with their motion; None if the PLY holds others.
+
+    Raises:
+        FileFormatError: not a PLY, cut off, or with NaN in it.
+    """
+    data = read_bytes(file, "a PLY file")
+    try:
+        header = read_header(data)
+        names = {p.name for e in header.elements if e.name == "vertex" for p in e.properties}
+        if not is_spacetime(names):
+            return None
+        columns = read_columns(data, header, "vertex")
+        gaussians, motion = from_spacetime_columns(columns)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
+    network = "not imported: the colour network, a second file; colours are those without it"
+    notes = (network,) if has_color_network(names) else ()
+    return MovingPly(gaussians=gaussians, motion=motion, notes=notes)
+
+
+def _decoded(data: bytes) -> SplatContent:
+    header = read_header(data)
+    elements = read_elements(data, header, "vertex")
+    columns, notes = elements["vertex"], []
+    if is_compressed(columns):
+        gaussians = from_compressed(elements)
+    else:
+        gaussians = from_columns(columns)
+        if has_fourth_degree(columns):
+            notes.append("not imported: harmonics of degree 4")
+    if is_linear(elements):
+        gaussians = with_srgb(gaussians)
+        notes.append("colours were proportional to light and became sRGB")
+    return SplatContent(
+        gaussians=gaussians,
+        notes=tuple(notes),
+        camera=camera_of(elements),
+        time_s=time_of(header.comments),
+    )
 
 
 def _encode(gaussians: Gaussians, comments: Sequence[str], where: str) -> bytes:

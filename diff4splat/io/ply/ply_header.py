@@ -46,10 +46,12 @@ class Header:
     elements: tuple[Element, ...]
     data_start: int
     """Position of the first byte after the header."""
+    comments: tuple[str, ...] = ()
+    """The texts of comment lines."""
 
 
 def read_header(data: bytes) -> Header:
-    """Parse the header at the start of ``data``; comments are skipped.
+    """Parse the header at the start of ``data``.
 
     Raises:
         FileFormatError: not a PLY, no end, or a line that makes no sense.
@@ -57,10 +59,13 @@ def read_header(data: bytes) -> Header:
     lines, data_start = _lines(data)
     byte_order: str | None = None
     elements: list[Element] = []
+    comments: list[str] = []
     for line in lines:
         match line.split():
-            case [] | ["comment" | "obj_info", *_]:
+            case [] | ["obj_info", *_]:
                 continue
+            case ["comment", *words]:
+                comments.append(" ".join(words))
             case ["format", kind, _] if kind in _BYTE_ORDERS:
                 byte_order = _BYTE_ORDERS[kind]
             case ["element", name, count] if (
@@ -73,7 +78,12 @@ def read_header(data: bytes) -> Header:
                 raise FileFormatError(f"expected a PLY header line, got {line[:60]!r}")
     if byte_order is None:
         raise FileFormatError("expected a PLY 'format' line, got none")
-    return Header(byte_order=byte_order, elements=tuple(elements), data_start=data_start)
+    return Header(
+        byte_order=byte_order,
+        elements=tuple(elements),
+        data_start=data_start,
+        comments=tuple(comments),
+    )
 
 
 def _lines(data: bytes) -> tuple[list[str], int]:

@@ -10,7 +10,12 @@ from random import Random
 
 from fuzz.edits.byte_edits import BYTE_EDITS, BytesEdit
 from fuzz.edits.json_edits import JSON_EDITS, is_json
-from fuzz.edits.stream_edits import edit_glb_document, edit_gzip
+from fuzz.edits.stream_edits import (
+    edit_glb_document,
+    edit_gzip,
+    edit_ply_row,
+    edit_zstd_column,
+)
 from fuzz.edits.tensor_edits import odd_tensor
 
 DTYPES = (
@@ -147,6 +152,10 @@ def edits_of(content: bytes) -> dict[str, BytesEdit]:
         found |= _named(edit_chunk)
     if content.startswith(b"\x1f\x8b"):
         found |= _named(edit_gzip)
+    if content.startswith(b"NGSP"):
+        found |= _named(edit_zstd_column)
+    if content.startswith(b"ply\n") and b"end_header\n" in content:
+        found |= _named(edit_ply_row)
     if content.startswith(b"glTF"):
         found |= _named(edit_glb_document)
     return found

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from diff4splat.io.ply import ply_body
 from diff4splat.io.ply.ply_file import read_ply
 
 CORE = {
@@ -168,3 +169,13 @@ def test_harmonics_are_channel_major(tmp_path: Path, k: int) -> None:
     got = read_ply(tmp_path / "a.ply").sh
     want = torch.tensor([[channel * (k - 1) + i for channel in range(3)] for i in range(k - 1)])
     assert torch.equal(got[0, 1:], want.float())
+
+
+@pytest.mark.parametrize("block_bytes", [9, 16, 33, 1 << 22])
+def test_text_is_read_in_blocks_of_any_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block_bytes: int
+) -> None:
+    monkeypatch.setattr(ply_body, "_BLOCK_BYTES", block_bytes)
+    body = "\n\n".join("  ".join(f"{v:.6f}" for v in row.values()) + " " for row in rows(9))
+    (tmp_path / "a.ply").write_bytes(header("ascii", vertex(9, FLOATS)) + body.encode())
+    assert_core(tmp_path / "a.ply", 9)

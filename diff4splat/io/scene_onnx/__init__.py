@@ -1,0 +1,1 @@
+"""Scenes as ONNX graphs: time in, Gaussians out."""

@@ -1,0 +1,1 @@
+"""Scenes as OpenUSD stages with time samples."""
