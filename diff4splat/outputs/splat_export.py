@@ -11,7 +11,7 @@ from diff4splat.outputs.export_check import ExportCheck, check_states, require_f
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
-OWN_READER = "diff4splat"
+READER = "diff4splat"
 CHECKED_FILES = 3
 """Of a sequence."""
 _ADVICE = "choose .ply or .glb, which round nothing"
@@ -30,7 +30,7 @@ def export_moment(
         OutputError: the file shows something else than the scene, or cannot be written.
     """
     form, state = SPLAT_FORMATS[file.suffix.lower()], scene.state_at(time_s)
-    readers = {OWN_READER: lambda path: form.read(path).gaussians}
+    readers = {READER: lambda path: form.read(path).gaussians}
     if (second := second_reader(file)) is not None:
         readers[NAME] = second
     with atomic_path(file) as temporary:
@@ -59,7 +59,7 @@ def export_sequence(
     def compare(files: Sequence[Path]) -> None:
         by_time = {times_s[index]: files[index] for index in chosen}
         checks.append(
-            check_states(scene, lambda t: read_ply(by_time[t]), by_time, OWN_READER, floor_db)
+            check_states(scene, lambda t: read_ply(by_time[t]), by_time, READER, floor_db)
         )
         require_floor(checks, folder, _ADVICE)
 

@@ -93,6 +93,7 @@ FREE = {
     ("Render", "frame"): "depends on the scene",
     ("Render", "out"): "depends on --dataset",
     ("Convert", "out"): "depends on its ending",
+    ("Convert", "target"): "depends on its ending",
     ("Pack", "model"): "has a message of its own",
 }
 """(command, option) without a constraint of its own."""

@@ -54,7 +54,7 @@ class Convert:
     """Start and stop of a checkpoint's motion in seconds. Default: 0 1 for 4DGaussians, -0.5 0.5
     for native 4D Gaussians."""
     bake: bool = False
-    """Make any motion key frames, which all viewers play; says how far off they are."""
+    """Make any motion key frames, which all viewers play; prints their error in pixels."""
     spz_version: Literal[3, 4] = 3
     """Version of .spz; 4 needs zstandard."""
 
