@@ -82,7 +82,7 @@ def test_the_papers_fit_is_exact_without_a_shift_and_wrong_with_one() -> None:
         )
         fit = paper_depth_space(samples, grid_regions(samples, (20, 20)))
         error = np.median(np.abs((fit.scale / disparity + fit.shift) * inverse - 1))
-        assert (error < 1e-9) is is_exact
+        assert bool(error < 1e-9) == is_exact
 
 
 def test_samples_are_spread_over_log_depth() -> None:
