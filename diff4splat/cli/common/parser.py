@@ -4,6 +4,7 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.datasets.prepare_curation import PrepareAlign, PrepareCaptions, PrepareCurate
 from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -29,6 +30,9 @@ Prepare = (
     | Annotated[PrepareLatents, subcommand("latents")]
     | Annotated[PrepareImport, subcommand("import")]
     | Annotated[PrepareDoctor, subcommand("doctor")]
+    | Annotated[PrepareAlign, subcommand("align")]
+    | Annotated[PrepareCaptions, subcommand("captions")]
+    | Annotated[PrepareCurate, subcommand("curate")]
     | Annotated[PrepareCheck, subcommand("check")]
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]

@@ -176,7 +176,8 @@ def test_tracks_that_jump_or_leave_their_surface_are_not_reliable(static) -> Non
 
 
 def record(name: str, quality: int = 1, **labels: str) -> ClipRecord:
-    return ClipRecord(identifier=name, dataset="set", scores={"quality": float(quality)}, labels=labels)
+    scores = {"quality": float(quality)}
+    return ClipRecord(identifier=name, dataset="set", scores=scores, labels=labels)
 
 
 def test_the_best_of_several_alike_remains(static, dynamic) -> None:
