@@ -16,8 +16,8 @@ from diff4splat.data_prep.alignment.other_fits import (
 from diff4splat.data_prep.alignment.samples import (
     FitSamples,
     SampleSettings,
+    candidate_pixels,
     choose_samples,
-    usable_pixels,
 )
 
 SEEDS = range(8)
@@ -58,8 +58,8 @@ def relative_errors(scene: Scene, masked: bool) -> list[float]:
     """Median |z − z_true| / z_true over uncontaminated pixels, per method."""
     settings = SampleSettings()
     excluded = scene.contaminated if masked else np.zeros(SHAPE, bool)
-    usable = usable_pixels(scene.disparity, scene.reference, excluded, settings)
-    samples = choose_samples(scene.disparity, scene.reference, usable, settings)
+    candidates = candidate_pixels(scene.disparity, scene.reference, excluded, settings)
+    samples = choose_samples(scene.disparity, scene.reference, candidates, settings)
     good = ~scene.contaminated & (scene.disparity > 0)
     return [
         float(np.median(np.abs(method(scene, samples)[good] / scene.depth[good] - 1)))

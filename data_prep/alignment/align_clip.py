@@ -31,8 +31,8 @@ from diff4splat.data_prep.alignment.references.reference import Reference
 from diff4splat.data_prep.alignment.samples import (
     FitSamples,
     SampleSettings,
+    candidate_pixels,
     choose_samples,
-    usable_pixels,
 )
 from diff4splat.data_prep.alignment.scaling import scaled_clip
 from diff4splat.errors import InputError
@@ -74,11 +74,11 @@ def align_clip(
     Raises:
         InputError: other frames than the clip has, or too few samples for a fit.
     """
-    settings = settings or AlignmentSettings()
+    settings = _in_units_of(reference, settings or AlignmentSettings())
     view = clip.views[0]
     relative = fitted_size(disparity, (clip.frames, *clip.size_px))
-    usable = usable_pixels(relative, reference.depth, _excluded(view), settings.samples)
-    samples = choose_samples(relative, reference.depth, usable, settings.samples)
+    candidates = candidate_pixels(relative, reference.depth, _excluded(view), settings.samples)
+    samples = choose_samples(relative, reference.depth, candidates, settings.samples)
     depth, scale, refused = _fitted(relative, samples, settings)
     depth = np.where(_sky(view), 0, depth).astype(np.float32)
     scale = replace(
@@ -113,6 +113,15 @@ def fitted_size(
     size = (shape[2], shape[1])
     frames = [np.asarray(each, np.float32) for each in maps]
     return np.stack([cv2.resize(each, size, interpolation=cv2.INTER_LINEAR) for each in frames])
+
+
+def _in_units_of(reference: Reference, settings: AlignmentSettings) -> AlignmentSettings:
+    """Limits in metres mean nothing where lengths have no unit; the median depth stands in."""
+    known = reference.depth[reference.depth > 0]
+    if reference.metric != "none" or not len(known):
+        return settings
+    samples = replace(settings.samples, nearest=0.0, farthest=float("inf"))
+    return replace(settings, samples=samples, farthest=settings.farthest * float(np.median(known)))
 
 
 def _fitted(

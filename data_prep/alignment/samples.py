@@ -43,7 +43,7 @@ class FitSamples:
     """Row · width + column."""
 
 
-def usable_pixels(
+def candidate_pixels(
     disparity: Float[np.ndarray, "t h w"],
     depth: Float[np.ndarray, "t h w"],
     excluded: Bool[np.ndarray, "t h w"],
@@ -62,7 +62,7 @@ def usable_pixels(
 def choose_samples(
     disparity: Float[np.ndarray, "t h w"],
     depth: Float[np.ndarray, "t h w"],
-    usable: Bool[np.ndarray, "t h w"],
+    candidates: Bool[np.ndarray, "t h w"],
     settings: SampleSettings,
 ) -> FitSamples:
     """Up to ``settings.most`` samples, spread over log-depth.
@@ -70,7 +70,7 @@ def choose_samples(
     Raises:
         InputError: fewer samples than any fit needs.
     """
-    index = np.flatnonzero(usable)
+    index = np.flatnonzero(candidates)
     if len(index) < _FEWEST:
         raise InputError(
             f"alignment: expected at least {_FEWEST} pixels with disparity and reference depth "

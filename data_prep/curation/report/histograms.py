@@ -15,12 +15,14 @@ _TAILS = (0.5, 99.5)
 
 
 def histogram_svg(values: list[float], gates: list[Gate]) -> str:
-    """Bars, those outside of any gate in the colour of rejection, and one line per limit."""
+    """Bars, in the colour of rejection where most values fail a gate, and one line per limit."""
     low, high = _span(values, gates)
-    counts, edges = np.histogram(np.clip(values, low, high), _BINS, (low, high))
+    counts, _ = np.histogram(np.clip(values, low, high), _BINS, (low, high))
     tallest = max(int(counts.max()), 1)
+    passing = [value for value in values if _passes(value, gates)]
+    passed, _ = np.histogram(np.clip(passing, low, high), _BINS, (low, high))
     bars = "".join(
-        _bar(number, int(count), tallest, _passes((edges[number] + edges[number + 1]) / 2, gates))
+        _bar(number, int(count), tallest, bool(2 * passed[number] >= count))
         for number, count in enumerate(counts)
         if count
     )

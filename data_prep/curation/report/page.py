@@ -89,16 +89,20 @@ def _sections(
     yield "<h1>Curation report</h1><p>Which clips are selected for training, and why others are "
     yield "not. Nothing was deleted: change <code>thresholds.toml</code> and run again.</p>"
     yield '<nav><a href="#stages">Stages</a><a href="#sets">Data sets</a>'
-    yield '<a href="#scores">Scores</a><a href="#rejected">Rejected clips</a></nav>'
+    yield '<a href="#rejected">Rejected clips</a><a href="#scores">Scores</a></nav>'
     yield _tiles(decisions)
     counts = stage_counts(decisions)
     yield f'<h2 id="stages">Stages</h2><div class="card flow">{_flow(counts)}</div>'
     yield f'<h2 id="sets">Data sets</h2><p>Clips that each stage rejects.</p>{_table(decisions)}'
-    yield '<h2 id="scores">Scores</h2><p>Over all clips. Dashed lines are thresholds; a threshold '
-    yield "may hold for some clips alone. Bars beyond it are in the colour of rejection.</p>"
-    yield f'<div class="histograms">{_histograms(decisions, thresholds)}</div>'
     yield '<h2 id="rejected">Rejected clips</h2>'
     yield _rejected(decisions, images) or "<p>None: every clip is selected.</p>"
+    yield '<h2 id="scores">Scores</h2><p>Over all clips. Dashed lines are thresholds; a threshold '
+    yield "may hold for some clips alone. Bars beyond it are in the colour of rejection.</p>"
+    gated = list(dict.fromkeys(gate.score for gate in thresholds.gates))
+    others = sorted({name for each in decisions for name in each.record.scores} - set(gated))
+    yield _histograms(gated, decisions, thresholds)
+    yield "<details><summary>Scores without a threshold</summary>"
+    yield f"{_histograms(others, decisions, thresholds)}</details>"
     yield "<footer>Written by diff4splat prepare curate. The numbers are in scores.jsonl and "
     yield "decisions.csv.</footer>"
 
@@ -144,12 +148,12 @@ def _table(decisions: list[Decision]) -> str:
         selected = sum(each.is_selected for each in group)
         cells = "".join(_cell(each.rejected) for each in stage_counts(group))
         rows.append(
-            f"<tr><td>{escape(name)}</td><td>{len(group):,}</td>{cells}"
-            f"<td><b>{selected:,}</b></td><td>{selected / len(group):.0%}</td></tr>"
+            f"<tr><td>{escape(name)}</td><td>{len(group):,}</td><td><b>{selected:,}</b></td>"
+            f"<td>{selected / len(group):.0%}</td>{cells}</tr>"
         )
     return (
-        f'<div class="scroll"><table><thead><tr><th>data set</th><th>in</th>{head}<th>out</th>'
-        f"<th>share</th></tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+        f'<div class="scroll"><table><thead><tr><th>data set</th><th>in</th><th>out</th>'
+        f"<th>share</th>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
     )
 
 
@@ -157,11 +161,9 @@ def _cell(count: int) -> str:
     return f'<td class="bad">{count:,}</td>' if count else '<td class="zero">0</td>'
 
 
-def _histograms(decisions: list[Decision], thresholds: Thresholds) -> str:
-    gated = [gate.score for gate in thresholds.gates]
-    others = sorted({name for each in decisions for name in each.record.scores} - set(gated))
+def _histograms(scores: list[str], decisions: list[Decision], thresholds: Thresholds) -> str:
     cards = []
-    for score in dict.fromkeys([*gated, *others]):
+    for score in scores:
         values = values_of(decisions, score)
         if values:
             gates = [gate for gate in thresholds.gates if gate.score == score]
@@ -169,7 +171,7 @@ def _histograms(decisions: list[Decision], thresholds: Thresholds) -> str:
                 f'<div class="card"><b>{escape(score)}</b> <small>{len(values):,} clips</small>'
                 f"{histogram_svg(values, gates)}</div>"
             )
-    return "".join(cards)
+    return f'<div class="histograms">{"".join(cards)}</div>'
 
 
 def _rejected(decisions: list[Decision], images: dict[tuple[str, str], str | None]) -> str:

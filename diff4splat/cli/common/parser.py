@@ -4,7 +4,12 @@ from typing import Annotated
 
 import tyro
 
-from diff4splat.cli.datasets.prepare_curation import PrepareAlign, PrepareCaptions, PrepareCurate
+from diff4splat.cli.datasets.prepare_curation import (
+    PrepareAlign,
+    PrepareCaptions,
+    PrepareCurate,
+    PreparePoses,
+)
 from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -30,6 +35,7 @@ Prepare = (
     | Annotated[PrepareLatents, subcommand("latents")]
     | Annotated[PrepareImport, subcommand("import")]
     | Annotated[PrepareDoctor, subcommand("doctor")]
+    | Annotated[PreparePoses, subcommand("poses")]
     | Annotated[PrepareAlign, subcommand("align")]
     | Annotated[PrepareCaptions, subcommand("captions")]
     | Annotated[PrepareCurate, subcommand("curate")]

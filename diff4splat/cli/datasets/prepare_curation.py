@@ -6,9 +6,37 @@ from typing import Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.options.constraints import InputPath, Number, OutFolder, OutputFolder
+from diff4splat.cli.options.constraints import (
+    InputPath,
+    Number,
+    OutFolder,
+    OutputFile,
+    OutputFolder,
+)
 
 Shards = Annotated[Path, tyro.conf.Positional, InputPath(what="a folder of shards", file=False)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreparePoses:
+    """Estimate camera poses of a video by matching features; lengths have no unit."""
+
+    video: Annotated[Path, tyro.conf.Positional, InputPath(what="a video", folder=False)]
+    """Up to 300 frames of a mostly static scene, filmed by a camera that moves."""
+    out: Annotated[Path, OutputFile(suffixes=(".json",)), tyro.conf.arg(aliases=("-o",))]
+    """Pose file; NAME.json beside NAME.mp4 makes it a capture for prepare import."""
+    fov: Annotated[float, Number(least=10, most=150)] = 60.0
+    """Horizontal field of view in degrees; wrong values bend the path."""
+
+    def run(self) -> None:
+        """Follow the camera and write the poses."""
+        from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.data_prep.alignment.video_to_path import write_video_poses
+
+        with ConsolePhases().phase("estimate poses") as advance:
+            frames = write_video_poses(self.video, self.out, self.fov)
+            advance()
+        note(f"wrote {frames} poses to {self.out}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -67,6 +67,12 @@ def test_translations_are_multiplied_and_never_shifted(clip) -> None:
     assert after[0, :3, 3].abs().max() == 0
 
 
+def test_limits_in_metres_do_not_apply_without_a_unit(clip) -> None:
+    tiny = replace(reference(clip, factor=1e-3), metric="none")
+    found = align_clip(without_depth(clip), relative_disparity(clip), tiny).clip
+    assert median_error(found.views[0].depth * 1e3, clip.views[0].depth) < 1e-5
+
+
 def test_infinitely_far_and_sky_pixels_have_no_depth(clip) -> None:
     disparity = relative_disparity(clip)
     disparity[:, 0] = 0

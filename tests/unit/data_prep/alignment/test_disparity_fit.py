@@ -12,8 +12,8 @@ from diff4splat.data_prep.alignment.other_fits import grid_regions, paper_depth_
 from diff4splat.data_prep.alignment.samples import (
     FitSamples,
     SampleSettings,
+    candidate_pixels,
     choose_samples,
-    usable_pixels,
 )
 from diff4splat.errors import InputError
 
@@ -102,7 +102,7 @@ def test_excluded_infinite_and_edge_pixels_are_no_samples() -> None:
     depth[0, 1, 0] = np.inf
     excluded = np.zeros(depth.shape, bool)
     excluded[0, 2, 0] = True
-    usable = usable_pixels(disparity, depth, excluded, SampleSettings())
+    usable = candidate_pixels(disparity, depth, excluded, SampleSettings())
     assert not usable[0, :3, 0].any()
     assert not usable[0, :, 2:4].any()
     assert usable[0, 3, 0]
