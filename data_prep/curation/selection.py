@@ -1,20 +1,28 @@
-"""The selected clips as a folder of shards, copied byte for byte."""
+"""The selected clips as a folder of shards: byte for byte, or completed by masks and tracks."""
 
 from pathlib import Path
 
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
+from diff4splat.data_prep.curation.completion import completed
 from diff4splat.data_prep.curation.decisions import Decision
-from diff4splat.errors import InputError, OutputError
+from diff4splat.data_prep.rows import ReportRow, failed_row, write_rows
+from diff4splat.errors import InputError, MissingExtraError, OutputError
 from diff4splat.progress.phases import Phases
 
-GENERATOR = "prepare curate"
+GENERATOR, REPORT = "prepare curate", "report.csv"
 
 
 def write_selection(
-    decisions: list[Decision], folders: tuple[Path, ...], out: Path, phases: Phases
+    decisions: list[Decision],
+    folders: tuple[Path, ...],
+    out: Path,
+    phases: Phases,
+    complete: bool = False,
 ) -> int:
     """Write the selected clips that ``out`` lacks, in order; returns how many it then holds.
+
+    What became of each is in ``report.csv`` there.
 
     Raises:
         OutputError: ``out`` holds clips that are not selected: nothing is removed from it.
@@ -38,10 +46,24 @@ def write_selection(
                 f"selected now, such as '{odd[0]}'; choose another folder"
             )
         waiting = [record for record in selected if record.identifier not in writer.identifiers]
+        rows = []
         with phases.phase("write shards", len(waiting)) as advance:
             for record in waiting:
                 source = sources[record.folder]
-                position = places[record.folder][record.identifier]
-                writer.write(source.encoded(position))
+                place = places[record.folder][record.identifier]
+                rows.append(_written(source, place, writer, complete))
                 advance()
-    return len(selected)
+    write_rows(rows, out / REPORT)
+    return len(selected) - sum(row.status == "failed" for row in rows)
+
+
+def _written(source: ClipFolder, position: int, writer: ShardWriter, complete: bool) -> ReportRow:
+    name = source.identifiers[position]
+    try:
+        clip = completed(source.clip(position)) if complete else source.encoded(position)
+        writer.write(clip)
+    except (OutputError, MissingExtraError):
+        raise
+    except Exception as error:  # damaged since it was scored: no reason to end the run
+        return failed_row("", name, error)
+    return ReportRow(sequence="", clip=name, status="written")

@@ -104,14 +104,19 @@ class PrepareCurate:
     """Your quality model as module:function; takes three frames, returns a number."""
     shards: Annotated[Path | None, OutputFolder()] = None
     """Also copy the selected clips into this folder of shards."""
+    complete: bool = False
+    """With --shards: add estimated motion masks, and tracks chained from true flow and depth."""
     workers: Annotated[int, Number(least=1, most=256)] = 1
     """Number of scoring processes."""
 
     def check(self) -> None:
         """Read the thresholds before anything is scored."""
         from diff4splat.data_prep.curation.thresholds import read_thresholds
+        from diff4splat.errors import ConfigError
 
         read_thresholds(self.thresholds)
+        if self.complete and self.shards is None:
+            raise ConfigError("--complete: expected --shards FOLDER, got none; name the folder")
 
     def run(self) -> None:
         """Score, decide, write tables and report."""
@@ -133,7 +138,7 @@ class PrepareCurate:
         decisions = curate(job, phases)
         report = write_report(decisions, thresholds, self.clips, self.out, phases)
         if self.shards is not None:
-            write_selection(decisions, self.clips, self.shards, phases)
+            write_selection(decisions, self.clips, self.shards, phases, self.complete)
         selected = sum(each.is_selected for each in decisions)
         note(f"selected {selected} of {len(decisions)} clips; open {report}")
 

@@ -110,6 +110,9 @@ def test_selected_clips_are_copied_byte_for_byte(clips, tmp_path) -> None:
     before = (tmp_path / "shards" / "shard-00000.tar").read_bytes()
     write_selection(decisions, (clips,), tmp_path / "shards", Phases())
     assert (tmp_path / "shards" / "shard-00000.tar").read_bytes() == before
+    damaged = [replace(d, reasons=()) for d in decisions if d.record.identifier == "damaged"]
+    assert write_selection(damaged, (clips,), tmp_path / "bad", Phases()) == 0
+    assert "damaged,failed,FileFormatError" in (tmp_path / "bad" / "report.csv").read_text()
     fewer = [d for d in decisions if d.record.identifier != "moving"]
     with pytest.raises(OutputError, match="not selected now, such as 'moving'"):
         write_selection(fewer, (clips,), tmp_path / "shards", Phases())

@@ -7,8 +7,10 @@ import pytest
 import torch
 from textured_clips import textured_clip, without_depth
 
+from diff4splat.data.checks import require_valid_clip
 from diff4splat.data.clip import Clip, Flow
 from diff4splat.data_prep.curation.clip_record import ClipRecord, record_of
+from diff4splat.data_prep.curation.completion import completed
 from diff4splat.data_prep.curation.decisions import decide
 from diff4splat.data_prep.curation.duplicates import duplicates_of
 from diff4splat.data_prep.curation.scoring import STAGES, score_clip
@@ -173,6 +175,17 @@ def test_tracks_that_jump_or_leave_their_surface_are_not_reliable(static) -> Non
     assert not reliable_tracks(damaged)[good].any()
     kept = without_tracks(damaged, reliable_tracks(damaged))
     assert kept.tracks.positions.shape[1] == int(reliable_tracks(damaged).sum())
+
+
+def test_completion_adds_masks_and_tracks_and_changes_nothing_exact(static, dynamic) -> None:
+    blind = replace(dynamic, views=(replace(dynamic.views[0], moving=None),))
+    found, true = completed(blind).views[0].moving, dynamic.views[0].moving
+    assert (found & true).sum() > 0.6 * (found | true).sum()
+    tracked = completed(with_true_flow(static))
+    assert tracked.note.track_source == "chained"
+    require_valid_clip(tracked)
+    exact = replace(tracked, note=replace(tracked.note, track_source="exact"))
+    assert completed(exact) is exact
 
 
 def record(name: str, quality: int = 1, **labels: str) -> ClipRecord:
