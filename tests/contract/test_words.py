@@ -42,7 +42,6 @@ COMMANDS = (
     *("generate", "fit", "render", "bake", "convert", "inspect", "train", "pack", "eval", "doctor"),
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
     *("prepare import", "prepare doctor"),
-    *("prepare align", "prepare captions", "prepare curate"),
     *("prepare align", "prepare captions", "prepare curate", "prepare poses"),
     *("report error-time", "report knobs"),
 )
