@@ -1,7 +1,5 @@
 """A copy of a data set into a folder of shards; what is unusable becomes a row of a report."""
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -17,12 +15,11 @@ from diff4splat.data_prep.datasets.registry import (
     find_dataset,
     list_sequences,
 )
+from diff4splat.data_prep.rows import ReportRow, failed_row, write_rows
 from diff4splat.errors import InputError, MissingExtraError, OutputError
-from diff4splat.io.atomic import write_text
 from diff4splat.progress.phases import Phases
 
 REPORT = "report.csv"
-_COLUMNS = ("sequence", "clip", "status", "error", "message")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,19 +33,6 @@ class ImportJob:
     coding: Coding = field(default_factory=Coding)
     most_sequences: int | None = None
     append: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReportRow:
-    """What became of one clip, or of a sequence that gave none."""
-
-    sequence: str
-    clip: str = ""
-    status: str
-    """``written``, ``present`` or ``failed``."""
-    error: str = ""
-    """Name of the error, such as ``FileFormatError``."""
-    message: str = ""
 
 
 def import_dataset(job: ImportJob, phases: Phases) -> tuple[ReportRow, ...]:
@@ -70,7 +54,7 @@ def import_dataset(job: ImportJob, phases: Phases) -> tuple[ReportRow, ...]:
                     rows += _imported(sequence, job, writer)
                     advance()
         finally:
-            _write_report(rows, job.folder / REPORT)
+            write_rows(rows, job.folder / REPORT)
     return tuple(rows)
 
 
@@ -82,7 +66,7 @@ def _imported(listed: ListedSequence, job: ImportJob, writer: ShardWriter) -> It
     except (OutputError, MissingExtraError):
         raise
     except Exception as error:  # one damaged sequence must not end a run of days
-        yield _failed(listed.name, "", error)
+        yield failed_row(listed.name, "", error)
 
 
 def _written(sequence: str, clip: ListedClip, writer: ShardWriter) -> ReportRow:
@@ -93,26 +77,8 @@ def _written(sequence: str, clip: ListedClip, writer: ShardWriter) -> ReportRow:
     except (OutputError, MissingExtraError):
         raise
     except Exception as error:  # as above
-        return _failed(sequence, clip.identifier, error)
+        return failed_row(sequence, clip.identifier, error)
     return ReportRow(sequence=sequence, clip=clip.identifier, status="written")
-
-
-def _failed(sequence: str, clip: str, error: Exception) -> ReportRow:
-    return ReportRow(
-        sequence=sequence,
-        clip=clip,
-        status="failed",
-        error=type(error).__name__,
-        message=" ".join(str(error).split()),
-    )
-
-
-def _write_report(rows: list[ReportRow], file: Path) -> None:
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(_COLUMNS)
-    table.writerows([getattr(row, name) for name in _COLUMNS] for row in rows)
-    write_text(file, text.getvalue())
 
 
 def summary(rows: tuple[ReportRow, ...]) -> str:

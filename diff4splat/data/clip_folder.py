@@ -4,6 +4,7 @@ No file stays open between two reads, so that a folder can be sent to, or inheri
 worker processes as wanted. Reading one clip is one open and one seek per member.
 """
 
+import hashlib
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from diff4splat.data.checks import require_valid_clip
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_part import FULL_CLIP, ClipPart
 from diff4splat.data.codecs.decode import decode_clip, wanted_members
+from diff4splat.data.codecs.encode import EncodedClip, Member
+from diff4splat.data.codecs.metadata import decode_metadata
 from diff4splat.data.entry import ClipEntry
 from diff4splat.data.licenses import commercial_ok
 from diff4splat.data.manifest import Manifest, read_manifest
@@ -104,6 +107,29 @@ class ClipFolder:
             return self._checked(decode_clip(members, entry, part))
         except FileFormatError as error:
             raise FileFormatError(f"{reader.file}: clip '{entry.identifier}', {error}") from error
+
+    def checksum(self, position: int) -> str:
+        """Of the stored clip, by the checksums of its members: equal for equal bytes.
+
+        Raises:
+            FileFormatError: the index of the shard is missing or damaged.
+        """
+        reader, entry = self._places[position]
+        slots = reader.slots(entry.identifier)
+        text = " ".join(f"{name} {slot.size} {slot.crc32}" for name, slot in sorted(slots.items()))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def encoded(self, position: int) -> EncodedClip:
+        """One clip as it is stored, to be copied into other shards.
+
+        Raises:
+            FileFormatError: the shard is missing or damaged; names shard, clip and member.
+        """
+        reader, entry = self._places[position]
+        content = reader.read(entry.identifier, reader.slots(entry.identifier))
+        source = decode_metadata(content["meta.json"], entry).source
+        members = tuple(Member(suffix=suffix, content=each) for suffix, each in content.items())
+        return EncodedClip(entry=entry, source=source, members=members)
 
     def check(self) -> None:
         """Read every byte of every clip and compare checksums; indices must match the manifest.

@@ -69,6 +69,11 @@ prepare import nowhere --dataset spring --out folder
 prepare import folder --dataset spring --out folder --frames 1
 prepare doctor nowhere --dataset spring
 prepare doctor folder --dataset spring --out folder
+prepare align nowhere --out folder --reference tracks
+prepare align folder --out folder --reference megasam
+prepare curate nowhere --out folder
+prepare poses nowhere.mp4 --out poses.json
+prepare captions folder --out folder
 train --config nowhere --stage vae
 train --config small --stage nowhere
 train --config small --stage vae --clips nowhere

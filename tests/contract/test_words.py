@@ -42,6 +42,7 @@ COMMANDS = (
     *("generate", "fit", "render", "bake", "convert", "inspect", "train", "pack", "eval", "doctor"),
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
     *("prepare import", "prepare doctor"),
+    *("prepare align", "prepare captions", "prepare curate", "prepare poses"),
     *("report error-time", "report knobs", "report stability"),
 )
 

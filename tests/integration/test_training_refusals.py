@@ -231,7 +231,7 @@ def test_no_room_for_a_shard(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         (("--clips", "0"), ("--clips", "got 0")),
         (("--workers", "0"), ("--workers", "at least 1", "got 0")),
         (("--size", "3"), ("size", "8 to 4096", "got 3")),
-        (("--frames", "1"), ("frames", "2 to 1000", "got 1")),
+        (("--frames", "0"), ("frames", "1 to 1000", "got 0")),
         (("--views", "0"), ("views", "1 to 8", "got 0")),
         (("--tracks", "-1"), ("tracks", "at least 0", "got -1")),
         (("--still-share", "2"), ("--still-share", "0 to 1", "got 2")),

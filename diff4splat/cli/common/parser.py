@@ -6,6 +6,12 @@ import tyro
 
 from diff4splat.cli.calibration.calibrate import Calibrate
 from diff4splat.cli.calibration.skipped import Skipped
+from diff4splat.cli.datasets.prepare_curation import (
+    PrepareAlign,
+    PrepareCaptions,
+    PrepareCurate,
+    PreparePoses,
+)
 from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -32,6 +38,10 @@ Prepare = (
     | Annotated[PrepareLatents, subcommand("latents")]
     | Annotated[PrepareImport, subcommand("import")]
     | Annotated[PrepareDoctor, subcommand("doctor")]
+    | Annotated[PreparePoses, subcommand("poses")]
+    | Annotated[PrepareAlign, subcommand("align")]
+    | Annotated[PrepareCaptions, subcommand("captions")]
+    | Annotated[PrepareCurate, subcommand("curate")]
     | Annotated[PrepareCheck, subcommand("check")]
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]

@@ -6,7 +6,7 @@ from multiprocessing import get_context
 
 import pytest
 import torch
-from clip_reading import depth_sum
+from clip_readback import depth_sum
 from oracles_clips import make_clip
 
 from diff4splat.data.clip_folder import ClipFolder, Selection

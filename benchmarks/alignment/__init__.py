@@ -1,0 +1,1 @@
+"""Alignment of relative disparity under contamination, method beside method."""

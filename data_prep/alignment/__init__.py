@@ -1,0 +1,1 @@
+"""Relative disparity to metric depth: fits, gates, references, files of other tools."""

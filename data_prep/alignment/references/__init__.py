@@ -1,0 +1,1 @@
+"""Depth that a relative disparity can be fitted to: one map per frame, 0 where unknown."""

@@ -1,0 +1,1 @@
+"""Scores of clips, thresholds that are applied last, and the report on both."""

@@ -1,0 +1,1 @@
+"""Captions from side-car files or from a user's model, into the records of clips."""

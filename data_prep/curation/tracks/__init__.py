@@ -1,0 +1,1 @@
+"""Which tracks can be trusted, and tracks out of flow."""
