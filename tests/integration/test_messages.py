@@ -67,9 +67,7 @@ def test_a_format_that_is_not_written_is_no_folder(
 ) -> None:
     out = tmp_path / "x.splat"
     assert run(["convert", str(scene_file), "--out", str(out)]) == 2
-    assert "expected a name ending in .ply, .spz, .glb, .safetensors, or a folder" in last_line(
-        capsys
-    )
+    assert "expected a name ending in .ply, .spz, .glb, .safetensors, .usdc" in last_line(capsys)
     assert not out.exists()
     out.mkdir()
     assert run(["convert", str(scene_file), "--out", str(out), "--fps", "2"]) == 0
