@@ -71,7 +71,7 @@ def test_a_format_that_is_not_written_is_no_folder(
     assert not out.exists()
     out.mkdir()
     assert run(["convert", str(scene_file), "--out", str(out), "--fps", "2"]) == 0
-    assert len(list(out.iterdir())) == 3
+    assert len(list(out.glob("*.ply"))) == 3
 
 
 @pytest.mark.parametrize("name", ["view.mp4", "view.MOV", "absent.webm"])
