@@ -165,6 +165,16 @@ APPROXIMATIONS = (
         label_meaning="steps",
     ),
     Approximation(
+        name="subpixel-infill",
+        subject="scene",
+        summary="Gaussians between the pixels of the image",
+        fields=("GenerationSettings.subpixel_infill",),
+        values=(False, True),
+        default=True,
+        reference=True,
+        apply=set_field("subpixel_infill"),
+    ),
+    Approximation(
         name="static-threshold",
         subject="scene",
         summary="no key times for what hardly moves",

@@ -8,10 +8,12 @@ import torch
 
 from diff4splat.errors import OutputError
 from diff4splat.io.atomic import atomic_path
+from diff4splat.io.scene_files.compression import Compression
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.io.scene_onnx.scene_onnx_file import SceneOnnxReader, write_scene_onnx
 from diff4splat.io.usd.sample_times import MAX_TIMES, between_s, sample_times_s
 from diff4splat.io.usd.usd_file import UsdReader, write_usd
+from diff4splat.outputs.compressed_scene import LEAST_PSNR_DB
 from diff4splat.outputs.export_check import ExportCheck, check_states, require_floor
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.bake import bake_within
@@ -81,7 +83,9 @@ def export_onnx(scene: Scene, file: Path) -> tuple[tuple[ExportCheck, ...], floa
     return (check,), error
 
 
-def export_scene_file(scene: Scene, file: Path) -> tuple[ExportCheck, ...]:
+def export_scene_file(
+    scene: Scene, file: Path, compression: Compression = "lossless"
+) -> tuple[ExportCheck, ...]:
     """Write a scene file, read it again and compare.
 
     Raises:
@@ -89,11 +93,12 @@ def export_scene_file(scene: Scene, file: Path) -> tuple[ExportCheck, ...]:
         OutputError: the file shows something else than the scene, or cannot be written.
     """
     with atomic_path(file) as temporary:
-        save_scene(scene, temporary)
+        save_scene(scene, temporary, compression)
         state_at = load_scene(temporary).state_at
         times_s = checked_times_s(scene)
-        check = check_states(scene, state_at, times_s, "diff4splat", SCENE_FLOOR_DB)
-        require_floor([check], file, "report this scene")
+        floor_db = SCENE_FLOOR_DB if compression == "lossless" else LEAST_PSNR_DB
+        check = check_states(scene, state_at, times_s, "diff4splat", floor_db)
+        require_floor([check], file, "write it with --compression lossless")
     return (check,)
 
 

@@ -13,8 +13,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
+from diff4splat.io.atomic import atomic_folder
 from diff4splat.io.exr import write_depth_exr
 from diff4splat.io.figures.contact_sheet import SheetContent, contact_sheet
+from diff4splat.io.movies.animations import require_numbered
 from diff4splat.io.movies.background_movie import BackgroundMovie
 from diff4splat.io.movies.suffixes import is_movie
 from diff4splat.io.photos.images import write_png
@@ -132,7 +134,7 @@ def write_view(
             frames = render_video(
                 scene, path, outputs=("depth",), settings=settings, advance=advance
             )
-            write_depth_exr(torch.stack([frame.depth for frame in frames]), path, file)
+            _write_depth(torch.stack([frame.depth for frame in frames]), path, file)
         return ()
     record = FilmRecord(path=path, with_depth=False, settings=settings)
     notes: tuple[str, ...] = ()
@@ -142,6 +144,19 @@ def write_view(
         write_png(next(film(scene, record, log)), file)
     empty = empty_note(scene, record)
     return notes if empty is None else (*notes, empty)
+
+
+def _write_depth(depth: Float[Tensor, "t h w"], path: CameraPath, file: Path) -> None:
+    """One file of all frames, or a file per frame where the name has a number."""
+    if "%" not in file.name:
+        write_depth_exr(depth, path, file)
+        return
+    require_numbered(file)
+    with atomic_folder(file.parent) as staging:
+        for number in range(len(path)):
+            frame = slice(number, number + 1)
+            single = replace(path, cameras=path.cameras[frame], times_s=path.times_s[frame])
+            write_depth_exr(depth[frame], single, staging / (file.name % number))
 
 
 def require_view_suffix(file: Path) -> str:

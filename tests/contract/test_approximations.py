@@ -14,6 +14,7 @@ PACKAGES = ("diff4splat", "models", "training", "data_prep", "configs")
 CLASSES = {cls.__name__: cls for module in DECLARING for cls in module.SETTINGS_CLASSES}
 CHOICES = {name: why for module in DECLARING for name, why in module.USER_CHOICES.items()}
 ELSEWHERE = {
+    "AlignmentSettings": "preparation of training data",
     "DataSettings": "a recipe of training: decides which weights come out",
     "DrawSettings": "ground truth of drawn worlds",
     "ExportSettings": "which files an export writes",
@@ -21,6 +22,7 @@ ELSEWHERE = {
     "PathSettings": "where cameras go: what is asked for",
     "RasterSettings": "`RenderSettings` as kernels read them",
     "RunSettings": "where and how long a training runs",
+    "SampleSettings": "preparation of training data",
     "ServerSettings": "limits of the server",
     "SourceSettings": "a recipe of training",
     "TrainerSettings": "a recipe of training",

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import foreign_files
 import pytest
+import torch
 from filmed_scenes import filmed_scene
 
 from diff4splat.cli.main import run
+from diff4splat.io.exr import read_depth_exr
 from diff4splat.io.scene_files.scene_file import load_scene, save_scene
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.spacetime import SpacetimeMotion
@@ -36,6 +38,15 @@ def test_the_check_is_stored(
     assert len({row["frame"] for row in check["rows"]}) == 3
 
 
+def test_a_scene_file_can_be_compressed(tmp_path: Path) -> None:
+    scene, out = tmp_path / "scene.safetensors", tmp_path / "small.safetensors"
+    save_scene(filmed_scene(3, side=60), scene)
+    assert run(["convert", str(scene), str(out), "--compression", "small"]) == 0
+    check = json.loads((tmp_path / "small.safetensors.check.json").read_text())["checks"][0]
+    assert check["floor_db"] == 45.0 <= check["worst_db"]
+    assert out.stat().st_size < 0.5 * scene.stat().st_size
+
+
 def test_a_sequence_goes_out_and_comes_back_as_key_frames(scene_file: Path, tmp_path: Path) -> None:
     assert run(["convert", str(scene_file), str(tmp_path / "frames"), "--fps", "10"]) == 0
     assert (tmp_path / "frames" / "check.json").exists()
@@ -59,6 +70,15 @@ def test_images_and_pages_are_outputs_too(scene_file: Path, tmp_path: Path) -> N
     for name in ("a.html", "a.png", "a.gif", "a.exr"):
         assert run(["convert", str(scene_file), str(tmp_path / name)]) == 0
         assert (tmp_path / name).stat().st_size > 100
+
+
+def test_depth_can_be_numbered_files(scene_file: Path, tmp_path: Path) -> None:
+    assert run(["render", str(scene_file), "--out", str(tmp_path / "all.exr")]) == 0
+    assert run(["render", str(scene_file), "--out", str(tmp_path / "d" / "%04d.exr")]) == 0
+    whole, _ = read_depth_exr(tmp_path / "all.exr")
+    files = sorted((tmp_path / "d").glob("*.exr"))
+    assert [file.name for file in files] == ["0000.exr", "0001.exr", "0002.exr"]
+    assert torch.equal(torch.cat([read_depth_exr(file)[0] for file in files]), whole)
 
 
 def test_one_output_is_needed(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:

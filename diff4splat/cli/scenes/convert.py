@@ -55,6 +55,8 @@ class Convert:
     for native 4D Gaussians."""
     bake: bool = False
     """Make any motion key frames, which all viewers play; prints their error in pixels."""
+    compression: Literal["lossless", "standard", "small"] = "lossless"
+    """Of a scene file: without loss, without visible loss, or smaller still."""
     spz_version: Literal[3, 4] = 3
     """Version of .spz; 4 needs zstandard."""
 
@@ -138,7 +140,7 @@ class Convert:
                 checks, error = moving_export.export_onnx(scene, self.file)
                 detail += f", numbers at most {error:.1e} off"
             else:
-                checks = moving_export.export_scene_file(scene, self.file)
+                checks = moving_export.export_scene_file(scene, self.file, self.compression)
         note(f"wrote {self.file} ({detail})")
         self._report(checks, (*lost, *more))
 

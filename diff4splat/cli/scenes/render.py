@@ -34,8 +34,8 @@ class Render:
     scene: Annotated[Path, tyro.conf.Positional, InputPath(what="a scene or checkpoint")]
     """A scene file, or whatever `diff4splat convert` reads."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",))] = Path("render.mp4")
-    """A video (.mp4, .webm, .gif, .webp), images (%04d.png), one image (.png) or depth (.exr); with
-    --dataset, a folder."""
+    """A video (.mp4, .webm, .gif, .webp), images (%04d.png), one image (.png) or depth (.exr,
+    %04d.exr); with --dataset, a folder."""
     camera: str | None = None
     """Camera presets or a path file. Default: the path in the scene file."""
     time: Annotated[float | None, Number()] = None

@@ -54,8 +54,7 @@ def write_sequence(
         InputError, ShapeError: as ``write_video``.
         OutputError: the folder cannot be written, or the disk is full.
     """
-    if len(_NUMBER.findall(file.name)) != 1 or file.name.count("%") != 1:
-        raise ConfigError(f"--out: expected one number such as %04d in the name, got {file.name}")
+    require_numbered(file)
     first, rest = first_frame(frames, file, fps)
     with atomic_folder(file.parent) as staging:
         count, frame = 0, first
@@ -66,6 +65,16 @@ def write_sequence(
             advance()
             frame = next(rest, None)
     return ()
+
+
+def require_numbered(file: Path) -> None:
+    """Require one number in the name of a sequence.
+
+    Raises:
+        ConfigError: the name has no or several numbers.
+    """
+    if len(_NUMBER.findall(file.name)) != 1 or file.name.count("%") != 1:
+        raise ConfigError(f"--out: expected one number such as %04d in the name, got {file.name}")
 
 
 def _images(
