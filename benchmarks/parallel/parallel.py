@@ -3,8 +3,8 @@
 Run ``python benchmarks/parallel/parallel.py --out FOLDER``, with ``--factory module:function`` for
 another stage than the toy. The function takes nothing and returns (Stage, Samples, StageRecipe).
 All modes take the same global batch; the first steps of each do not count, and the median of the
-rest does. Memory is the peak before the last step, above that of an idle process with everything imported, or
-what PyTorch allocated on a GPU. Writes ``parallel.md`` and ``parallel.json``.
+rest does. Memory is the peak before the last step, above that of an idle process with everything
+imported, or what PyTorch allocated on a GPU. Writes ``parallel.md`` and ``parallel.json``.
 """
 
 import argparse
