@@ -2,8 +2,10 @@
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 # As the command line does, and before torch is loaded: waiting threads sleep.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -12,6 +14,9 @@ import jaxtyping
 import pytest
 import torch
 from hypothesis import HealthCheck, settings
+
+# Benchmarks are run from the root and belong to no package.
+sys.path.append(str(Path(__file__).parents[1]))
 
 # A busy machine is slow, which is no failure.
 settings.register_profile("any_load", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -373,11 +373,10 @@ def test_gaussians_that_cannot_be_drawn_are_counted_once(
 
 
 def test_commands_that_draw_nothing_load_no_compiler(tmp_path: Path) -> None:
-    scene, files = str(scene_file(tmp_path)), str(tmp_path / "files")
+    scene = str(scene_file(tmp_path))
     code = (
         "import sys\nfrom diff4splat.cli.main import run\n"
         f"assert run(['inspect', {scene!r}]) == 0\n"
-        f"assert run(['convert', {scene!r}, '--out', {files!r}]) == 0\n"
         "assert run(['paths', 'list']) == 0\n"
         "assert run(['report', 'knobs']) == 0\n"
         "assert 'numba' not in sys.modules\n"

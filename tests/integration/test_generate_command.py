@@ -166,7 +166,7 @@ def test_a_field_of_view_overrides_and_is_reported(photo: Path, tmp_path: Path) 
 def test_a_scene_that_stands_still_is_one_ply_file(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "sequence"
     assert run(["convert", str(folder / "scene.safetensors"), "--out", str(out)]) == 0
-    assert [file.name for file in out.iterdir()] == ["frame_0000.ply"]
+    assert sorted(file.name for file in out.iterdir()) == ["check.json", "frame_0000.ply"]
 
 
 def test_a_second_run_leaves_no_file_of_the_first_beside_its_own(
@@ -194,7 +194,7 @@ def test_a_moving_model_goes_all_the_way(photo: Path, tmp_path: Path, frames: in
     assert len(card["provenance"]["weights_sha256"]) == 64
     scene_file = str(out / "scene.safetensors")
     assert run(["convert", scene_file, "--out", str(tmp_path / "ply")]) == 0
-    assert len(list((tmp_path / "ply").iterdir())) == frames
+    assert len(list((tmp_path / "ply").glob("*.ply"))) == frames
     scene = load_scene(out / "scene.safetensors")
     last_s, camera = float(scene.path.times_s[-1]), scene.path.cameras[0]
     expected = render(scene, camera, last_s).rgb

@@ -56,7 +56,7 @@ class Convert:
     bake: bool = False
     """Make any motion key frames, which all viewers play; prints their error in pixels."""
     compression: Literal["lossless", "standard", "small"] = "lossless"
-    """Of a scene file: without loss, without visible loss, or smaller still."""
+    """Of a scene file: without loss, without visible loss, or smallest."""
     spz_version: Literal[3, 4] = 3
     """Version of .spz; 4 needs zstandard."""
 
