@@ -78,8 +78,8 @@ def require_batch(loaded: Loaded) -> Batch:
         reasons = Counter(failure.reason for failure in loaded.failures)
         listed = "; ".join(f"{count} × {reason}" for reason, count in reasons.most_common())
         raise InputError(
-            f"{loaded.failures[-1].message} (sample {loaded.failures[-1].sample}: expected a usable "
-            f"one among {MOST_ATTEMPTS} tries, got {listed}; check the data source)"
+            f"{loaded.failures[-1].message} (sample {loaded.failures[-1].sample}: expected a "
+            f"usable one among {MOST_ATTEMPTS} tries, got {listed}; check the data source)"
         )
     return loaded.batch
 
