@@ -1,5 +1,6 @@
 """Every recipe by name."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -44,10 +45,43 @@ def find_recipe(name_or_file: str) -> Recipe:
         raise ConfigError(f"--config {name_or_file}: {error}") from error
 
 
+WeightedFolder = tuple[Path, float]
+"""A folder of shards and its share of the samples, relative to the others."""
+
+
 def with_clips(recipe: Recipe, folder: Path) -> Recipe:
     """The recipe with every source replaced by a folder of shards; shares of static clips stay."""
+    return with_mixture(recipe, [(folder, 1.0)])
+
+
+def with_mixture(recipe: Recipe, folders: Sequence[WeightedFolder]) -> Recipe:
+    """The recipe with every source replaced by folders of shards, mixed by weight."""
+    stages = [replace(stage, data=_from_folders(stage.data, folders)) for stage in recipe.stages]
+    return replace(recipe, stages=tuple(stages))
+
+
+def weighted_folder(text: str) -> WeightedFolder:
+    """``FOLDER`` or ``FOLDER:WEIGHT``; a folder that exists is never split.
+
+    Raises:
+        ConfigError: the weight is not a number above 0.
+    """
+    path, separator, weight = text.rpartition(":")
+    if not separator or Path(text).is_dir():
+        return Path(text), 1.0
+    try:
+        value = float(weight)
+    except ValueError:
+        return Path(text), 1.0
+    if not 0 < value < math.inf:
+        raise ConfigError(f"--clips {text}: expected a weight above 0, got {weight}")
+    return Path(path), value
+
+
+def for_commercial_use(recipe: Recipe) -> Recipe:
+    """The recipe that reads no clip of a licence not known to allow commercial use."""
     stages = [
-        replace(stage, data=_from_folder(stage.data, folder.resolve())) for stage in recipe.stages
+        replace(stage, data=replace(stage.data, commercial_only=True)) for stage in recipe.stages
     ]
     return replace(recipe, stages=tuple(stages))
 
@@ -65,6 +99,10 @@ def with_latents(recipe: Recipe, stage: str, folders: Sequence[Path]) -> Recipe:
     return replace(recipe, stages=stages)
 
 
-def _from_folder(data: DataSettings, folder: Path) -> DataSettings:
-    sources = [replace(source, kind="shards", folder=str(folder)) for source in data.sources]
+def _from_folders(data: DataSettings, folders: Sequence[WeightedFolder]) -> DataSettings:
+    sources = [
+        replace(source, kind="shards", folder=str(folder.resolve()), weight=source.weight * weight)
+        for source in data.sources
+        for folder, weight in folders
+    ]
     return replace(data, sources=tuple(sources))

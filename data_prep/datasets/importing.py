@@ -1,5 +1,6 @@
 """A copy of a data set into a folder of shards; what is unusable becomes a row of a report."""
 
+import hashlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -33,6 +34,9 @@ class ImportJob:
     coding: Coding = field(default_factory=Coding)
     most_sequences: int | None = None
     append: bool = False
+    task: int = 0
+    """Which of ``tasks`` parts to import: every sequence belongs to one, by its name."""
+    tasks: int = 1
 
 
 def import_dataset(job: ImportJob, phases: Phases) -> tuple[ReportRow, ...]:
@@ -44,7 +48,7 @@ def import_dataset(job: ImportJob, phases: Phases) -> tuple[ReportRow, ...]:
         MissingExtraError: the format needs a package that is not installed.
     """
     dataset = find_dataset(job.dataset)
-    listed = list_sequences(dataset, job.root)[: job.most_sequences]
+    listed = of_task(list_sequences(dataset, job.root)[: job.most_sequences], job)
     options = ShardOptions(generator=f"import of {dataset.facts.title}", coding=job.coding)
     rows: list[ReportRow] = []
     with ShardWriter(job.folder, options, job.append) as writer:
@@ -56,6 +60,19 @@ def import_dataset(job: ImportJob, phases: Phases) -> tuple[ReportRow, ...]:
         finally:
             write_rows(rows, job.folder / REPORT)
     return tuple(rows)
+
+
+def of_task(listed: list[ListedSequence], job: ImportJob) -> list[ListedSequence]:
+    """The sequences of one task; they do not depend on the order in which a disk lists them."""
+    if job.tasks == 1:
+        return listed
+    chosen = [one for one in listed if _task_of(one.name, job.tasks) == job.task]
+    return sorted(chosen, key=lambda one: one.name)
+
+
+def _task_of(name: str, tasks: int) -> int:
+    digest = hashlib.sha256(name.encode(errors="replace")).digest()
+    return int.from_bytes(digest[:8], "big") % tasks
 
 
 def _imported(listed: ListedSequence, job: ImportJob, writer: ShardWriter) -> Iterator[ReportRow]:

@@ -24,8 +24,11 @@ class Train:
     """Stage to train, such as vae; another name is refused with a list of the recipe's stages."""
     out: OutFolder = Path("training-run")
     """Folder of the run, with one subfolder per stage."""
-    clips: Annotated[Path | None, InputPath(what="a folder of shards", file=False)] = None
-    """Folder of shards to train on. Default: the procedural worlds of the recipe."""
+    clips: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Folder of shards to train on, or FOLDER:WEIGHT; repeatable: folders are mixed by weight.
+    Default: the procedural worlds of the recipe."""
+    commercial_only: bool = False
+    """Leave out clips whose licence is not known to allow commercial use."""
     latents: Annotated[
         tuple[Path, ...], InputPath(what="a folder of encoded clips", file=False)
     ] = ()
@@ -89,16 +92,31 @@ class Train:
         Raises:
             ConfigError: no such recipe, stage or setting.
         """
-        from diff4splat.configs.recipes import find_recipe, with_clips, with_latents
+        from diff4splat.configs.recipes import (
+            find_recipe,
+            for_commercial_use,
+            with_latents,
+            with_mixture,
+        )
         from diff4splat.training.recipe.overrides import override
 
         recipe = override(find_recipe(self.config), [one for given in self.set for one in given])
-        if self.clips is not None:
-            recipe = with_clips(recipe, self.clips)
+        if self.clips:
+            recipe = with_mixture(recipe, self._folders())
+        if self.commercial_only:
+            recipe = for_commercial_use(recipe)
         if self.latents:
             recipe = with_latents(recipe, self.stage, self.latents)
         recipe.stage(self.stage)
         return recipe
+
+    def _folders(self) -> list[tuple[Path, float]]:
+        from diff4splat.configs.recipes import weighted_folder
+
+        folders = [weighted_folder(text) for text in self.clips]
+        for folder, _ in folders:
+            InputPath(what="a folder of shards", file=False).check("--clips", folder)
+        return folders
 
     def starting_model(self) -> "Model | None":
         """The model that stands in for stages that were not run."""

@@ -75,7 +75,12 @@ def cropped(clip: Clip, size_px: tuple[int, int], generator: torch.Generator) ->
             f"{size_px[0]}×{size_px[1]}, got {clip.size_px[0]}×{clip.size_px[1]}; lower crop_px"
         )
     top, left = (int(torch.randint(space + 1, (), generator=generator)) for space in room)
-    views = tuple(_window(view, (top, left), size_px) for view in clip.views)
+    return cut_out(clip, (top, left), size_px)
+
+
+def cut_out(clip: Clip, corner: tuple[int, int], size_px: tuple[int, int]) -> Clip:
+    """The window of (height, width) at (top, left) of all frames and views."""
+    views = tuple(_window(view, corner, size_px) for view in clip.views)
     tracks = None if clip.tracks is None else drop_projections(clip.tracks)
     return replace(clip, views=views, tracks=tracks)
 

@@ -42,6 +42,8 @@ class ClipBatch:
     """Relative displacement of every cell (``motion_field``), extended from those that move."""
     moving: Bool[Tensor, "b h w"]
     """Pixels of the first frame that move."""
+    motion_known: Bool[Tensor, " b"]
+    """Whether ``field`` and ``moving`` are the truth; otherwise they are 0 and teach nothing."""
     is_static: Bool[Tensor, " b"]
     captions: tuple[str, ...]
 

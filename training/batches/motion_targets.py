@@ -20,14 +20,37 @@ def pixel_motion(clip: Clip, input_stride: int) -> Float[Tensor, "3 t h w"]:
     """Relative displacement of every pixel of the first frame, in the unit of ``motion_field``.
 
     The clip is in model units and its first camera is the identity. ``input_stride`` is the number
-    of clip frames per frame of the video. A clip without masks or tracks counts as static.
+    of clip frames per frame of the video. 0 where ``motion_known`` is False.
     """
     view = clip.views[INPUT_VIEW]
     field = torch.zeros(3, _latent_frames(clip, input_stride), *clip.size_px)
-    if clip.motion_truth == "objects":
-        _fill(field, view, clip.tracks, TIME_STRIDE * input_stride)
+    if clip.motion_truth != "objects" or not motion_known(clip, input_stride):
+        return field
+    _fill(field, view, clip.tracks, TIME_STRIDE * input_stride)
     depth = view.depth[0].float()
     return torch.where(depth > 0, field / depth.clamp_min(1e-6), 0.0) / UNIT
+
+
+def motion_known(clip: Clip, input_stride: int) -> bool:
+    """Whether the clip tells the motion of every pixel: absent masks do not mean stillness.
+
+    True for static clips, and with depth and masks of objects whose tracks have points that are
+    known in all latent frames.
+    """
+    view, tracks = clip.views[INPUT_VIEW], clip.tracks
+    if clip.motion_truth != "objects":
+        return clip.motion_truth == "static"
+    if view.depth is None:
+        return False
+    lasting = _lasting(tracks, TIME_STRIDE * input_stride)
+    return set(tracks.instances.tolist()) == set(tracks.instances[lasting].tolist())
+
+
+def _lasting(tracks: Tracks, stride: int) -> Bool[Tensor, " n"]:
+    """Points that the source has in every latent frame."""
+    if tracks.known is None:
+        return torch.ones(tracks.positions.shape[1], dtype=torch.bool)
+    return tracks.known[::stride].all(0)
 
 
 def moving_mask(motion: Float[Tensor, "3 t h w"]) -> Bool[Tensor, "h w"]:
@@ -64,9 +87,10 @@ def _latent_frames(clip: Clip, input_stride: int) -> int:
 def _fill(field: Float[Tensor, "3 t h w"], view: View, tracks: Tracks, stride: int) -> None:
     """Write the displacement of every pixel of a moving object into ``field``."""
     displacement = (tracks.positions[::stride] - tracks.positions[:1]).float()
-    moves = displacement.norm(dim=-1).amax(0) > MIN_MOTION
+    lasting = _lasting(tracks, stride)
+    moves = (displacement.norm(dim=-1).amax(0) > MIN_MOTION) & lasting
     for instance in tracks.instances[moves].unique():
-        points = (tracks.instances == instance).nonzero()[:, 0]
+        points = ((tracks.instances == instance) & lasting).nonzero()[:, 0]
         rows, columns = (view.instances[0] == instance).nonzero(as_tuple=True)
         pixels = torch.stack([columns, rows], -1).float() + 0.5
         nearest = torch.cdist(pixels, view.track_uv[0, points].float()).argmin(1)

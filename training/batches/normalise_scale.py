@@ -15,6 +15,27 @@ from diff4splat.data.clip import Clip, View
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import Camera
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.training.recipe.data import DataSettings
+
+
+def in_unit(clip: Clip, settings: DataSettings) -> Clip:
+    """The clip in the unit of the recipe; a metric clip in metres keeps its lengths.
+
+    Without any depth map the farthest camera is 1 from the first: images alone tell no scale.
+
+    Raises:
+        InputError: too little depth, or metres are wanted and the clip does not have them.
+    """
+    if settings.unit == "median_depth":
+        if clip.views[0].depth is None:
+            return rescaled(clip, 1 / (_travel(clip) or 1))
+        return normalized(clip, settings.min_valid_depth)
+    if clip.note.metric in ("exact", "aligned"):
+        return clip
+    raise InputError(
+        f"clip {clip.note.identifier}: expected lengths in metres, got metric "
+        f"'{clip.note.metric}'; align the clip or train with data.unit=median_depth"
+    )
 
 
 def normalized(clip: Clip, min_valid_depth: float = 0.01) -> Clip:
@@ -24,6 +45,14 @@ def normalized(clip: Clip, min_valid_depth: float = 0.01) -> Clip:
         InputError: too few pixels of the first input frame have a depth.
     """
     return rescaled(clip, PLANE_DEPTH / typical_depth(clip, min_valid_depth))
+
+
+def _travel(clip: Clip) -> float:
+    """Greatest distance of a camera of the clip from the first; below 1e-6 it counts as 0."""
+    first = clip.views[0].cameras.world_from_camera[0, :3, 3]
+    away = [(v.cameras.world_from_camera[:, :3, 3] - first).norm(dim=-1).max() for v in clip.views]
+    farthest = float(max(away))
+    return farthest if farthest > 1e-6 else 0.0
 
 
 def typical_depth(clip: Clip, min_valid_depth: float) -> float:

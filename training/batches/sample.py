@@ -3,7 +3,7 @@
 Axes: ``f`` frames, ``h w`` pixels. Everything random comes from the generator of the sample's key.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import torch
 from jaxtyping import Float
@@ -16,14 +16,15 @@ from diff4splat.training.batches.augment import augmented
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.motion_targets import (
     extend_to_all_cells,
+    motion_known,
     moving_mask,
     pixel_motion,
 )
-from diff4splat.training.batches.normalise_scale import normalized
-from diff4splat.training.batches.resize import resized
+from diff4splat.training.batches.normalise_scale import in_unit
+from diff4splat.training.batches.resize import fitted
 from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
-from diff4splat.training.batches.temporal_crop import crop, repeat_keyframes
-from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.batches.temporal_crop import at_frame_rate, crop, repeat_keyframes
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
 from diff4splat.training.stage import SampleKey
 
 
@@ -33,6 +34,7 @@ class Origin:
 
     key: SampleKey
     source: str
+    settings: SourceSettings = field(default_factory=SourceSettings)
 
 
 def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch:
@@ -42,25 +44,31 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         InputError: the clip is too short, has too little depth, or another shape than asked for.
     """
     generator = origin.key.generator()
-    _require_views(clip, settings.views)
-    clip = resized(_window(clip, settings, generator), settings.size_px)
+    clip = fitted(_window(clip, settings, generator), settings.size_px)
     clip = augmented(clip, settings, generator)
-    clip = normalized(clip, settings.min_valid_depth)
-    targets = draw_targets(clip.frames, len(clip.views[: settings.views]), settings, generator)
+    clip = in_unit(clip, settings)
+    targets = draw_targets(
+        clip.frames,
+        len(clip.views[: settings.views]),
+        settings,
+        generator,
+        is_static=clip.note.is_static,
+    )
     if not (settings.supervise_motion or clip.note.is_static):
-        targets = replace(targets, frames=torch.zeros_like(targets.frames))
+        targets = targets.at_first_frame()
     tracks = draw_tracks(clip, targets.frames, settings, generator)
     motion = pixel_motion(clip, settings.input_stride)
     moving = moving_mask(motion)
+    depths = [_depth(clip, number, origin) for number in range(len(clip.views))]
     view, shown = clip.views[INPUT_VIEW], slice(None, None, settings.input_stride)
     return ClipBatch(
         sample_index=torch.tensor([origin.key.sample]),
         source=(origin.source,),
         video=view.rgb[None, shown],
         cameras=stack_cameras([view.cameras[shown]]).to(torch.float32),
-        depth=view.depth[None, shown][:, :: settings.keyframe_stride].float(),
-        target_rgb=_images(clip, targets, "rgb")[None],
-        target_depth=_images(clip, targets, "depth").float()[None],
+        depth=depths[INPUT_VIEW][None, shown][:, :: settings.keyframe_stride],
+        target_rgb=_images([view.rgb for view in clip.views], targets)[None],
+        target_depth=_images(depths, targets)[None],
         target_cameras=stack_cameras([_target_cameras(clip, targets)]).to(torch.float32),
         target_time=_fractions(clip, targets, generator)[None],
         track_cell=tracks.cell[None],
@@ -68,6 +76,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         track_valid=tracks.valid[None],
         field=extend_to_all_cells(motion, moving)[None],
         moving=moving[None],
+        motion_known=torch.tensor([motion_known(clip, settings.input_stride)]),
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
     )
@@ -75,6 +84,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
 
 def _window(clip: Clip, settings: DataSettings, generator: torch.Generator) -> Clip:
     if not settings.keyframes_only:
+        clip = at_frame_rate(clip, settings.fps, settings.clip_frames)
         return crop(clip, settings.clip_frames, generator)
     if clip.frames != settings.clip_frames:
         raise InputError(
@@ -84,28 +94,25 @@ def _window(clip: Clip, settings: DataSettings, generator: torch.Generator) -> C
     return repeat_keyframes(clip, settings.keyframe_spacing)
 
 
-def _require_views(clip: Clip, views: int) -> None:
-    """Clips of one view have samples of another shape than clips of several."""
-    if len(clip.views) == 1 < views:
-        raise InputError(
-            f"clip {clip.note.identifier}: expected at least 2 views, got 1; "
-            "leave the clip out or train with data.views=1"
-        )
+def _depth(clip: Clip, number: int, origin: Origin) -> Float[Tensor, "f h w"]:
+    """Depth that may teach: 0 where the view has none, or the source's loss leaves it out."""
+    depth, rule = clip.views[number].depth, origin.settings.depth_loss
+    left_out = rule == "never" or (rule == "true" and clip.note.metric == "pseudo")
+    if depth is None or left_out:
+        return torch.zeros(clip.frames, *clip.size_px)
+    return depth.float()
 
 
-def _images(clip: Clip, targets: Targets, name: str) -> Tensor:
+def _images(views: list[Tensor], targets: Targets) -> Tensor:
     """One kind of image at every target, with axes ``m p`` in front."""
-    rows = [
-        torch.stack([getattr(clip.views[view], name)[frame] for view in views])
-        for frame, views in targets.pairs()
-    ]
+    rows = [torch.stack([views[view][frame] for view, frame in row]) for row in targets.images()]
     return torch.stack(rows)
 
 
 def _target_cameras(clip: Clip, targets: Targets) -> Camera:
     rows = [
-        stack_cameras([clip.views[view].cameras[frame] for view in views])
-        for frame, views in targets.pairs()
+        stack_cameras([clip.views[view].cameras[frame] for view, frame in row])
+        for row in targets.images()
     ]
     return stack_cameras(rows)
 

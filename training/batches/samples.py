@@ -4,12 +4,13 @@ The trainer asks for indices; everything else follows from them, the seed and th
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import torch
 
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
-from diff4splat.training.batches.sources import EndlessClips, open_source
+from diff4splat.training.batches.sources import EndlessClips, open_mixture
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
@@ -17,7 +18,9 @@ from diff4splat.training.stage import SampleKey
 class ClipSamples:
     """A mixture of sources as samples of one shape."""
 
-    def __init__(self, recipe: StageRecipe, seed: int, sources: Sequence[EndlessClips]) -> None:
+    def __init__(
+        self, recipe: StageRecipe, seed: int, sources: Sequence[EndlessClips | None]
+    ) -> None:
         self.recipe = recipe
         self.seed = seed
         self.sources = tuple(sources)
@@ -29,8 +32,8 @@ class ClipSamples:
         Raises:
             InputError, FileFormatError: a folder is not one of shards.
         """
-        data = recipe.data
-        return cls(recipe, seed, [open_source(source, data, seed) for source in data.sources])
+        opened, data = open_mixture(recipe.data, seed)
+        return cls(replace(recipe, data=data), seed, opened)
 
     def __getitem__(self, sample_index: int) -> ClipBatch:
         """A batch of one.
@@ -41,7 +44,9 @@ class ClipSamples:
         number = self._source(sample_index)
         key = SampleKey(self.seed, self.recipe.name, sample_index, "sample")
         clip = self.sources[number].clip(sample_index)
-        return make_sample(clip, self.recipe.data, Origin(key=key, source=self._name(number)))
+        settings = self.recipe.data.sources[number]
+        origin = Origin(key=key, source=self._name(number), settings=settings)
+        return make_sample(clip, self.recipe.data, origin)
 
     def collate(self, samples: list[ClipBatch]) -> ClipBatch:
         """Samples as one batch."""

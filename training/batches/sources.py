@@ -4,6 +4,7 @@ A source answers any index from 0; training and evaluation never share a clip: w
 have indices from EVALUATION_START on, and a folder keeps its last clips back for it.
 """
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -51,12 +52,10 @@ class WorldClips:
 class FolderClips:
     """A folder of shards, shuffled anew in every epoch."""
 
-    def __init__(
-        self, settings: SourceSettings, views: int, seed: int, in_memory: bool = False
-    ) -> None:
+    def __init__(self, settings: SourceSettings, data: DataSettings, seed: int) -> None:
         self.folder = Path(settings.folder)
-        self.views = views
-        self.kept: dict[int, Clip] | None = {} if in_memory else None
+        self.views, self.selection = data.views, Selection(commercial_only=data.commercial_only)
+        self.kept: dict[int, Clip] | None = {} if data.in_memory else None
         self.order = ShuffledIndices(settings.still_share, seed)
 
     @cached_property
@@ -81,7 +80,9 @@ class FolderClips:
 
     @cached_property
     def _places(self) -> IndicesByMotion:
-        return split_by_motion([entry.is_static for entry in self.clips.entries])
+        chosen = self.clips.positions(self.selection)
+        split = split_by_motion([self.clips.entries[place].is_static for place in chosen])
+        return {kind: [chosen[place] for place in places] for kind, places in split.items()}
 
 
 def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> EndlessClips:
@@ -93,15 +94,51 @@ def open_source(settings: SourceSettings, data: DataSettings, seed: int) -> Endl
     if settings.kind == "worlds":
         return world_clips(settings, data, seed)
     # A missing folder stops the run now, not every sample later.
-    _require_clips(ClipFolder(settings.folder), settings)
-    return FolderClips(settings, data.views, seed, data.in_memory)
+    _require_clips(ClipFolder(settings.folder), settings, data.commercial_only)
+    return FolderClips(settings, data, seed)
 
 
-def _require_clips(clips: ClipFolder, settings: SourceSettings) -> None:
-    """The folder has clips of every kind that samples will ask for."""
-    stills = len(clips.positions(Selection(is_static=True)))
+def open_mixture(data: DataSettings, seed: int) -> tuple[list[EndlessClips | None], DataSettings]:
+    """The sources of a stage, and the settings that they fit.
+
+    In a mixture a folder of static clips alone gives static ones, one of moving clips alone gives
+    moving ones, and one without clips of the kind that the stage asks for has weight 0.
+
+    Raises:
+        InputError, FileFormatError: as ``open_source``, or no folder has a clip for the stage.
+    """
+    if len(data.sources) > 1:
+        data = replace(data, sources=tuple(_fitting(source, data) for source in data.sources))
+    opened = [open_source(one, data, seed) if one.weight else None for one in data.sources]
+    return opened, data
+
+
+def _fitting(settings: SourceSettings, data: DataSettings) -> SourceSettings:
+    """The settings with the share of static clips that the folder can give, or weight 0."""
+    if settings.kind != "shards" or not settings.weight:
+        return settings
+    clips, commercial = ClipFolder(settings.folder), data.commercial_only
+    stills = len(clips.positions(Selection(is_static=True, commercial_only=commercial)))
+    moving = len(clips.positions(Selection(is_static=False, commercial_only=commercial)))
     share = settings.still_share
-    needed = {"still": (stills, share > 0, 0), "moving": (len(clips) - stills, share < 1, 1)}
+    if not (stills and share > 0) and not (moving and share < 1):
+        return replace(settings, weight=0.0)
+    if not stills or not moving:
+        return replace(settings, still_share=float(stills > 0))
+    return settings
+
+
+def _require_clips(clips: ClipFolder, settings: SourceSettings, commercial: bool) -> None:
+    """The folder has clips of every kind that samples will ask for."""
+    usable = len(clips.positions(Selection(commercial_only=commercial)))
+    stills = len(clips.positions(Selection(is_static=True, commercial_only=commercial)))
+    share = settings.still_share
+    needed = {"still": (stills, share > 0, 0), "moving": (usable - stills, share < 1, 1)}
+    if len(clips) and not usable:
+        raise InputError(
+            f"{settings.folder}: expected clips for commercial use, got none of {len(clips)}; "
+            "leave the folder out or set data.commercial_only=false"
+        )
     if not len(clips):
         raise InputError(f"{settings.folder}: expected clips, got none; prepare some")
     for kind, (count, wanted, other) in needed.items():

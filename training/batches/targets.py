@@ -25,10 +25,18 @@ class Targets:
 
     frames: Int[Tensor, " m"]
     views: Int[Tensor, "m p"]
+    image_frames: Int[Tensor, "m p"]
+    """Frame of each image: that of its row, or another frame of a static clip."""
 
-    def pairs(self) -> list[tuple[int, list[int]]]:
-        """(frame, its views) in order."""
-        return list(zip(self.frames.tolist(), self.views.tolist(), strict=True))
+    def images(self) -> list[list[tuple[int, int]]]:
+        """(view, frame) of every image, by row."""
+        rows = zip(self.views.tolist(), self.image_frames.tolist(), strict=True)
+        return [list(zip(views, frames, strict=True)) for views, frames in rows]
+
+    def at_first_frame(self) -> "Targets":
+        """The same views, all of the first frame."""
+        still = torch.zeros_like(self.image_frames)
+        return Targets(frames=torch.zeros_like(self.frames), views=self.views, image_frames=still)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,16 +49,28 @@ class TrackTargets:
 
 
 def draw_targets(
-    frames: int, views: int, settings: DataSettings, generator: torch.Generator
+    frames: int,
+    views: int,
+    settings: DataSettings,
+    generator: torch.Generator,
+    *,
+    is_static: bool = False,
 ) -> Targets:
-    """Different times, and per time another camera's view and, if there is room, the input's."""
-    per_time = 2 if views > 1 and settings.target_frames > 1 else 1
+    """Different times, and per time another camera's view and, if there is room, the input's.
+
+    A clip of fewer cameras than the recipe's gives as many images: of a static one the camera at
+    another frame is another view; of a moving one the input view counts for both.
+    """
+    per_time = 2 if settings.views > 1 and settings.target_frames > 1 else 1
     count = min(max(settings.target_frames // per_time, 1), frames)
     times = torch.randperm(frames, generator=generator)[:count].sort().values
     chosen = torch.zeros(count, per_time, dtype=torch.long)
+    shown = times[:, None].repeat(1, per_time)
     if views > 1:
         chosen[:, 0] = torch.randint(1, views, (count,), generator=generator)
-    return Targets(frames=times, views=chosen)
+    elif is_static and settings.views > 1:
+        shown[:, 0] = torch.randint(frames, (count,), generator=generator)
+    return Targets(frames=times, views=chosen, image_frames=shown)
 
 
 def draw_tracks(
@@ -61,6 +81,7 @@ def draw_tracks(
 ) -> TrackTargets:
     """Points, each at one of the input frames in which the input view sees it."""
     count, seen = settings.tracks, visible_cells(clip)
+    seen = seen[_known_at(clip, target_frames)[seen[:, 0]]]
     seen = seen[seen[:, 1] % (settings.input_stride * settings.keyframe_stride) == 0]
     chosen = torch.randperm(len(seen), generator=generator)
     # One cell per point: the first of its frames in random order.
@@ -79,6 +100,15 @@ def draw_tracks(
     return TrackTargets(cell=cell, offset=offset, valid=valid)
 
 
+def _known_at(clip: Clip, frames: Int[Tensor, " m"]) -> Bool[Tensor, " n"]:
+    """Points that the source has in all of these frames: elsewhere their positions are no truth."""
+    if clip.tracks is None:
+        return torch.zeros(0, dtype=torch.bool)
+    if clip.tracks.known is None:
+        return torch.ones(clip.tracks.positions.shape[1], dtype=torch.bool)
+    return clip.tracks.known[frames].all(0)
+
+
 def _balanced(seen: Int[Tensor, "u 4"], clip: Clip, count: int) -> Int[Tensor, "s 4"]:
     """Up to ``count`` rows; points that move come first, for at most half of them.
 
@@ -87,8 +117,12 @@ def _balanced(seen: Int[Tensor, "u 4"], clip: Clip, count: int) -> Int[Tensor, "
     """
     if not len(seen):
         return seen
-    positions = clip.tracks.positions[:, seen[:, 0]]
-    moves = (positions - positions[:1]).norm(dim=-1).amax(0) > MIN_MOTION
+    positions, known = clip.tracks.positions[:, seen[:, 0]], clip.tracks.known
+    here = positions[seen[:, 1], torch.arange(len(seen))]
+    away = (positions - here).norm(dim=-1)
+    if known is not None:
+        away = torch.where(known[:, seen[:, 0]], away, 0.0)
+    moves = away.amax(0) > MIN_MOTION
     first = moves & (moves.cumsum(0) <= count // 2)
     return torch.cat([seen[first], seen[~first & ~moves], seen[~first & moves]])[:count]
 

@@ -32,6 +32,18 @@ def crop(clip: Clip, frames: int, generator: torch.Generator) -> Clip:
     return from_first_camera(_frames(clip, slice(first, first + frames)))
 
 
+def at_frame_rate(clip: Clip, fps: float, least_frames: int) -> Clip:
+    """Every k-th frame, so that the rate is nearest to ``fps`` with enough frames left.
+
+    0, clips without a frame rate and slower clips keep every frame.
+    """
+    if not fps or clip.fps is None:
+        return clip
+    longest = (clip.frames - 1) // max(least_frames - 1, 1)
+    step = max(min(round(clip.fps / fps), longest), 1)
+    return clip if step == 1 else _frames(clip, slice(None, None, step))
+
+
 def repeat_keyframes(clip: Clip, stride: int) -> Clip:
     """Keyframes as a full clip: each is repeated for the ``stride`` frames up to it."""
     every = torch.arange(1 + (clip.frames - 1) * stride)

@@ -29,8 +29,8 @@ from diff4splat.training.batches.motion_targets import (
     moving_mask,
     pixel_motion,
 )
-from diff4splat.training.batches.normalise_scale import normalized
-from diff4splat.training.batches.resize import resized
+from diff4splat.training.batches.normalise_scale import in_unit
+from diff4splat.training.batches.resize import fitted
 from diff4splat.training.batches.temporal_crop import from_first_camera
 from diff4splat.training.latents.latent_shards import LatentPack, has_pack, join_packs, write_pack
 from diff4splat.training.latents.video_latents import FirstFrame, render_condition
@@ -101,8 +101,8 @@ def _input_clip(clip: Clip, data: DataSettings) -> Clip:
             f"clip {clip.note.identifier}: expected at least {data.clip_frames} frames, got "
             f"{clip.frames}; leave the clip out"
         )
-    clip = from_first_camera(resized(clip, data.size_px))
-    return normalized(clip, data.min_valid_depth)
+    clip = from_first_camera(fitted(clip, data.size_px))
+    return in_unit(clip, data)
 
 
 def encode_clip(model: Model, clip: Clip, data: DataSettings) -> LatentPack:

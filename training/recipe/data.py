@@ -20,6 +20,8 @@ class SourceSettings:
     still_share: float = 0.25
     """Share of clips in which nothing moves."""
     weight: float = 1.0
+    depth_loss: Literal["true", "always", "never"] = "true"
+    """``true`` leaves out depth whose scale was only assumed (``pseudo``)."""
 
     def __post_init__(self) -> None:
         require(0 <= self.still_share <= 1, "source.still_share", "0 to 1", self.still_share)
@@ -53,6 +55,13 @@ class DataSettings:
     """Tracked points per clip."""
     supervise_motion: bool = True
     """False takes all targets of moving clips from their first frame, for static stages."""
+    unit: Literal["median_depth", "metre"] = "median_depth"
+    """Length 1 of a sample: a quarter of the clip's median depth, or a metre; clips without
+    metric scale are then skipped and counted."""
+    fps: float = 0.0
+    """Frame rate that faster clips are thinned to; 0 takes every frame."""
+    commercial_only: bool = False
+    """Only clips of shards whose licence is known to allow commercial use."""
     keyframes_only: bool = False
     """Clips hold only the first frame and the last frame of each latent frame, which render
     faster; the motion network needs no other."""
@@ -81,6 +90,7 @@ class DataSettings:
         require(fits, "data.crop_px", "0, or sides that size_px has room for", self.crop_px)
         multiples = all(side > 0 and side % 16 == 0 for side in self.view_sides_px)
         require(multiples, "data.view_sides_px", "multiples of 16", self.view_sides_px)
+        require(0 <= self.fps < math.inf, "data.fps", "at least 0", self.fps)
         share = self.min_valid_depth
         require(0 <= share <= 1, "data.min_valid_depth", "0 to 1", share)
 

@@ -35,19 +35,31 @@ def decisive(stage: Mapping[str, Any]) -> dict[str, Any]:
     """The values of a stage's recipe that decide its weights."""
     data = {key: value for key, value in stage["data"].items() if key not in _NOT_DECISIVE}
     data["sources"] = [
-        {key: value for key, value in source.items() if key != "folder"}
+        {
+            key: value
+            for key, value in source.items()
+            if key != "folder" and (key, value) != ("depth_loss", "true")
+        }
         for source in data["sources"]
     ]
-    # Stages of recipes from before random views keep their fingerprint.
-    data = {key: value for key, value in data.items() if key != "view_sides_px" or value}
+    # Stages of recipes from before these settings keep their fingerprint.
+    data = {key: value for key, value in data.items() if not _unchanged(key, value)}
     kept = {key: value for key, value in stage.items() if key != "micro_batch"}
     return kept | {"data": data}
 
 
 _NOT_DECISIVE = ("workers", "in_memory")
+_ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False}
+"""Settings of later releases, with the value that changes nothing."""
 
 
 def _uses_features(losses: Mapping[str, Any]) -> bool:
     """Whether a perceptual term counts, at any depth."""
     nested = [value for value in losses.values() if isinstance(value, Mapping)]
     return bool(losses.get("perceptual")) or any(map(_uses_features, nested))
+
+
+def _unchanged(key: str, value: Any) -> bool:
+    if key == "view_sides_px":
+        return not value
+    return key in _ADDED and _ADDED[key] == value

@@ -87,6 +87,14 @@ class PrepareImport:
     """Relative error of depth: 1.5e-5, 4.9e-4 (packed, or plain and read fastest), or none."""
     append: bool = False
     """Add to an existing folder; existing clips are kept."""
+    task: Annotated[int, Number(least=0)] = 0
+    """Which of --tasks parts to import, from 0; each part needs a folder of its own."""
+    tasks: Annotated[int, Number(least=1, most=1_000_000)] = 1
+    """Number of parts that the sequences are divided into, to import on several machines."""
+
+    def check(self) -> None:
+        """Require a task that exists."""
+        Number(least=0, most=self.tasks - 1).check("--task", self.task)
 
     def run(self) -> None:
         """Read, write, and say what became of the clips."""
@@ -111,6 +119,8 @@ class PrepareImport:
             coding=Coding(images=self.images, depth=self.depth),
             most_sequences=self.sequences,
             append=self.append,
+            task=self.task,
+            tasks=self.tasks,
         )
         rows = import_dataset(job, ConsolePhases())
         text = summary(rows)

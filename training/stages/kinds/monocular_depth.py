@@ -133,12 +133,14 @@ def depth_terms(
 ) -> dict[str, Float[Tensor, " n"]]:
     """Every loss of every image."""
     known, difference = images.known, log_depth - images.depth.log()
+    # Without any depth nothing tells sky from the rest.
+    sky = ~known & known.flatten(1).any(1)[:, None, None]
     too_near = (math.log(SKY_DEPTH) - log_depth).clamp_min(0)
     return {
         "depth_log": masked_mean(difference.abs().flatten(1), known.flatten(1)),
         "depth_gradient": gradient_error(difference, known),
         "inverse_depth": inverse_depth_error(log_depth, images.depth, known, PLANE_DEPTH),
-        "sky_margin": masked_mean(too_near.flatten(1), ~known.flatten(1)),
+        "sky_margin": masked_mean(too_near.flatten(1), sky.flatten(1)),
     }
 
 

@@ -69,16 +69,19 @@ class MotionDiffusionStage(ModelStage):
         level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
         noisy = self._noisy(batch, level.to(batch.field), "noise")
         clean, logits = self.motion_unet.predict_motion_and_mask(*self._inputs(batch, noisy))
+        known = batch.motion_known.to(clean)
         weights = min_level_weights(noisy.level, losses.min_level_weighting)
         return weighted_sum(
             [
                 LossTerm(
-                    name="flow", weight=losses.flow, compute=lambda: noisy.error(clean, weights)
+                    name="flow",
+                    weight=losses.flow,
+                    compute=lambda: known * noisy.error(clean, weights),
                 ),
                 LossTerm(
                     name="motion_mask",
                     weight=losses.motion_mask,
-                    compute=lambda: _mask_error(logits, batch.moving),
+                    compute=lambda: known * _mask_error(logits, batch.moving),
                 ),
             ]
         )
@@ -102,7 +105,7 @@ class MotionDiffusionStage(ModelStage):
         static = clean.square().flatten(1).mean(1)
         share = (predicted - clean).square().flatten(1).mean(1) / static
         return {
-            "flow_error": torch.stack(errors).mean(0),
+            "flow_error": torch.where(batch.motion_known, torch.stack(errors).mean(0), torch.nan),
             "motion_share": torch.where(static > 0, share, torch.nan),
         }
 

@@ -189,14 +189,67 @@ def test_samples_say_which_source_they_come_from(folder: Path) -> None:
     assert bool(sample.is_static.all())
 
 
-def test_clips_of_one_view_do_not_mix_with_those_of_several() -> None:
+def test_clips_of_one_view_mix_with_those_of_several() -> None:
     clip = exact_clip(0, True)
     alone = replace(clip, views=clip.views[:1])
-    samples = ClipSamples(recipe(SourceSettings()), 0, [Counting(alone)])
-    with pytest.raises(InputError, match=r"at least 2 views, got 1; .* data\.views=1"):
-        samples[0]
-    one = recipe(SourceSettings(), data=replace(DATA, views=1))
-    assert ClipSamples(one, 0, [Counting(alone)])[0].target_rgb.shape[2] == 1
+    both = (SourceSettings(), SourceSettings())
+    samples = ClipSamples(recipe(*both), 0, [Counting(alone), Counting(clip)])
+    batch = load_batch(samples, range(12)).batch
+    assert len(set(batch.source)) == 2
+    # The camera of a static clip at another frame is another view, and has its own pose.
+    one = batch.source.index(next(name for name in batch.source if name.startswith("0")))
+    poses = batch.target_cameras.world_from_camera[one]
+    assert poses.shape[1] == 2
+
+
+def test_sources_decide_about_depth_and_absent_depth_teaches_nothing() -> None:
+    clip = exact_clip(0, False)
+    second = replace(clip.views[1], depth=None)
+    cases = {
+        "never": (clip, "never", False),
+        "given": (clip, "true", True),
+        "assumed": (replace(clip, note=replace(clip.note, metric="pseudo")), "true", False),
+        "asked": (replace(clip, note=replace(clip.note, metric="pseudo")), "always", True),
+        "some": (replace(clip, views=(clip.views[0], second)), "true", True),
+    }
+    for made, rule, teaches in cases.values():
+        source = SourceSettings(depth_loss=rule)
+        sample = ClipSamples(recipe(source), 0, [Counting(made)])[0]
+        assert bool((sample.depth > 0).any()) is teaches
+
+
+def test_images_alone_teach_and_unknown_motion_is_not_stillness() -> None:
+    clip = exact_clip(0, False)
+    views = [
+        replace(v, depth=None, instances=None, moving=None, track_uv=None, track_visible=None)
+        for v in clip.views
+    ]
+    images = replace(clip, views=tuple(views), tracks=None)
+    sample = ClipSamples(recipe(SourceSettings()), 0, [Counting(images)])[0]
+    assert not bool(sample.motion_known) and not bool(sample.target_depth.any())
+    assert bool(ClipSamples(recipe(SourceSettings()), 0, [Counting(clip)])[0].motion_known)
+
+
+def test_positions_that_are_not_known_teach_nothing() -> None:
+    clip = exact_clip(0, False)
+    hidden = torch.zeros(clip.tracks.positions.shape[:2], dtype=torch.bool)
+    views = tuple(
+        replace(view, track_visible=torch.zeros_like(view.track_visible)) for view in clip.views
+    )
+    gone = replace(clip, views=views, tracks=replace(clip.tracks, known=hidden))
+    sample = ClipSamples(recipe(SourceSettings()), 0, [Counting(gone)])[0]
+    assert not bool(sample.track_valid.any()) and not bool(sample.motion_known)
+
+
+def test_metric_clips_keep_metres_and_others_are_refused() -> None:
+    clip = exact_clip(0, True)
+    metres = recipe(SourceSettings(), data=replace(DATA, unit="metre"))
+    exact = replace(clip, note=replace(clip.note, metric="exact"))
+    sample = ClipSamples(metres, 0, [Counting(exact)])[0]
+    assert float(sample.depth.max()) <= float(clip.views[0].depth.max()) + 1e-3
+    with pytest.raises(InputError, match="metres"):
+        relative = replace(clip, note=replace(clip.note, metric="none"))
+        ClipSamples(metres, 0, [Counting(relative)])[0]
 
 
 def test_clips_without_depth_are_replaced_and_counted(tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_moving_targets_are_the_default(moving: Clip) -> None:
 def test_targets_are_different_times_where_there_are_several(
     frames: int, views: int, asked: int, seed: int
 ) -> None:
-    settings_ = replace(MOVING, target_frames=asked)
+    settings_ = replace(MOVING, target_frames=asked, views=views)
     generator = torch.Generator().manual_seed(seed)
     targets = draw_targets(frames, views, settings_, generator)
     per_time = 2 if views > 1 and asked > 1 else 1
