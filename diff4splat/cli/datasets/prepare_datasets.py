@@ -88,7 +88,7 @@ class PrepareImport:
     append: bool = False
     """Add to an existing folder; existing clips are kept."""
     task: Annotated[int, Number(least=0)] = 0
-    """Which of --tasks parts to import, from 0; each part needs a folder of its own."""
+    """Which of --tasks parts to import, from 0; each part needs another folder."""
     tasks: Annotated[int, Number(least=1, most=1_000_000)] = 1
     """Number of parts that the sequences are divided into, to import on several machines."""
 
