@@ -74,7 +74,7 @@ def finished(item: Item, folder: Path) -> Made | None:
 
 
 def make_all(items: Sequence[Item], gallery: Path, tell: Callable[[str], None]) -> dict[str, Made]:
-    """Every item that can be made, by name; those that fail are told and left out."""
+    """Every item that can be made, by name; those that fail are reported and left out."""
     done: dict[str, Made] = {}
     start_s, fresh = time.monotonic(), 0
     for place, item in enumerate(items):

@@ -53,7 +53,7 @@ def clip_identifier(dataset: str, sequence: str, first: int) -> str:
     """A name that shards can hold: short, plain, and different for different sequences."""
     plain = re.sub(r"[^A-Za-z0-9]+", "-", f"{dataset}-{sequence}").strip("-")
     if len(plain) > _LONGEST or plain != f"{dataset}-{sequence}".replace("/", "-"):
-        # What was cut or replaced may be all that tells two sequences apart.
+        # What was cut or replaced may be all in which two sequences differ.
         digest = hashlib.sha256(sequence.encode(errors="replace")).hexdigest()[:8]
         plain = f"{plain[: _LONGEST - 9].strip('-')}-{digest}"
     return f"{plain}-{first:06d}"

@@ -30,7 +30,7 @@ def measure_speed_s(clock: Callable[[], float] = time.thread_time) -> float:
 
 
 def machine_name() -> str:
-    """What tells machines apart at a glance."""
+    """System, kind of processor and number of cores."""
     return f"{platform.system()} {platform.machine()}, {os.cpu_count() or 1} cores"
 
 

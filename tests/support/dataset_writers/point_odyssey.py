@@ -12,7 +12,7 @@ COLORS = np.array([[10, 200, 30], [250, 0, 9], [7, 7, 255], [0, 0, 0]], np.uint8
 
 
 def write(truth: Truth, root: Path, tracks: int | None = None) -> Path:
-    """``tracks`` is what ``info.npz`` says of them; None tells the truth."""
+    """``tracks`` is what ``info.npz`` says of them; None is the truth."""
     folder = root / "train" / "ani_01"
     eye = truth.left
     for t in range(truth.frames):

@@ -45,10 +45,14 @@ def test_a_failure_leaves_the_others(tmp_path: Path) -> None:
     broken = replace(ITEM, name="b", steps=((DIFF4SPLAT, "{out}", "fail"),))
     with pytest.raises(ItemError, match=r"see .*log\.txt"):
         make(broken, tmp_path)
-    told: list[str] = []
-    assert list(make_all([broken, ITEM], tmp_path, told.append)) == ["a"]
-    assert told[0] == "1/2 b" and "left out" in told[1] and told[2].startswith("2/2 a, about")
-    assert make_all([ITEM], tmp_path, told.append) and told[-1] == "1/1 a (kept)"
+    reported: list[str] = []
+    assert list(make_all([broken, ITEM], tmp_path, reported.append)) == ["a"]
+    assert (
+        reported[0] == "1/2 b"
+        and "left out" in reported[1]
+        and reported[2].startswith("2/2 a, about")
+    )
+    assert make_all([ITEM], tmp_path, reported.append) and reported[-1] == "1/1 a (kept)"
 
 
 def test_the_page_names_only_files_beside_it(tmp_path: Path) -> None:

@@ -8,8 +8,10 @@ from torch import Tensor
 from diff4splat.generation.inputs.input_image import downsample
 from diff4splat.generation.layered_image.build import (
     PIXEL_FOOTPRINT_PX,
+    FineDepth,
     ImageMaps,
     build_layered_image,
+    pixel_layer,
 )
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
@@ -56,6 +58,21 @@ def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
     assert built().visible_count == 31 * 47
+
+
+def test_pixels_take_the_depth_of_the_larger_copy() -> None:
+    image = input_image(random_rgb(2 * SIZE_PX[0], 2 * SIZE_PX[1]))
+    small, larger = downsample(image, 4), downsample(image, 2)
+    size_px = small.camera.size_px
+    displacement = torch.zeros(2, *size_px, 3)
+    displacement[1, ..., 0] = 0.5
+    fine = FineDepth(rgb=larger.rgb, depth=torch.full(larger.camera.size_px, 7.0))
+    maps = ImageMaps(depth=torch.full(size_px, 4.0), displacement=displacement, fine=fine)
+    pixels = pixel_layer(small, image, maps)
+    torch.testing.assert_close(pixels.depth, torch.full_like(pixels.depth, 7.0))
+    # As far in the image as at the depth of the smaller copy.
+    moved = pixels.displacement[1, ..., 0]
+    torch.testing.assert_close(moved, torch.full_like(moved, 0.5 * 7 / 4))
 
 
 def test_without_border_cells_there_is_no_border_layer() -> None:
