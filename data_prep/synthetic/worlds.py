@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diff4splat.data_prep.synthetic.actors import StageArea, freeze, place_moving_objects
+from diff4splat.data_prep.synthetic.arrangements.arrangement import FOV_DEG, try_arrangement
 from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
 from diff4splat.data_prep.synthetic.camera_rig import rig_views
 from diff4splat.data_prep.synthetic.cameras import LensSpec, camera_batch, sample_path, sample_views
@@ -55,6 +56,8 @@ class WorldRecipe:
     """Static cameras all around the scene; otherwise moving cameras near the input view."""
     free_cameras: bool = False
     """Static cameras of all kinds beside the input view; for depth of single images."""
+    arrangements: bool = False
+    """Static objects before a surface, a corner, a room or open ground, seen from any side."""
     families: Names = None
     textures: Names = None
     motions: Names = None
@@ -69,9 +72,9 @@ class WorldRecipe:
         for name in ("still_share", "against_share", "frozen_share"):
             _require_range(name, getattr(self, name), 0.0, 1.0)
         _require_range("fps", self.fps, 0.1, 1000.0)
-        if self.rig and self.free_cameras:
+        if self.rig + self.free_cameras + self.arrangements > 1:
             raise ConfigError(
-                "cameras: expected one arrangement, got rig and free_cameras; leave one out"
+                "cameras: expected one of rig, free_cameras and arrangements, got several; keep one"
             )
 
     def allowed(self) -> Split:
@@ -102,7 +105,8 @@ def make_world(recipe: WorldRecipe, index: int) -> World:
     for attempt in range(ATTEMPTS):
         rng = Rng("world", recipe.split, recipe.seed, index, attempt)
         is_still = Rng("still", recipe.split, recipe.seed, index).bernoulli(recipe.still_share)
-        world = _try_world(recipe, index, split, rng, is_still)
+        try_world = _try_arrangement if recipe.arrangements else _try_world
+        world = try_world(recipe, index, split, rng, is_still)
         if world is not None:
             return world
     raise ConfigError(
@@ -120,6 +124,13 @@ class _Framing:
     views: tuple[Camera, ...]
     path: str
     """Camera path of the input view."""
+
+
+def _try_arrangement(
+    recipe: WorldRecipe, index: int, split: Split, rng: Rng, is_still: bool
+) -> World | None:
+    lens = LensSpec(size_px=recipe.size_px, fov_deg=FOV_DEG, frames=recipe.frames, fps=recipe.fps)
+    return try_arrangement(split, lens, recipe.views, rng, world_identifier(recipe, index))
 
 
 def _try_world(
@@ -207,8 +218,9 @@ def _moving(area: StageArea, rng: Rng, is_still: bool, *, is_watched: bool) -> l
 
 def world_identifier(recipe: WorldRecipe, index: int) -> str:
     """Identifier of the clip of a world."""
-    rig = f"-rig{recipe.views}" if recipe.rig else "-free" if recipe.free_cameras else ""
-    return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{rig}"
+    kind = f"-rig{recipe.views}" if recipe.rig else "-free" if recipe.free_cameras else ""
+    kind = "-arranged" if recipe.arrangements else kind
+    return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{kind}"
 
 
 def _has_new_content(split: Split, content: WorldContent, objects) -> bool:

@@ -42,6 +42,8 @@ class PrepareSynthetic:
     """Place cameras all around the scene, for per-scene fitting; hold out the last two."""
     free_cameras: bool = False
     """Place cameras after the first anywhere: above, close, rolled, other lenses; for depth."""
+    arrangements: bool = False
+    """Static objects before a wall, in a corner, a room or open ground, from any side; for depth."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
     tracks: Annotated[int, Number(least=0)] = 512
@@ -76,6 +78,7 @@ class PrepareSynthetic:
             views=self.views,
             rig=self.rig,
             free_cameras=self.free_cameras,
+            arrangements=self.arrangements,
             motions=self.motions or None,
         )
         job = WorldJob(

@@ -1,0 +1,78 @@
+"""``make_arrangement(recipe, index)``: a static world of objects before a backdrop.
+
+In the worlds of ``worlds.py`` there is ground below and sky above, and a network that only learns
+the image row does well. Here every view is from another side, and nothing is below.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from diff4splat.captions.grammar import CaptionFacts
+from diff4splat.data_prep.synthetic.arrangements.backdrops import KINDS, Backdrop, make_backdrop
+from diff4splat.data_prep.synthetic.arrangements.cameras import any_view
+from diff4splat.data_prep.synthetic.arrangements.objects import Arranged, arrange
+from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
+from diff4splat.data_prep.synthetic.cameras import LensSpec, ViewSpec, camera_batch
+from diff4splat.data_prep.synthetic.captioning import clip_metadata
+from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
+from diff4splat.data_prep.synthetic.lights import sample_lighting
+from diff4splat.data_prep.synthetic.quantise import POSE_BITS, quantise
+from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.splits import Split
+from diff4splat.data_prep.synthetic.world import Light, World
+
+PORTRAIT_SHARE = 0.4
+LEAST_LIGHT_DEG = 15.0
+FOV_DEG = 50.0
+"""Every view has its own."""
+
+
+def try_arrangement(
+    split: Split, lens: LensSpec, views: int, rng: Rng, identifier: str
+) -> World | None:
+    """A world with ``views`` static cameras; None where a camera found no free place."""
+    kind = rng.weighted_choice(list(KINDS), list(KINDS.values()))
+    is_portrait = rng.bernoulli(PORTRAIT_SHARE)
+    backdrop = make_backdrop(kind, rng.child("backdrop"))
+    objects = arrange(split.families.names, rng.child("objects"), is_portrait=is_portrait)
+    specs = [
+        any_view(objects, backdrop, rng.child("view", number), is_portrait=is_portrait)
+        for number in range(views)
+    ]
+    found = [spec for spec in specs if spec is not None]
+    if len(found) < views:
+        return None
+    return _world(_content(objects, backdrop, split, rng), found, lens, rng, identifier)
+
+
+def _content(objects: list[Arranged], backdrop: Backdrop, split: Split, rng: Rng) -> WorldContent:
+    static = (*backdrop.objects, *(item.placed for item in objects))
+    return WorldContent(moving=(), static=static, split=split, rng=rng.child("looks"))
+
+
+def _world(
+    content: WorldContent, specs: list[ViewSpec], lens: LensSpec, rng: Rng, identifier: str
+) -> World:
+    objects, assembled = assemble(content)
+    scene = rng.choice(sorted(name for name, kind in SCENE_KINDS.items() if kind.hills_m[1] < 5))
+    light, sky = sample_lighting(SCENE_KINDS[scene], 1.0, rng.child("light"))
+    facts = CaptionFacts(place="", events=(), static_objects=(), camera=())
+    return World(
+        note=clip_metadata(facts, assembled, identifier, 0),
+        times_s=quantise(np.arange(lens.frames) / lens.fps, POSE_BITS),
+        objects=objects,
+        light=_from_anywhere(light, rng.child("sun")),
+        sky=sky,
+        views=tuple(camera_batch(spec, lens, 0.0) for spec in specs),
+    )
+
+
+def _from_anywhere(light: Light, rng: Rng) -> Light:
+    """The same light from any direction above the surface."""
+    lowest = math.sin(math.radians(LEAST_LIGHT_DEG))
+    up, azimuth = rng.uniform(lowest, 1.0), rng.uniform(-np.pi, np.pi)
+    level = math.sqrt(1 - up * up)
+    toward = np.array([level * math.sin(azimuth), -up, level * math.cos(azimuth)])
+    return replace(light, toward=quantise(toward, POSE_BITS))
