@@ -43,7 +43,7 @@ class PrepareSynthetic:
     free_cameras: bool = False
     """Place cameras after the first anywhere: above, close, rolled, other lenses; for depth."""
     arrangements: bool = False
-    """Static objects before a wall, in a corner, a room or open ground, from any side; for depth."""
+    """Static objects before walls, in rooms or on open ground, from any side; for depth."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
     tracks: Annotated[int, Number(least=0)] = 512
