@@ -18,6 +18,7 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
+from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.inputs.request import Request, UserInput, prepare_request
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
@@ -78,6 +79,7 @@ class Diff4SplatPipeline:
         seed: int = 0,
         settings: GenerationSettings | None = None,
         log: RunLog | None = None,
+        depth: DepthSource | None = None,
     ) -> Scene:
         """Generate a scene; equal arguments give equal bits on one machine.
 
@@ -88,6 +90,7 @@ class Diff4SplatPipeline:
             seed: of the noise that sampling starts from.
             settings: sampling, guidance, filling and pruning.
             log: collects seconds and what was skipped.
+            depth: takes the place of the model's depth prior (``open_depth``).
 
         Raises:
             InputError: the image, the path or the prompt cannot be used.
@@ -101,6 +104,7 @@ class Diff4SplatPipeline:
             prompt=prompt,
             seed=seed,
             settings=settings or GenerationSettings(),
+            depth=depth,
         )
         request = prepare_request(self.model, user, self.device)
         request.plan.record(self.model, log)
@@ -113,7 +117,7 @@ class Diff4SplatPipeline:
     def generate(self, request: Request, log: RunLog) -> Scene:
         """A prepared request, with its networks loaded."""
         model = self._running(request.plan)
-        copies = Copies(image=request.image, small=request.small)
+        copies = Copies(image=request.image, small=request.small, depth=request.depth)
         size_px = request.small.camera.size_px
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread():

@@ -1,6 +1,7 @@
 """Which networks one request needs, decided before any of them is loaded.
 
-    depth prior          if the model has one; else the image lies on a plane
+    depth prior          if the model has one; else the image lies on a plane. Depth that is given
+                         takes its place; of inverse depth it finds the offset
     motion prior         if the model has one and a prompt asks for motion in words that it knows;
                          else the image is static
     text encoder         if a prompt is given and something takes it
@@ -12,6 +13,7 @@ What the plan leaves out is neither loaded nor run, and the card says why.
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import Fill, ModelConfig
@@ -26,6 +28,8 @@ RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
 NO_MOTION = "no prompt asks for motion"
 UNTRAINED_FILL = "the video model is not trained"
+GivenDepth = Literal["none", "complete", "inverse"]
+"""Depth that a request brings along; inverse depth lacks its offset."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +43,8 @@ class RequestFacts:
     """Nothing may move."""
     frames: int = 2
     """Frames of the camera path as the networks see it."""
+    given_depth: GivenDepth = "none"
+    """Depth that the request brings along."""
     static_prompt: str = ""
     """Why a trained motion prior finds no motion in the prompt; empty where it may."""
 
@@ -59,6 +65,7 @@ class GenerationPlan:
 
     parts: frozenset[str]
     skipped: tuple[SkippedPart, ...]
+    depth_given: bool = False
 
     @property
     def fills(self) -> bool:
@@ -72,8 +79,8 @@ class GenerationPlan:
 
     @property
     def has_depth(self) -> bool:
-        """Whether the depth prior runs."""
-        return "monocular_depth" in self.parts
+        """Whether depth is predicted or given."""
+        return self.depth_given or "monocular_depth" in self.parts
 
     @property
     def shows_image(self) -> bool:
@@ -99,7 +106,7 @@ def plan_generation(
         ConfigError: the video model is asked to fill, but it is not trained and other parts are.
     """
     reasons = {
-        "monocular_depth": _untrained("monocular_depth", trained),
+        "monocular_depth": _depth_reason(trained, facts),
         "motion_unet": _untrained("motion_unet", trained)
         or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
@@ -119,12 +126,20 @@ def plan_generation(
         if reasons[part]
     ]
     running = frozenset(part for part in parts if not reasons[part])
-    return GenerationPlan(parts=running, skipped=tuple(skipped))
+    given = facts.given_depth != "none"
+    return GenerationPlan(parts=running, skipped=tuple(skipped), depth_given=given)
 
 
 def _untrained(part: str, trained: Collection[str]) -> str:
     """Random models run whole; in others a part that is not trained stays out."""
     return "it is not trained" if trained and part not in trained else ""
+
+
+def _depth_reason(trained: Collection[str], facts: RequestFacts) -> str:
+    """An untrained prior is no opinion about the offset of inverse depth."""
+    if facts.given_depth == "complete" or (facts.given_depth == "inverse" and not trained):
+        return "depth is given"
+    return _untrained("monocular_depth", trained)
 
 
 def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:
