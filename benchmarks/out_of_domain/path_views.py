@@ -1,7 +1,7 @@
 """Scenes with their true depth and images along a camera path, one NumPy file each.
 
-Arrays: ``rgb`` (h w 3) in bytes, ``depth`` z (h w) at the image's size and ``depth_518`` z (518 518),
-0 where there is no surface, ``views`` (v h w 3) in bytes, ``world_from_camera`` (v 4 4) relative to
+Arrays: ``rgb`` (h w 3) in bytes; ``depth`` z (h w) at the image's size, ``depth_518`` at 518 px, 0
+where there is no surface; ``views`` (v h w 3) in bytes; ``world_from_camera`` (v 4 4) relative to
 the first camera, in scene units: the median true depth is 4. ``fov_deg`` is horizontal.
 """
 

@@ -19,7 +19,6 @@ from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.depth import (
     DepthFileOrName,
     depth_file,
-    given_depth,
     require_depth_kind,
     require_one_photo,
 )
@@ -359,7 +358,7 @@ class Generate:
 
         photo_px = photo_size(self.image)
         side_px, multiple_px = find_image_size(
-            self.model, self.resolution, self.fill, photo_px, given_depth(self.depth)
+            self.model, self.resolution, self.fill, photo_px, self.depth is not None
         )
         return load_image(self.image, side_px, self.fov, self.convert, multiple_px, self.fit)
 

@@ -1,7 +1,7 @@
 """Which networks one request needs, decided before any of them is loaded.
 
-    depth prior          if the model has one; else the image lies on a plane. Depth that is given
-                         takes its place; of inverse depth it finds the offset
+    depth prior          if the model has one and no depth is given; without either the image lies
+                         on a plane
     motion prior         if the model has one and a prompt asks for motion in words that it knows;
                          else the image is static
     text encoder         if a prompt is given and something takes it
@@ -13,7 +13,6 @@ What the plan leaves out is neither loaded nor run, and the card says why.
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import Fill, ModelConfig
@@ -26,10 +25,11 @@ FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 """What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
+DEPTH_GIVEN = "depth is given"
+CHOICES = (WORSE_FILL, DEPTH_GIVEN)
+"""Reasons that are choices: the part would give another scene."""
 NO_MOTION = "no prompt asks for motion"
 UNTRAINED_FILL = "the video model is not trained"
-GivenDepth = Literal["none", "complete", "inverse"]
-"""Depth that a request brings along; inverse depth lacks its offset."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,8 +43,8 @@ class RequestFacts:
     """Nothing may move."""
     frames: int = 2
     """Frames of the camera path as the networks see it."""
-    given_depth: GivenDepth = "none"
-    """Depth that the request brings along."""
+    depth_given: bool = False
+    """Whether the request brings its depth along."""
     static_prompt: str = ""
     """Why a trained motion prior finds no motion in the prompt; empty where it may."""
 
@@ -121,13 +121,12 @@ def plan_generation(
     reasons["text_encoder"] = asked if facts.prompt else "no prompt"
     parts = model_parts(config)
     skipped = [
-        SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] == WORSE_FILL)
+        SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] in CHOICES)
         for part in parts
         if reasons[part]
     ]
     running = frozenset(part for part in parts if not reasons[part])
-    given = facts.given_depth != "none"
-    return GenerationPlan(parts=running, skipped=tuple(skipped), depth_given=given)
+    return GenerationPlan(parts=running, skipped=tuple(skipped), depth_given=facts.depth_given)
 
 
 def _untrained(part: str, trained: Collection[str]) -> str:
@@ -136,10 +135,7 @@ def _untrained(part: str, trained: Collection[str]) -> str:
 
 
 def _depth_reason(trained: Collection[str], facts: RequestFacts) -> str:
-    """An untrained prior is no opinion about the offset of inverse depth."""
-    if facts.given_depth == "complete" or (facts.given_depth == "inverse" and not trained):
-        return "depth is given"
-    return _untrained("monocular_depth", trained)
+    return DEPTH_GIVEN if facts.depth_given else _untrained("monocular_depth", trained)
 
 
 def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:

@@ -55,7 +55,7 @@ def _depths(
 ) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
     """Depth of the copy; where the prior sees a larger one, its own and that one reduced."""
     if images.depth is not None:
-        return _given_depths(model, images, log)
+        return _given_depths(images, log)
     log.depth["source"] = "plane" if model.networks.monocular_depth is None else "model"
     scale = model.config.monocular_depth.photo_scale
     reduction = images.small.reduction
@@ -67,13 +67,9 @@ def _depths(
     return 1 / inverse, fine
 
 
-def _given_depths(
-    model: Model, images: Copies, log: RunLog
-) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
+def _given_depths(images: Copies, log: RunLog) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
     """Given depth at the size of the image, and reduced."""
-    has_prior = model.networks.monocular_depth is not None
-    reference = image_depth(model, images.small) if has_prior else None
-    depth = given_depth(images.depth, images.image, reference, log)
+    depth = given_depth(images.depth, images.image, log)
     if images.small.camera.size_px == images.image.camera.size_px:
         return depth, None
     fine = FineDepth(rgb=images.image.rgb, depth=depth, smooth=False)

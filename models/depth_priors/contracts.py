@@ -6,6 +6,7 @@ have, unless their metadata states the contract (``METADATA``).
 
 import json
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -192,19 +193,18 @@ def _is_map(output: TensorFacts) -> bool:
 
 def _first_layer(facts: GraphFacts, image: str) -> tuple[int | None, bool]:
     """(side of the kernel of the first convolution, whether values are normalised before it)."""
-    normalised, value = False, image
+    queue = deque([(image, False)])
     for _ in range(_MOST_STEPS):
-        node = next((one for one in facts.nodes if value in one.inputs), None)
-        if node is None or not node.outputs:
+        if not queue:
             break
-        if node.operator == "Conv" and len(node.inputs) > 1:
-            shape = facts.weight_shapes.get(node.inputs[1], ())
-            return (shape[2] if len(shape) == 4 else None), normalised
-        if node.operator not in NORMALISING | PASSING:
-            break
-        normalised |= node.operator in NORMALISING
-        value = node.outputs[0]
-    return None, normalised
+        value, normalised = queue.popleft()
+        for node in (one for one in facts.nodes if value in one.inputs and one.outputs):
+            if node.operator == "Conv" and len(node.inputs) > 1:
+                shape = facts.weight_shapes.get(node.inputs[1], ())
+                return (shape[2] if len(shape) == 4 else None), normalised
+            if node.operator in NORMALISING | PASSING:
+                queue.append((node.outputs[0], normalised or node.operator in NORMALISING))
+    return None, False
 
 
 def _names(tensors: tuple[TensorFacts, ...]) -> set[str]:

@@ -6,7 +6,6 @@ bytes. Weights are skipped by their length, so a file of gigabytes costs what it
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Self
 
 from diff4splat.errors import FileFormatError
 
@@ -82,10 +81,10 @@ class Message:
             value, place = self._varint(place)
             yield value
 
-    def _part(self, start: int, length: int) -> Self:
+    def _part(self, start: int, length: int) -> "Message":
         if start + length > self.stop:
             raise FileFormatError(_CUT_OFF)
-        return type(self)(self.data, start, start + length)
+        return Message(self.data, start, start + length)
 
     def _varint(self, place: int) -> tuple[int, int]:
         value = 0

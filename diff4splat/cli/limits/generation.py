@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.stopwatch import Stopwatch
-from diff4splat.cli.options.depth import given_depth
 from diff4splat.outputs.budgets.choose import agrees
 from diff4splat.outputs.budgets.limits import loss_from_error
 from diff4splat.outputs.budgets.table import SettingValues
@@ -164,7 +163,7 @@ def _side(command: "Generate") -> tuple[int, int]:
     from diff4splat.io.photos.images import photo_size
 
     photo_px = photo_size(command.image)
-    given = given_depth(command.depth)
+    given = command.depth is not None
     return find_image_size(command.model, command.resolution, command.fill, photo_px, given)
 
 

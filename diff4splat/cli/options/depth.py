@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from diff4splat.cli.options.constraints import InputPath
 from diff4splat.errors import ConfigError
@@ -69,8 +68,3 @@ def require_one_photo(depth: Path | None) -> None:
             f"--depth: expected one photo for the map {depth}, got several; generate them one by "
             "one, or give a network (.onnx)"
         )
-
-
-def given_depth(depth: Path | None) -> Literal["none", "complete"]:
-    """What the image's size depends on: whether there is depth at all."""
-    return "none" if depth is None else "complete"

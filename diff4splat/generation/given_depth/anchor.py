@@ -33,24 +33,21 @@ class AnchoredDepth:
 
 
 def anchor(
-    values: np.ndarray,
-    kind: DepthKind,
-    ray_length: np.ndarray,
-    reference: np.ndarray | None = None,
+    values: np.ndarray, kind: DepthKind, tangents: tuple[np.ndarray, np.ndarray]
 ) -> AnchoredDepth:
     """Values (h, w) of a ``kind`` in scene units.
 
-    ``ray_length`` is the length of each pixel's ray at z = 1. ``reference`` is another, weaker
-    opinion of depth z, which helps to find the offset.
+    ``tangents`` are x/z of the columns and y/z of the rows.
 
     Raises:
         InputError: nothing is known, or all is the same.
     """
     values = values.astype(np.float32)
     if kind in ("disparity", "inverse"):
-        return _anchor_inverse(values, kind, reference)
+        return _anchor_inverse(values, kind, tangents)
     if kind == "distance":
-        values = values / ray_length
+        x, y = (tangent.astype(np.float32) for tangent in tangents)
+        values = values / np.sqrt(1 + x[None] ** 2 + y[:, None] ** 2)
     z = np.where(values > 0, values, np.nan)
     known = z[np.isfinite(z)]
     _require_depth(known, kind)
@@ -64,13 +61,13 @@ def anchor(
 
 
 def _anchor_inverse(
-    values: np.ndarray, kind: DepthKind, reference: np.ndarray | None
+    values: np.ndarray, kind: DepthKind, tangents: tuple[np.ndarray, np.ndarray]
 ) -> AnchoredDepth:
     values = np.where(np.isfinite(values), values, np.nan)
     known = values[np.isfinite(values)]
     _require_depth(known, kind)
     zero = Offset(infinity=0.0, why="0 is infinitely far, as stated")
-    offset = zero if kind == "disparity" else find_offset(values, reference)
+    offset = zero if kind == "disparity" else find_offset(values, tangents)
     inverse = values - np.float32(offset.infinity)
     above = inverse[inverse > 0]
     if not above.size:

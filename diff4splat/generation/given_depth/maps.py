@@ -19,18 +19,12 @@ EDGE = 0.03
 """Difference of log depth beyond which neighbours are two surfaces."""
 
 
-def given_depth(
-    source: DepthSource,
-    image: InputImage,
-    reference: Float[Tensor, "y x"] | None,
-    log: RunLog,
-) -> Float[Tensor, "h w"]:
+def given_depth(source: DepthSource, image: InputImage, log: RunLog) -> Float[Tensor, "h w"]:
     """Depth z of every pixel in scene units; what was done goes into the log's ``depth``."""
     found = source.depth_map(image)
-    size = found.values.shape
-    weaker = None if reference is None else resized_depth(reference.cpu().numpy(), size)
-    anchored = anchor(found.values, found.kind, ray_lengths(image.camera, size), weaker)
-    log.depth.update(source.record() | depth_record(anchored) | {"kind": found.kind})
+    tangents = ray_tangents(image.camera, found.values.shape)
+    anchored = anchor(found.values, found.kind, tangents)
+    log.depth.update(source.record() | {"kind": found.kind} | depth_record(anchored))
     depth = resized_depth(anchored.depth, image.camera.size_px)
     return torch.from_numpy(depth).to(image.rgb)
 
@@ -43,14 +37,14 @@ def depth_record(anchored: AnchoredDepth) -> dict[str, object]:
     return record
 
 
-def ray_lengths(camera: Camera, size_px: tuple[int, ...]) -> np.ndarray:
-    """Length of the rays at z = 1 through the pixels of a grid over the camera's image."""
-    height, width = size_px
-    scale = [new / old for new, old in zip(size_px, camera.size_px, strict=True)]
-    (fx, fy), (cx, cy) = camera.focal_px.tolist(), camera.center_px.tolist()
-    x = (np.arange(width) + 0.5 - cx * scale[1]) / (fx * scale[1])
-    y = (np.arange(height) + 0.5 - cy * scale[0]) / (fy * scale[0])
-    return np.sqrt(1 + x[None] ** 2 + y[:, None] ** 2).astype(np.float32)
+def ray_tangents(camera: Camera, size_px: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """x/z of the columns and y/z of the rows of a grid over the camera's image."""
+    centers, focals = camera.center_px.tolist(), camera.focal_px.tolist()
+    found = []
+    for axis, center, focal in zip((1, 0), centers, focals, strict=True):
+        pixels = (np.arange(size_px[axis]) + 0.5) / size_px[axis] * camera.size_px[axis]
+        found.append((pixels - center) / focal)
+    return found[0], found[1]
 
 
 def resized_depth(depth: np.ndarray, size_px: tuple[int, ...]) -> np.ndarray:

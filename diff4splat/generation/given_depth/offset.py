@@ -1,8 +1,30 @@
-"""Where infinity is in inverse depth that is known up to a factor and an offset."""
+"""Where infinity is in inverse depth that is known up to a factor and an offset.
+
+One number is missing: with another one flat scenes become deep, or right angles sharp.
+
+1. Sky. Many pixels with the smallest value, and few just above it, are sky: infinity is there.
+2. Else the most probable offset. Inverse depth of images usually varies by about ``SPREAD`` of its
+   mean, give or take ``SPREAD_SIGMA``: that is the prior. Planes stay planes under any offset, but
+   angles between them do not: the share of surfaces at right angles (``right_angles``) is the
+   evidence of rooms, tables and streets.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from diff4splat.generation.given_depth.right_angles import perpendicular_shares
+
+SPREAD, SPREAD_SIGMA = 0.51, 0.4
+"""Standard deviation over mean of inverse depth: the median of path-traced scenes without sky, and
+the standard deviation of its logarithm."""
+CHANCE = 0.01
+"""Share of perpendicular pairs that means nothing."""
+SKY_SHARE, SKY_GAP, LEVEL = 0.02, 4.0, 0.004
+"""Least share of sky, how many times its pixels outnumber those of the next level, and the width of
+a level as a share of the range: one of 8 bits."""
+RELIEF = np.linspace(0.03, 0.9, 59)
+"""Inverse depth of the far end against the median, one per offset that is tried."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,7 +35,42 @@ class Offset:
     why: str
 
 
-def find_offset(values: np.ndarray, reference: np.ndarray | None) -> Offset:
+def find_offset(values: np.ndarray, tangents: tuple[np.ndarray, np.ndarray]) -> Offset:
+    """Of values (h, w), NaN where unknown; ``tangents`` are x/z of the columns and y/z of the rows.
+
+    The far end and the median must differ; a map of one value has no offset.
+    """
     known = values[np.isfinite(values)]
-    low, mid = np.quantile(known, [0.01, 0.5])
-    return Offset(infinity=float(low - (mid - low) / 7), why="near and far")
+    if is_sky(values):
+        return Offset(infinity=float(known.min()), why="sky is infinitely far")
+    low, middle = np.quantile(known, [0.01, 0.5])
+    offsets = low - RELIEF / (1 - RELIEF) * max(middle - low, 1e-3 * np.ptp(known))
+    shares = perpendicular_shares(values, offsets, tangents)
+    best = int(np.argmax((shares + CHANCE) * spread_prior(known, offsets)))
+    why = "right angles" if shares[best] > 2 * CHANCE else "usual spread"
+    return Offset(infinity=_between(offsets, shares, best), why=why)
+
+
+def spread_prior(known: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """How usual the spread of inverse depth is with infinity at each offset; at most 1."""
+    spread = known.std(dtype=np.float64) / (known.mean(dtype=np.float64) - offsets)
+    return np.exp(-0.5 * (np.log(spread / SPREAD) / SPREAD_SIGMA) ** 2)
+
+
+def is_sky(values: np.ndarray) -> bool:
+    """Whether the farthest pixels are sky: equal, many, and with a gap after them.
+
+    A wall seen from the front has no gap: its values go on.
+    """
+    known = values[np.isfinite(values)]
+    low, level = known.min(), LEVEL * np.ptp(known)
+    count = int((known <= low + level / 2).sum())
+    after = int((known <= low + 1.5 * level).sum()) - count
+    return count >= SKY_SHARE * values.size and count >= SKY_GAP * after
+
+
+def _between(offsets: np.ndarray, shares: np.ndarray, best: int) -> float:
+    """The peak between the offsets that were tried: their mean by score."""
+    near = slice(max(best - 1, 0), best + 2)
+    weights = shares[near] - 0.9 * shares[near].min() + 1e-6
+    return float(np.average(offsets[near], weights=weights))

@@ -11,7 +11,6 @@ from collections.abc import Collection
 from diff4splat.generation.inputs.input_image import require_side
 from diff4splat.generation.plan import (
     GenerationPlan,
-    GivenDepth,
     RequestFacts,
     plan_generation,
 )
@@ -64,7 +63,7 @@ def find_image_size(
     side_px: int | None = None,
     fill: Fill | None = None,
     photo_px: tuple[int, int] | None = None,
-    given_depth: GivenDepth = "none",
+    depth_given: bool = False,
 ) -> tuple[int, int]:
     """(side, multiple) in pixels for a model, before any weights are read.
 
@@ -72,7 +71,7 @@ def find_image_size(
         ConfigError, CheckpointError, FileFormatError: as ``load_model``.
     """
     config = find_config(name_or_folder)
-    plan = image_plan(config, find_provenance(name_or_folder).trained, fill, given_depth)
+    plan = image_plan(config, find_provenance(name_or_folder).trained, fill, depth_given)
     side_px = default_side_px(config, plan, photo_px) if side_px is None else side_px
     require_side(side_px, config.token_px)
     return side_px, size_multiple_px(config, plan, side_px)
@@ -82,8 +81,8 @@ def image_plan(
     config: ModelConfig,
     trained: Collection[str],
     fill: Fill | None = None,
-    given_depth: GivenDepth = "none",
+    depth_given: bool = False,
 ) -> GenerationPlan:
     """The plan as far as it decides about sizes: prompts do not."""
-    facts = RequestFacts(prompt=False, fill=fill, given_depth=given_depth)
+    facts = RequestFacts(prompt=False, fill=fill, depth_given=depth_given)
     return plan_generation(config, trained, facts)

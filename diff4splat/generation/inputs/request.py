@@ -21,7 +21,6 @@ from diff4splat.generation.inputs.input_cameras import (
 from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
 from diff4splat.generation.plan import (
     GenerationPlan,
-    GivenDepth,
     RequestFacts,
     plan_generation,
 )
@@ -79,7 +78,7 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         fill=settings.fill,
         still=settings.still,
         frames=config.frames,
-        given_depth=depth_given(user.depth),
+        depth_given=user.depth is not None,
         static_prompt="" if user.prompt is None else why_static(user.prompt),
     )
     plan = plan_generation(config, model.trained, facts)
@@ -98,18 +97,11 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
     )
 
 
-def depth_given(depth: DepthSource | None) -> GivenDepth:
-    """What a plan has to know of it."""
-    if depth is None:
-        return "none"
-    return "inverse" if depth.kind == "inverse" else "complete"
-
-
 def _load(model: Model, user: UserInput) -> InputImage:
     """The image at a size that the model can take, in single precision."""
     config, image = model.config, user.image
     if not isinstance(image, InputImage):
-        given = depth_given(user.depth)
+        given = user.depth is not None
         plan = image_plan(config, model.trained, user.settings.fill, given)
         side_px = default_side_px(config, plan, photo_size(Path(image)))
         multiple_px = size_multiple_px(config, plan, side_px)
