@@ -6,20 +6,20 @@ One number is missing: with another one flat scenes become deep, or right angles
 2. Else the most probable offset. Inverse depth of images usually varies by about ``SPREAD`` of its
    mean, give or take ``SPREAD_SIGMA``: that is the prior. Planes stay planes under any offset, but
    angles between them do not: the share of surfaces at right angles (``right_angles``) is the
-   evidence of rooms, tables and streets.
+   evidence of rooms, tables, streets and boxes.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from diff4splat.generation.given_depth.right_angles import perpendicular_shares
+from diff4splat.generation.given_depth.right_angles import right_angle_evidence
 
 SPREAD, SPREAD_SIGMA = 0.51, 0.4
 """Standard deviation over mean of inverse depth: the median of path-traced scenes without sky, and
 the standard deviation of its logarithm."""
-CHANCE = 0.01
-"""Share of perpendicular pairs that means nothing."""
+CLEAR = 4.0
+"""Evidence of right angles that decides."""
 SKY_SHARE, SKY_GAP, LEVEL = 0.02, 4.0, 0.004
 """Least share of sky, how many times its pixels outnumber those of the next level, and the width of
 a level as a share of the range: one of 8 bits."""
@@ -44,11 +44,13 @@ def find_offset(values: np.ndarray, tangents: tuple[np.ndarray, np.ndarray]) -> 
     if is_sky(values):
         return Offset(infinity=float(known.min()), why="sky is infinitely far")
     low, middle = np.quantile(known, [0.01, 0.5])
-    offsets = low - RELIEF / (1 - RELIEF) * max(middle - low, 1e-3 * np.ptp(known))
-    shares = perpendicular_shares(values, offsets, tangents)
-    best = int(np.argmax((shares + CHANCE) * spread_prior(known, offsets)))
-    why = "right angles" if shares[best] > 2 * CHANCE else "usual spread"
-    return Offset(infinity=_between(offsets, shares, best), why=why)
+    span = float(np.ptp(known))
+    offsets = low - RELIEF / (1 - RELIEF) * max(middle - low, 1e-3 * span)
+    scaled = (values - low) / span
+    evidence = right_angle_evidence(scaled, (offsets - low) / span, tangents)
+    best = int(np.argmax(evidence * spread_prior(known, offsets)))
+    why = "right angles" if evidence[best] > CLEAR else "usual spread"
+    return Offset(infinity=_between(offsets, evidence, best), why=why)
 
 
 def spread_prior(known: np.ndarray, offsets: np.ndarray) -> np.ndarray:
@@ -69,8 +71,8 @@ def is_sky(values: np.ndarray) -> bool:
     return count >= SKY_SHARE * values.size and count >= SKY_GAP * after
 
 
-def _between(offsets: np.ndarray, shares: np.ndarray, best: int) -> float:
+def _between(offsets: np.ndarray, evidence: np.ndarray, best: int) -> float:
     """The peak between the offsets that were tried: their mean by score."""
     near = slice(max(best - 1, 0), best + 2)
-    weights = shares[near] - 0.9 * shares[near].min() + 1e-6
+    weights = evidence[near] - 0.9 * evidence[near].min()
     return float(np.average(offsets[near], weights=weights))
