@@ -39,7 +39,7 @@ class DepthContract:
     std: tuple[float, float, float] = PLAIN[1]
     """Of RGB in [0, 1]."""
     side_px: int = 518
-    """Of the input's shorter side, where the graph leaves it free."""
+    """Of the input, where the graph leaves it free."""
     multiple_px: int = 14
     square: bool = False
     """Whether the image is stretched to a square, as the network was trained."""

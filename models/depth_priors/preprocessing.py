@@ -17,14 +17,15 @@ def input_size(
 ) -> tuple[int, int]:
     """(height, width) that the network gets for an image of ``size_px``.
 
-    A side that the graph fixes is taken; else the shape is kept, the shorter side is about the
-    contract's, and both are multiples of its patch (as image processors of DPT do).
+    A side that the graph fixes is taken; else the shape is kept, one side is about the contract's,
+    whichever takes the smaller change, and both are multiples of its patch (as image processors of
+    DPT do).
 
     Raises:
         FileFormatError: the graph asks for sides that are no image.
     """
     fixed = image.shape[-2:]
-    scale = contract.side_px / min(size_px)
+    scale = min((contract.side_px / side for side in size_px), key=lambda scale: abs(1 - scale))
     chosen = []
     for side, given in zip(size_px, fixed, strict=True):
         if given is not None:

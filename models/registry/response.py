@@ -1,8 +1,8 @@
 """The head of an HTTP response to a request for a file or the rest of it."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
+from email.message import Message
 
 from diff4splat.errors import InputError
 
@@ -21,7 +21,7 @@ class Response:
     """Strong ETag or date of the last change, for the next request; empty without one."""
 
 
-def parse_response(address: str, status: int, headers: Mapping[str, str], start: int) -> Response:
+def parse_response(address: str, status: int, headers: Message, start: int) -> Response:
     """Read the head of a response to a request from byte ``start`` on.
 
     Raises:
