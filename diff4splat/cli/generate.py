@@ -22,6 +22,7 @@ from diff4splat.cli.options.depth import (
     require_depth_kind,
     require_one_photo,
 )
+from diff4splat.cli.options.device import render_device, require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.models import ModelName, require_prompt_for, require_runtime
 
@@ -112,7 +113,10 @@ class Generate:
     compression: Literal["lossless", "standard", "small"] = "standard"
     """Of the scene file: every bit, a tenth of the size without visible loss, or less than that."""
     device: str = "cpu"
-    """Where networks run: cpu, cuda or mps. Frames are rendered on the CPU."""
+    """Where networks run and frames are rendered: cpu, cuda (frames then by gsplat), or auto, which
+    is cuda where there is one; mps runs networks alone."""
+    dtype: Literal["float32", "bfloat16", "float16"] = "float32"
+    """What networks compute in; half precision is for GPUs. Gaussians stay float32."""
     skip_depth: bool = False
     """Do not render and write depth."""
     convert: bool = False
@@ -194,7 +198,6 @@ class Generate:
     ) -> None:
         """Generate with the settings as they are; ``outcome`` compares with what was expected."""
         from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.options.device import require_device
         from diff4splat.generation.pipeline import Diff4SplatPipeline
         from diff4splat.io.atomic import atomic_folder
         from diff4splat.outputs.card import write_card
@@ -202,13 +205,13 @@ class Generate:
         from diff4splat.progress.run_log import RunLog
 
         settings, log = self.settings(), RunLog(phases=phases or ConsolePhases())
-        device = require_device(self.device)
+        device = "cpu" if self.runtime_is_onnx() else require_device(self.device)
         depth = self.given_depth()
         input_image, path = self.read_inputs()
         for line in outcome.promised.lines():
             note(line)
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
-            pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device)
+            pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device, self.dtype)
             scene = pipeline(
                 input_image,
                 path,
@@ -226,6 +229,12 @@ class Generate:
             write_card(folder / "card.json", result, inputs, log, scene_file, record)
         for line in (*lines, *filter(None, [record["not_held"]]), f"wrote {self.out}"):
             note(line)
+
+    def runtime_is_onnx(self) -> bool:
+        """Whether the model folder holds graphs, which stay on the CPU."""
+        from diff4splat.models.onnx.manifest import has_graphs
+
+        return has_graphs(Path(self.model))
 
     def given_depth(self) -> "DepthSource | None":
         """The network or map of --depth, opened."""
@@ -253,7 +262,8 @@ class Generate:
         precompile_renderer(scene.gaussians, log.phases)
         if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
             note(skipped)
-        record = FilmRecord(path=scene.path, with_depth=not self.skip_depth)
+        device = render_device(self.device)
+        record = FilmRecord(path=scene.path, with_depth=not self.skip_depth, device=device)
         with BackgroundMovie(folder / self.video_name(), frames_per_second(scene.path)) as movie:
             render_into(movie, scene, record, log)
             result = Result.of(scene, input_image.rgb, record.first_rgb)

@@ -11,6 +11,7 @@ Axes: ``b c t h w`` inside networks, images ``h w 3`` outside; this file is wher
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import torch
 from jaxtyping import Float
@@ -38,6 +39,7 @@ from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
 
 UNKNOWN_LICENSE = "unknown"
+Dtype = Literal["float32", "bfloat16", "float16"]
 
 
 class Diff4SplatPipeline:
@@ -46,6 +48,7 @@ class Diff4SplatPipeline:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.device = torch.device("cpu")
+        self.dtype = torch.float32
 
     @classmethod
     def from_pretrained(cls, name_or_folder: str | Path) -> "Diff4SplatPipeline":
@@ -60,9 +63,9 @@ class Diff4SplatPipeline:
         """
         return cls(load_model(name_or_folder, parts=()))
 
-    def to(self, device: torch.device | str) -> "Diff4SplatPipeline":
-        """Run networks there; scenes always come back to the CPU."""
-        self.device = torch.device(device)
+    def to(self, device: torch.device | str, dtype: Dtype = "float32") -> "Diff4SplatPipeline":
+        """Run networks there and in that precision; scenes come back to the CPU in float32."""
+        self.device, self.dtype = torch.device(device), getattr(torch, dtype)
         return self
 
     def save_pretrained(self, folder: Path | str) -> None:
@@ -120,7 +123,7 @@ class Diff4SplatPipeline:
         copies = Copies(image=request.image, small=request.small, depth=request.depth)
         size_px = request.small.camera.size_px
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
-        with one_thread():
+        with one_thread(), self._autocast():
             text = self._text_states(request, log)
             motion = MotionRequest(text=text, seed=request.seed, settings=request.settings)
             maps = image_maps(model, copies, frames, motion, log)
@@ -148,9 +151,10 @@ class Diff4SplatPipeline:
         """Those of the image, of the video model's fill, or of both."""
         if not request.plan.fills:
             return self._image_gaussians(request, maps, log)[0]
-        fill = fill_hidden(
-            self._running(request.plan), self._fill_request(request, maps, text), log
-        )
+        with self._autocast():
+            fill = fill_hidden(
+                self._running(request.plan), self._fill_request(request, maps, text), log
+            )
         if not request.plan.shows_image:
             return fill.gaussians
         image, visible_count = self._image_gaussians(request, maps, log)
@@ -192,6 +196,12 @@ class Diff4SplatPipeline:
         """The model with the networks of the plan alone; others may be loaded from before."""
         idle = {part: None for part in self.model.loaded if part not in plan.parts}
         return replace(self.model, networks=replace(self.model.networks, **idle))
+
+    def _autocast(self) -> torch.autocast:
+        """Networks in half precision where that was asked for."""
+        half = self.dtype != torch.float32
+        dtype = self.dtype if half else None
+        return torch.autocast(self.device.type, dtype, enabled=half)
 
     def _text_states(self, request: Request, log: RunLog) -> Float[Tensor, "1 s d"] | None:
         if "text_encoder" not in request.plan.parts:

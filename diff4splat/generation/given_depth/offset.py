@@ -4,7 +4,7 @@ One number is missing: with another one flat scenes become deep, or right angles
 
 1. Sky. Many pixels with the smallest value, and few just above it, are sky: infinity is there.
 2. Else the most probable offset. Inverse depth of images usually varies by about ``SPREAD`` of its
-   mean, give or take ``SPREAD_SIGMA``: that is the prior. Planes stay planes under any offset, but
+   mean, and that of the far end is about ``FAR_END`` of the median's: that is the prior. Planes stay planes under any offset, but
    angles between them do not: the share of surfaces at right angles (``right_angles``) is the
    evidence of rooms, tables, streets and boxes.
 """
@@ -18,8 +18,10 @@ from diff4splat.generation.given_depth.right_angles import right_angle_evidence
 SPREAD, SPREAD_SIGMA = 0.51, 0.4
 """Standard deviation over mean of inverse depth: the median of path-traced scenes without sky, and
 the standard deviation of its logarithm."""
+FAR_END, FAR_END_SIGMA = 0.55, 0.21
+"""Inverse depth of the far end over the median's: mean and standard deviation in these scenes."""
 CLEAR = 4.0
-"""Evidence of right angles that decides."""
+"""Evidence of right angles that counts; smooth objects have less under any offset."""
 SKY_SHARE, SKY_GAP, LEVEL = 0.02, 4.0, 0.004
 """Least share of sky, how many times its pixels outnumber those of the next level, and the width of
 a level as a share of the range: one of 8 bits."""
@@ -48,15 +50,17 @@ def find_offset(values: np.ndarray, tangents: tuple[np.ndarray, np.ndarray]) -> 
     offsets = low - RELIEF / (1 - RELIEF) * max(middle - low, 1e-3 * span)
     scaled = (values - low) / span
     evidence = right_angle_evidence(scaled, (offsets - low) / span, tangents)
-    best = int(np.argmax(evidence * spread_prior(known, offsets)))
-    why = "right angles" if evidence[best] > CLEAR else "usual spread"
-    return Offset(infinity=_between(offsets, evidence, best), why=why)
+    best = int(np.argmax(np.maximum(evidence, CLEAR) * usual_prior(known, offsets)))
+    if evidence[best] > CLEAR:
+        return Offset(infinity=_between(offsets, evidence, best), why="right angles")
+    return Offset(infinity=float(offsets[best]), why="usual spread")
 
 
-def spread_prior(known: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """How usual the spread of inverse depth is with infinity at each offset; at most 1."""
+def usual_prior(known: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """How usual inverse depth is with infinity at each of the offsets of ``RELIEF``; at most 1."""
     spread = known.std(dtype=np.float64) / (known.mean(dtype=np.float64) - offsets)
-    return np.exp(-0.5 * (np.log(spread / SPREAD) / SPREAD_SIGMA) ** 2)
+    deviation = np.log(spread / SPREAD) / SPREAD_SIGMA
+    return np.exp(-0.5 * (deviation**2 + ((RELIEF - FAR_END) / FAR_END_SIGMA) ** 2))
 
 
 def is_sky(values: np.ndarray) -> bool:

@@ -1,7 +1,7 @@
 """Where given depth comes from: a network in an ONNX file, or a map beside the photograph."""
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ SHAPE_TOLERANCE = 0.04
 """Of the ratio of sides: networks round both to multiples of 14 of about 518."""
 
 
+@runtime_checkable
 class DepthSource(Protocol):
     """Depth of a photograph."""
 

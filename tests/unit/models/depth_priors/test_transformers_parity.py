@@ -100,7 +100,8 @@ def test_the_image_is_prepared_as_transformers_does(tmp_path: Path) -> None:
     """Theirs resizes 8-bit pixels; ours differs by their rounding."""
     processor = _processor()
     prior = OnnxDepthPrior(small_onnx.one_map(tmp_path / "a.onnx"))
-    image = (RGB * 255).round().byte()
+    y, x = torch.meshgrid(torch.linspace(0, 4, 60), torch.linspace(0, 6, 84), indexing="ij")
+    image = (torch.stack([x.sin(), y.cos(), (x + y).sin()], -1) * 120 + 127).round().byte()
     theirs = processor(image.numpy(), return_tensors="pt")["pixel_values"]
     ours = network_input(prior.contract, prior.image, image.float() / 255)
     assert ours.shape == theirs.shape
