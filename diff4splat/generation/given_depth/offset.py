@@ -4,9 +4,9 @@ One number is missing: with another one flat scenes become deep, or right angles
 
 1. Sky. Many pixels with the smallest value, and few just above it, are sky: infinity is there.
 2. Else the most probable offset. Inverse depth of images usually varies by about ``SPREAD`` of its
-   mean, and that of the far end is about ``FAR_END`` of the median's: that is the prior. Planes stay planes under any offset, but
-   angles between them do not: the share of surfaces at right angles (``right_angles``) is the
-   evidence of rooms, tables, streets and boxes.
+   mean, and that of the far end is about ``FAR_END`` of the median's: that is the prior. Planes
+   stay planes under any offset, but angles between them do not: the share of surfaces at right
+   angles (``right_angles``) is the evidence of rooms, tables, streets and boxes.
 """
 
 from dataclasses import dataclass

@@ -1,5 +1,6 @@
 """Where given depth comes from: a network in an ONNX file, or a map beside the photograph."""
 
+import math
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -84,7 +85,7 @@ class FileDepth:
             InputError: the map has another shape than the photograph.
         """
         height, width = image.camera.size_px
-        window = image.window or PhotoWindow.whole((height, width))
+        window = image.window or PhotoWindow.full((height, width))
         values = upright_array(self.found.values, self.found.orientation)
         values = oriented(self.file, values, window)
         rows, columns = (pixel_places(window, axis, values.shape[axis]) for axis in (0, 1))
@@ -150,7 +151,7 @@ def oriented(file: Path, values: np.ndarray, window: PhotoWindow) -> np.ndarray:
 def shape_fits(shape: tuple[int, ...], photo_px: tuple[int, int]) -> bool:
     """Whether two sizes have about one ratio of sides."""
     ratio = (shape[0] / shape[1]) / (photo_px[0] / photo_px[1])
-    return abs(np.log(ratio)) <= SHAPE_TOLERANCE
+    return abs(math.log(ratio)) <= SHAPE_TOLERANCE
 
 
 def pixel_places(window: PhotoWindow, axis: int, length: int) -> np.ndarray:

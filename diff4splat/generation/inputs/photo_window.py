@@ -17,6 +17,6 @@ class PhotoWindow:
     """EXIF orientation of the file, before it was turned upright."""
 
     @classmethod
-    def whole(cls, size_px: tuple[int, int]) -> "PhotoWindow":
+    def full(cls, size_px: tuple[int, int]) -> "PhotoWindow":
         """All of a photograph."""
         return cls(photo_px=size_px, corner_px=(0, 0), size_px=size_px)
