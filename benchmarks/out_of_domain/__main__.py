@@ -5,7 +5,7 @@ from pathlib import Path
 
 from benchmarks.out_of_domain.depth_table import write_depth_table
 from benchmarks.out_of_domain.path_views import render_views
-from benchmarks.out_of_domain.prior_table import write_prior_table
+from benchmarks.out_of_domain.prior_table import write_prior_picture, write_prior_table
 from benchmarks.out_of_domain.rendering import render_images
 
 
@@ -32,6 +32,12 @@ def main() -> None:
     priors.add_argument("--model", default="small")
     priors.add_argument("--out", type=Path, required=True)
     priors.set_defaults(run=write_prior_table)
+    picture = commands.add_parser("picture")
+    picture.add_argument("--images", type=Path, required=True)
+    picture.add_argument("--model", default="small")
+    picture.add_argument("--items", type=int, nargs="+", default=[0, 1])
+    picture.add_argument("--out", type=Path, required=True)
+    picture.set_defaults(run=write_prior_picture)
     depth = commands.add_parser("depth")
     depth.add_argument("--images", type=Path, required=True)
     depth.add_argument("--model", nargs="+", default=["small"])

@@ -20,6 +20,7 @@ from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry.camera import focal_from_fov, pinhole
 from diff4splat.io.atomic import write_text
+from diff4splat.io.photos.images import write_png
 from diff4splat.metrics.image import psnr
 from diff4splat.models.depth_priors.kinds import DepthKind, DepthMap
 from diff4splat.paths.camera_path import CameraPath
@@ -116,6 +117,17 @@ def sources(item: Item, index: int) -> dict[str, ArrayDepth | None]:
 
 def path_psnr(pipeline: Diff4SplatPipeline, item: Item, source: ArrayDepth | None) -> float:
     """Mean PSNR of the views along the path."""
+    targets = torch.from_numpy(item["views"]).float() / 255
+    found = path_views(pipeline, item, source)
+    return statistics.mean(
+        float(psnr(view, target)) for view, target in zip(found, targets, strict=True)
+    )
+
+
+def path_views(
+    pipeline: Diff4SplatPipeline, item: Item, source: ArrayDepth | None
+) -> list[torch.Tensor]:
+    """The generated scene as the cameras of the path see it."""
     rgb = torch.from_numpy(item["rgb"]).float() / 255
     size_px = (rgb.shape[0], rgb.shape[1])
     camera = pinhole(focal_from_fov(float(item["fov_deg"]), size_px[1]), size_px).to(torch.float32)
@@ -124,12 +136,24 @@ def path_psnr(pipeline: Diff4SplatPipeline, item: Item, source: ArrayDepth | Non
     times_s = torch.arange(len(poses)) / 24
     path = CameraPath(cameras=camera.with_pose(poses), times_s=times_s)
     scene = pipeline(image, path, log=RunLog(), depth=source)
-    targets = torch.from_numpy(item["views"]).float() / 255
-    found = [
-        float(psnr(render(scene, scene.path.cameras[number], 0.0).rgb, target))
-        for number, target in enumerate(targets, 1)
-    ]
-    return statistics.mean(found)
+    cameras = scene.path.cameras
+    with torch.no_grad():
+        return [render(scene, cameras[number], 0.0).rgb for number in range(1, len(cameras))]
+
+
+def write_prior_picture(arguments: argparse.Namespace) -> None:
+    """A row per item: input, target, with the model's own depth, with 8-bit disparity."""
+    pipeline = Diff4SplatPipeline.from_pretrained(arguments.model)
+    rows = []
+    for number in arguments.items:
+        with np.load(arguments.images / f"{number:04d}.npz", allow_pickle=False) as arrays:
+            item = dict(arrays)
+        given = sources(item, number)["disparity, affine, 8 bits"]
+        cells = [torch.from_numpy(item[name]).float() / 255 for name in ("rgb", "views")]
+        cells = [cells[0], cells[1][-1]]
+        cells += [path_views(pipeline, item, source)[-1] for source in (None, given)]
+        rows.append(torch.cat([cell.clamp(0, 1) for cell in cells], 1))
+    write_png(torch.cat(rows), arguments.out)
 
 
 def table_rows(rows: dict[str, list[float]]) -> list[str]:
