@@ -29,7 +29,10 @@ from diff4splat.render.api import render
 
 Item = dict[str, np.ndarray]
 Distort = Callable[[np.ndarray, np.random.Generator], np.ndarray]
-HEADER = "| depth | PSNR [dB] | difference [dB] | worst item [dB] |\n|---|---:|---:|---:|\n"
+HEADER = (
+    "| depth | PSNR [dB] | mean difference | median difference | worst scene |\n"
+    "|---|---:|---:|---:|---:|\n"
+)
 
 
 class ArrayDepth:
@@ -73,8 +76,20 @@ def quantised(distort: Distort, bits: int) -> Distort:
     return apply
 
 
+def levels(bits: int) -> Distort:
+    """Whole numbers of which 0 is infinitely far."""
+
+    def apply(disparity: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        del rng
+        return np.round(disparity / disparity.max() * (2**bits - 1))
+
+    return apply
+
+
 DISPARITIES: dict[str, tuple[DepthKind, Distort]] = {
     "disparity, 0 at infinity stated": ("disparity", scaled),
+    "the same, 16 bits": ("disparity", levels(16)),
+    "the same, 8 bits": ("disparity", levels(8)),
     "disparity up to a factor": ("inverse", scaled),
     "disparity, affine": ("inverse", affine),
     "disparity, affine, 16 bits": ("inverse", quantised(affine, 16)),
@@ -162,6 +177,7 @@ def table_rows(rows: dict[str, list[float]]) -> list[str]:
     lines = []
     for name, values in rows.items():
         gaps = [value - true for value, true in zip(values, truth, strict=True)]
-        cells = (statistics.mean(values), statistics.mean(gaps), min(gaps))
-        lines.append(f"| {name} | {cells[0]:.2f} | {cells[1]:+.2f} | {cells[2]:+.2f} |")
+        cells = (statistics.mean(gaps), statistics.median(gaps), min(gaps))
+        shown = " | ".join(f"{cell:+.2f}" for cell in cells)
+        lines.append(f"| {name} | {statistics.mean(values):.2f} | {shown} |")
     return lines

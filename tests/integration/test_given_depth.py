@@ -79,7 +79,7 @@ def test_what_is_refused(photo: Path, tmp_path: Path, capsys: pytest.CaptureFixt
         ("--depth", png, "--depth-kind", "millimetres"): "expected known pixels",
         ("--depth", nan): "NaN or infinity",
         ("--depth", outside): "outside of its folder",
-        ("--depth", str(tmp_path / "text.onnx")): "an ONNX graph",
+        ("--depth", str(tmp_path / "text.onnx")): "ONNX graph",
         ("--depth", str(tmp_path / "absent.onnx")): "no such file",
         ("--depth", "depth-anything-v2-small"): "models get depth-anything-v2-small",
     }
