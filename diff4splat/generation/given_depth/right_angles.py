@@ -17,7 +17,7 @@ SIDE_PX = 172
 """The map is looked at about this large."""
 STEP_PX = 3
 """Distance of the differences."""
-BLUR = 1.0
+BLUR, BLUR_OF_8_BITS = 1.0, 2.0
 """Standard deviation of a blur before them, in their pixels: 8 bits are steps."""
 SMOOTH = 0.15
 """Change of a gradient over that distance, of the range, beyond which there is an edge."""
@@ -72,7 +72,8 @@ def _gradients(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """(h, w, 3) normals at infinity 0, and (h, w) where no edge is near."""
     scale = max(1, round(max(values.shape) / SIDE_PX))
-    smooth = cv2.GaussianBlur(values.astype(np.float32), (0, 0), BLUR * scale)
+    blur = BLUR_OF_8_BITS if len(np.unique(values)) <= 256 else BLUR
+    smooth = cv2.GaussianBlur(values.astype(np.float32), (0, 0), blur * scale)
     v = smooth[scale // 2 :: scale, scale // 2 :: scale].astype(np.float64)
     x, y = (tangent[scale // 2 :: scale] for tangent in tangents)
     if min(v.shape) <= 4 * STEP_PX:
