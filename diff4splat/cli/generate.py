@@ -74,7 +74,7 @@ class Generate:
     fov: Annotated[float | None, Number(least=1, most=170)] = None
     """Horizontal field of view in degrees. Default: from EXIF, else a 30 mm lens."""
     depth: Annotated[Path | None, DepthFileOrName()] = None
-    """Depth in place of the model's own: a depth network (.onnx, or a name of `models list` that
+    """Depth in place of what the model predicts: a network (.onnx, or a name of `models list` that
     was downloaded), or a map of the photo by any tool (.exr, .png, .npy)."""
     depth_kind: (
         Literal["metric", "millimetres", "relative", "distance", "disparity", "inverse"] | None

@@ -112,14 +112,14 @@ def open_depth(file: Path, kind: DepthKind | None = None) -> DepthSource:
     return FileDepth(file, kind)
 
 
-def require_stated(file: Path, found: DepthFile) -> DepthKind:
+def require_stated(file: Path, content: DepthFile) -> DepthKind:
     """The kind that the file states.
 
     Raises:
         ConfigError: it states none.
     """
-    if found.quantity:
-        return found.quantity
+    if content.quantity:
+        return content.quantity
     kinds = "; ".join(f"{name}: {meaning}" for name, meaning in KINDS.items())
     raise ConfigError(
         f"{file}: expected --depth-kind, since numbers in {file.suffix.lower()} can mean anything; "
