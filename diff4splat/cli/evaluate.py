@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.models import FeatureFiles, ModelName
+from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
@@ -38,6 +39,10 @@ class Evaluate:
     """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
     fill: Literal["none", "video"] | None = None
     """What fills hidden regions, as in `generate`. Default: that of the model."""
+    device: str = "cpu"
+    """Where networks of generation run: cpu, cuda, or auto, which is cuda where there is one."""
+    dtype: Literal["float32", "bfloat16", "float16"] = "float32"
+    """What they compute in."""
     fresh: bool = False
     """Ignore the results of an earlier run in the same folder."""
 
@@ -45,6 +50,11 @@ class Evaluate:
         """Require a protocol that can be read."""
         from diff4splat.evaluation.protocols.protocol_json import load_protocol
 
+        if self.task == "reconstruction" and (self.device, self.dtype) != ("cpu", "float32"):
+            raise ConfigError(
+                "--device, --dtype: expected without --task reconstruction, which runs on the CPU "
+                "in float32; leave them out"
+            )
         load_protocol(self.protocol)
 
     def run(self) -> None:
@@ -91,6 +101,7 @@ class Evaluate:
         """The model as the system of the task."""
         from functools import partial
 
+        from diff4splat.cli.options.device import require_device
         from diff4splat.evaluation.systems.evaluated_system import (
             Generator,
             Reconstructor,
@@ -103,6 +114,7 @@ class Evaluate:
 
         if self.task != "reconstruction":
             pipeline = Diff4SplatPipeline.from_pretrained(self.model)
+            pipeline.to(require_device(self.device), self.dtype)
             return Generator(pipeline=pipeline, settings=self.settings())
         model = load_model(self.model, RECONSTRUCTION_PARTS)
         return Reconstructor(

@@ -16,11 +16,19 @@ import tyro
 from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.camera import CameraOptions, choose_path, require_camera
 from diff4splat.cli.options.constraints import Number, OutFolder
+from diff4splat.cli.options.depth import (
+    DepthFileOrName,
+    depth_file,
+    require_depth_kind,
+    require_one_photo,
+)
+from diff4splat.cli.options.device import render_device, require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.models import ModelName, require_prompt_for, require_runtime
 
 if TYPE_CHECKING:
     from diff4splat.cli.limits.generation import Outcome
+    from diff4splat.generation.given_depth.source import DepthSource
     from diff4splat.generation.inputs.input_image import InputImage
     from diff4splat.generation.settings import GenerationSettings
     from diff4splat.outputs.card import Result
@@ -65,6 +73,14 @@ class Generate:
     pixel."""
     fov: Annotated[float | None, Number(least=1, most=170)] = None
     """Horizontal field of view in degrees. Default: from EXIF, else a 30 mm lens."""
+    depth: Annotated[Path | None, DepthFileOrName()] = None
+    """Depth in place of what the model predicts: a network (.onnx, or a name of `models list` that
+    was downloaded), or a map of the photo by any tool (.exr, .png, .npy)."""
+    depth_kind: (
+        Literal["metric", "millimetres", "relative", "distance", "disparity", "inverse"] | None
+    ) = None
+    """What the numbers of --depth are: z in metres or millimetres, z up to a factor, length of the
+    ray, 1/z with 0 at infinity, or 1/z up to factor and offset. Default: what the file states."""
     fill: Literal["none", "video"] | None = None
     """What shows where the image hides: extended layers (none), or what the video model generates
     (video). Default: the model decides; small: none."""
@@ -97,7 +113,10 @@ class Generate:
     compression: Literal["lossless", "standard", "small"] = "standard"
     """Of the scene file: every bit, a tenth of the size without visible loss, or less than that."""
     device: str = "cpu"
-    """Where networks run: cpu, cuda or mps. Frames are rendered on the CPU."""
+    """Where networks run and frames are rendered: cpu, cuda (frames then by gsplat), or auto, which
+    is cuda where there is one; mps runs networks alone."""
+    dtype: Literal["float32", "bfloat16", "float16"] = "float32"
+    """What networks compute in; half precision is for GPUs. Gaussians stay float32."""
     skip_depth: bool = False
     """Do not render and write depth."""
     convert: bool = False
@@ -117,8 +136,11 @@ class Generate:
         if self.prompt is not None:
             require_prompt_for(self.model, self.prompt)
         require_runtime(self.model, self.runtime, self.device)
+        require_depth_kind(self.depth, self.depth_kind)
         if photo_files(self.images) == list(self.images[:1]):
             self.check_photo()
+        else:
+            require_one_photo(self.depth)
 
     def check_photo(self) -> None:
         """Check the photo's header, and that nothing of it is overwritten."""
@@ -126,7 +148,8 @@ class Generate:
         from diff4splat.outputs.file_names import OUTPUT_FILES
 
         outputs = [self.out / name for name in OUTPUT_FILES]
-        require_inputs_not_overwritten((self.image, Path(self.camera)), outputs)
+        inputs = (self.image, Path(self.camera), *filter(None, (self.depth,)))
+        require_inputs_not_overwritten(inputs, outputs)
         with open_photo(self.image, self.convert):
             pass
 
@@ -175,7 +198,6 @@ class Generate:
     ) -> None:
         """Generate with the settings as they are; ``outcome`` compares with what was expected."""
         from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.options.device import require_device
         from diff4splat.generation.pipeline import Diff4SplatPipeline
         from diff4splat.io.atomic import atomic_folder
         from diff4splat.outputs.card import write_card
@@ -183,14 +205,21 @@ class Generate:
         from diff4splat.progress.run_log import RunLog
 
         settings, log = self.settings(), RunLog(phases=phases or ConsolePhases())
-        device = require_device(self.device)
+        device = "cpu" if self.runtime_is_onnx() else require_device(self.device)
+        depth = self.given_depth()
         input_image, path = self.read_inputs()
         for line in outcome.promised.lines():
             note(line)
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
-            pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device)
+            pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device, self.dtype)
             scene = pipeline(
-                input_image, path, self.prompt, seed=self.seed, settings=settings, log=log
+                input_image,
+                path,
+                self.prompt,
+                seed=self.seed,
+                settings=settings,
+                log=log,
+                depth=depth,
             )
             if on_scene is not None:
                 on_scene(scene)
@@ -200,6 +229,18 @@ class Generate:
             write_card(folder / "card.json", result, inputs, log, scene_file, record)
         for line in (*lines, *filter(None, [record["not_held"]]), f"wrote {self.out}"):
             note(line)
+
+    def runtime_is_onnx(self) -> bool:
+        """Whether the model folder holds graphs, which stay on the CPU."""
+        from diff4splat.models.onnx.manifest import has_graphs
+
+        return has_graphs(Path(self.model))
+
+    def given_depth(self) -> "DepthSource | None":
+        """The network or map of --depth, opened."""
+        from diff4splat.generation.given_depth.source import open_depth
+
+        return None if self.depth is None else open_depth(depth_file(self.depth), self.depth_kind)
 
     def write_results(
         self, folder: Path, scene: "Scene", input_image: "InputImage", log: "RunLog"
@@ -221,7 +262,8 @@ class Generate:
         precompile_renderer(scene.gaussians, log.phases)
         if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
             note(skipped)
-        record = FilmRecord(path=scene.path, with_depth=not self.skip_depth)
+        device = render_device(self.device)
+        record = FilmRecord(path=scene.path, with_depth=not self.skip_depth, device=device)
         with BackgroundMovie(folder / self.video_name(), frames_per_second(scene.path)) as movie:
             render_into(movie, scene, record, log)
             result = Result.of(scene, input_image.rgb, record.first_rgb)
@@ -325,7 +367,9 @@ class Generate:
         from diff4splat.io.photos.images import photo_size
 
         photo_px = photo_size(self.image)
-        side_px, multiple_px = find_image_size(self.model, self.resolution, self.fill, photo_px)
+        side_px, multiple_px = find_image_size(
+            self.model, self.resolution, self.fill, photo_px, self.depth is not None
+        )
         return load_image(self.image, side_px, self.fov, self.convert, multiple_px, self.fit)
 
     def inputs(

@@ -45,7 +45,8 @@ class Train:
     minutes: Annotated[float | None, Number(above=0)] = None
     """Save and stop after this many minutes of this call."""
     device: str | None = None
-    """Device, such as cpu. Default: a GPU if available."""
+    """Device, such as cpu; auto, the default, is a GPU if available. The recipe has the precision:
+    --set trainer.precision=bfloat16."""
     ignore_gates: bool = False
     """Start even if earlier stages are unfinished or below their quality thresholds."""
 
@@ -72,7 +73,7 @@ class Train:
             start=self.starting_model(),
             stop_after_steps=self.steps,
             stop_after_s=None if self.minutes is None else 60 * self.minutes,
-            device=self.device,
+            device=None if self.device == "auto" else self.device,
             phases=phases,
             note=note,
         )

@@ -11,6 +11,7 @@ Axes: ``b c t h w`` inside networks, images ``h w 3`` outside; this file is wher
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import torch
 from jaxtyping import Float
@@ -18,6 +19,7 @@ from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
+from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.inputs.request import Request, UserInput, prepare_request
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
@@ -37,6 +39,7 @@ from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
 
 UNKNOWN_LICENSE = "unknown"
+Dtype = Literal["float32", "bfloat16", "float16"]
 
 
 class Diff4SplatPipeline:
@@ -45,6 +48,7 @@ class Diff4SplatPipeline:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.device = torch.device("cpu")
+        self.dtype = torch.float32
 
     @classmethod
     def from_pretrained(cls, name_or_folder: str | Path) -> "Diff4SplatPipeline":
@@ -59,9 +63,9 @@ class Diff4SplatPipeline:
         """
         return cls(load_model(name_or_folder, parts=()))
 
-    def to(self, device: torch.device | str) -> "Diff4SplatPipeline":
-        """Run networks there; scenes always come back to the CPU."""
-        self.device = torch.device(device)
+    def to(self, device: torch.device | str, dtype: Dtype = "float32") -> "Diff4SplatPipeline":
+        """Run networks there and in that precision; scenes come back to the CPU in float32."""
+        self.device, self.dtype = torch.device(device), getattr(torch, dtype)
         return self
 
     def save_pretrained(self, folder: Path | str) -> None:
@@ -78,6 +82,7 @@ class Diff4SplatPipeline:
         seed: int = 0,
         settings: GenerationSettings | None = None,
         log: RunLog | None = None,
+        depth: DepthSource | None = None,
     ) -> Scene:
         """Generate a scene; equal arguments give equal bits on one machine.
 
@@ -88,6 +93,7 @@ class Diff4SplatPipeline:
             seed: of the noise that sampling starts from.
             settings: sampling, guidance, filling and pruning.
             log: collects seconds and what was skipped.
+            depth: takes the place of the model's depth prior (``open_depth``).
 
         Raises:
             InputError: the image, the path or the prompt cannot be used.
@@ -101,6 +107,7 @@ class Diff4SplatPipeline:
             prompt=prompt,
             seed=seed,
             settings=settings or GenerationSettings(),
+            depth=depth,
         )
         request = prepare_request(self.model, user, self.device)
         request.plan.record(self.model, log)
@@ -113,10 +120,10 @@ class Diff4SplatPipeline:
     def generate(self, request: Request, log: RunLog) -> Scene:
         """A prepared request, with its networks loaded."""
         model = self._running(request.plan)
-        copies = Copies(image=request.image, small=request.small)
+        copies = Copies(image=request.image, small=request.small, depth=request.depth)
         size_px = request.small.camera.size_px
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
-        with one_thread():
+        with one_thread(), self._autocast():
             text = self._text_states(request, log)
             motion = MotionRequest(text=text, seed=request.seed, settings=request.settings)
             maps = image_maps(model, copies, frames, motion, log)
@@ -144,9 +151,10 @@ class Diff4SplatPipeline:
         """Those of the image, of the video model's fill, or of both."""
         if not request.plan.fills:
             return self._image_gaussians(request, maps, log)[0]
-        fill = fill_hidden(
-            self._running(request.plan), self._fill_request(request, maps, text), log
-        )
+        with self._autocast():
+            fill = fill_hidden(
+                self._running(request.plan), self._fill_request(request, maps, text), log
+            )
         if not request.plan.shows_image:
             return fill.gaussians
         image, visible_count = self._image_gaussians(request, maps, log)
@@ -188,6 +196,12 @@ class Diff4SplatPipeline:
         """The model with the networks of the plan alone; others may be loaded from before."""
         idle = {part: None for part in self.model.loaded if part not in plan.parts}
         return replace(self.model, networks=replace(self.model.networks, **idle))
+
+    def _autocast(self) -> torch.autocast:
+        """Networks in half precision where that was asked for."""
+        half = self.dtype != torch.float32
+        dtype = self.dtype if half else None
+        return torch.autocast(self.device.type, dtype, enabled=half)
 
     def _text_states(self, request: Request, log: RunLog) -> Float[Tensor, "1 s d"] | None:
         if "text_encoder" not in request.plan.parts:

@@ -1,6 +1,7 @@
 """Which networks one request needs, decided before any of them is loaded.
 
-    depth prior          if the model has one; else the image lies on a plane
+    depth prior          if the model has one and no depth is given; without either the image lies
+                         on a plane
     motion prior         if the model has one and a prompt asks for motion in words that it knows;
                          else the image is static
     text encoder         if a prompt is given and something takes it
@@ -24,6 +25,9 @@ FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 """What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
+DEPTH_GIVEN = "depth is given"
+CHOICES = (WORSE_FILL, DEPTH_GIVEN)
+"""Reasons that are choices: the part would give another scene."""
 NO_MOTION = "no prompt asks for motion"
 UNTRAINED_FILL = "the video model is not trained"
 
@@ -39,6 +43,8 @@ class RequestFacts:
     """Nothing may move."""
     frames: int = 2
     """Frames of the camera path as the networks see it."""
+    depth_given: bool = False
+    """Whether the request brings its depth along."""
     static_prompt: str = ""
     """Why a trained motion prior finds no motion in the prompt; empty where it may."""
 
@@ -59,6 +65,7 @@ class GenerationPlan:
 
     parts: frozenset[str]
     skipped: tuple[SkippedPart, ...]
+    depth_given: bool = False
 
     @property
     def fills(self) -> bool:
@@ -72,8 +79,8 @@ class GenerationPlan:
 
     @property
     def has_depth(self) -> bool:
-        """Whether the depth prior runs."""
-        return "monocular_depth" in self.parts
+        """Whether depth is predicted or given."""
+        return self.depth_given or "monocular_depth" in self.parts
 
     @property
     def shows_image(self) -> bool:
@@ -99,7 +106,7 @@ def plan_generation(
         ConfigError: the video model is asked to fill, but it is not trained and other parts are.
     """
     reasons = {
-        "monocular_depth": _untrained("monocular_depth", trained),
+        "monocular_depth": _depth_reason(trained, facts),
         "motion_unet": _untrained("motion_unet", trained)
         or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
@@ -114,17 +121,21 @@ def plan_generation(
     reasons["text_encoder"] = asked if facts.prompt else "no prompt"
     parts = model_parts(config)
     skipped = [
-        SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] == WORSE_FILL)
+        SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] in CHOICES)
         for part in parts
         if reasons[part]
     ]
     running = frozenset(part for part in parts if not reasons[part])
-    return GenerationPlan(parts=running, skipped=tuple(skipped))
+    return GenerationPlan(parts=running, skipped=tuple(skipped), depth_given=facts.depth_given)
 
 
 def _untrained(part: str, trained: Collection[str]) -> str:
     """Random models run whole; in others a part that is not trained stays out."""
     return "it is not trained" if trained and part not in trained else ""
+
+
+def _depth_reason(trained: Collection[str], facts: RequestFacts) -> str:
+    return DEPTH_GIVEN if facts.depth_given else _untrained("monocular_depth", trained)
 
 
 def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:

@@ -11,6 +11,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
+from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
+from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.build import FineDepth, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
@@ -27,6 +29,8 @@ class Copies:
 
     image: InputImage
     small: InputImage
+    depth: DepthSource | None = None
+    """Depth of the image that takes the place of the model's own prior."""
 
 
 def image_maps(
@@ -35,7 +39,7 @@ def image_maps(
     """Depth, and displacement over ``frames`` latent frames, by the priors that are loaded."""
     image = images.small
     with log.phases.phase("predict depth"):
-        depth, fine = _depths(model, images)
+        depth, fine = _depths(model, images, log)
     if model.networks.motion_unet is None or frames < 2:
         return ImageMaps(depth=depth, displacement=None, fine=fine)
     motion = _sample_motion(model, image, frames, request, log)
@@ -46,8 +50,13 @@ def image_maps(
     return ImageMaps(depth=depth, displacement=moved, fine=fine)
 
 
-def _depths(model: Model, images: Copies) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
+def _depths(
+    model: Model, images: Copies, log: RunLog
+) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
     """Depth of the copy; where the prior sees a larger one, its own and that one reduced."""
+    if images.depth is not None:
+        return _given_depths(images, log)
+    log.depth["source"] = "plane" if model.networks.monocular_depth is None else "model"
     scale = model.config.monocular_depth.photo_scale
     reduction = images.small.reduction
     if model.networks.monocular_depth is None or scale == 1 or reduction % scale:
@@ -56,6 +65,15 @@ def _depths(model: Model, images: Copies) -> tuple[Float[Tensor, "h w"], FineDep
     fine = FineDepth(rgb=larger.rgb, depth=image_depth(model, larger))
     inverse = torch.nn.functional.avg_pool2d(1 / fine.depth[None, None], scale)[0, 0]
     return 1 / inverse, fine
+
+
+def _given_depths(images: Copies, log: RunLog) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
+    """Given depth at the size of the image, and reduced."""
+    depth = given_depth(images.depth, images.image, log)
+    if images.small.camera.size_px == images.image.camera.size_px:
+        return depth, None
+    fine = FineDepth(rgb=images.image.rgb, depth=depth, smooth=False)
+    return reduced_depth(depth, images.small.camera.size_px), fine
 
 
 def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:

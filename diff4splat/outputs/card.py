@@ -99,6 +99,7 @@ def write_card(
         "peak_memory_bytes": peak_memory_bytes(),
         "forecast": forecast,
         "networks_run": log.networks,
+        "depth": log.depth,
         "left_out": log.skipped.to_json(),
         "versions": {name: version(name) for name in LIBRARIES},
         "machine": {

@@ -4,7 +4,7 @@ Axes: ``t`` frames, ``h w`` pixels, ``s`` frames of the contact sheet.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import torch
 from jaxtyping import Float, Int
@@ -31,6 +31,8 @@ class FilmRecord:
     path: CameraPath
     with_depth: bool = True
     settings: RenderSettings = DEFAULTS
+    device: str = "cpu"
+    """Where frames are rendered; what is kept is on the CPU."""
     first_rgb: Float[Tensor, "h w 3"] | None = None
     sheet_rgb: list[Float[Tensor, "h w 3"]] = field(default_factory=list)
     depth: Float[Tensor, "t h w"] | None = None
@@ -70,11 +72,30 @@ def film(scene: Scene, record: FilmRecord, log: RunLog) -> Iterator[Float[Tensor
         log.record_skipped("depth", "not asked for", f"{count} blended depth maps")
     with log.phases.phase("render", count) as advance, torch.no_grad():
         frames = render_video(
-            scene, record.path, outputs=outputs, settings=record.settings, advance=advance
+            on_device(scene, record.device),
+            record.path,
+            outputs=outputs,
+            settings=record.settings,
+            advance=advance,
         )
-        for index, frame in enumerate(frames):
+        for index, frame in enumerate(map(on_cpu, frames)):
             record.add(index, frame)
             yield frame.rgb
+
+
+def on_device(scene: Scene, device: str) -> Scene:
+    """The scene where it is rendered; gsplat then takes what is on a CUDA device."""
+    return scene if torch.device(device).type == "cpu" else scene.to(torch.device(device))
+
+
+def on_cpu(frame: RenderOutput) -> RenderOutput:
+    """The same images, where files are written from."""
+    images = {
+        name: value.cpu()
+        for name in ("rgb", "depth", "alpha")
+        if (value := getattr(frame, name)) is not None
+    }
+    return replace(frame, **images)
 
 
 def empty_note(scene: Scene, record: FilmRecord) -> str | None:

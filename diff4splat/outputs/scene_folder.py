@@ -25,7 +25,7 @@ from diff4splat.io.scene_files.compression import Compression
 from diff4splat.outputs.card import Result
 from diff4splat.outputs.compressed_scene import SceneFileFacts, write_scene
 from diff4splat.outputs.file_names import VIEW_SUFFIXES
-from diff4splat.outputs.filming import FilmRecord, empty_note, film
+from diff4splat.outputs.filming import FilmRecord, empty_note, film, on_device
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.phases import Phases
 from diff4splat.progress.run_log import RunLog
@@ -117,10 +117,11 @@ def write_view(
     time_s: float | None,
     log: RunLog,
     settings: RenderSettings = DEFAULTS,
+    device: str = "cpu",
 ) -> tuple[str, ...]:
     """Render ``path`` into one file whose name says what it holds; returns notes about it.
 
-    With ``time_s`` all frames show that time.
+    With ``time_s`` all frames show that time. Frames are rendered on ``device``.
 
     Raises:
         ConfigError: another suffix.
@@ -131,12 +132,13 @@ def write_view(
         scene = replace(scene, gaussians=scene.state_at(time_s), motion=StaticMotion())
     if file.suffix.lower() == ".exr":
         with log.phases.phase("render", len(path)) as advance, torch.no_grad():
+            there = on_device(scene, device)
             frames = render_video(
-                scene, path, outputs=("depth",), settings=settings, advance=advance
+                there, path, outputs=("depth",), settings=settings, advance=advance
             )
-            _write_depth(torch.stack([frame.depth for frame in frames]), path, file)
+            _write_depth(torch.stack([frame.depth.cpu() for frame in frames]), path, file)
         return ()
-    record = FilmRecord(path=path, with_depth=False, settings=settings)
+    record = FilmRecord(path=path, with_depth=False, settings=settings, device=device)
     notes: tuple[str, ...] = ()
     if is_movie(file):
         notes = write_film(scene, file, record, log)

@@ -15,6 +15,8 @@ class RunLog:
     skipped: SkippedWorkList = field(default_factory=SkippedWorkList)
     networks: list[str] = field(default_factory=list)
     """Names of the networks that ran, in order."""
+    depth: dict[str, object] = field(default_factory=dict)
+    """Where the depth came from; empty where no scene is generated."""
 
     def record_skipped(
         self, what: str, why: str, saved: str, error: float | None = 0.0, error_unit: str = ""

@@ -1,9 +1,5 @@
-"""One ONNX graph on ONNX Runtime, NumPy arrays in and out. The only importer of ONNX Runtime.
+"""One ONNX graph on ONNX Runtime, NumPy arrays in and out. Nothing here imports torch."""
 
-Nothing here imports torch. ONNX Runtime collects no telemetry in its public builds for Python.
-"""
-
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -18,6 +14,7 @@ from diff4splat.models.onnx.manifest import (
     read_manifest,
     require_files,
 )
+from diff4splat.models.onnx.session import open_session
 from diff4splat.models.onnx.shapes import match_shape
 
 Arrays = Mapping[str, np.ndarray]
@@ -57,21 +54,7 @@ class OnnxGraph:
         return dict(zip(names, session.run(names, arrays), strict=True))
 
     def _open(self) -> object:
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = self.threads or len(os.sched_getaffinity(0))
-        # Spinning threads take the cores that the renderer and other requests need.
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        options.log_severity_level = 3
-        try:
-            self._session = onnxruntime.InferenceSession(
-                str(self.file), options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:  # ONNX Runtime raises many types of its own
-            raise FileFormatError(
-                f"{self.file}: expected a graph that ONNX Runtime opens, got {error}; {ADVICE}"
-            ) from error
+        self._session = open_session(self.file, self.threads, ADVICE)
         return self._session
 
     def _require(self, inputs: Arrays) -> None:

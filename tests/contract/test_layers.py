@@ -111,7 +111,9 @@ def test_no_network_library_and_no_torchvision_anywhere() -> None:
     banned = {"torchvision", "requests", "urllib", "http", "socket", "pickle"}
     for _, path in source_files():
         found = {name.split(".")[0] for name in imported_modules(path)} & banned
-        # The server listens there; nothing connects to anything.
+        # The server listens there; downloads that were asked for are the only connections.
         if path == ROOT / "diff4splat" / "serving" / "api" / "run.py":
             found.discard("socket")
+        if path == ROOT / "models" / "registry" / "download.py":
+            found -= {"urllib", "http"}
         assert not found, f"{path.relative_to(ROOT)} imports {found}"

@@ -44,6 +44,7 @@ COMMANDS = (
     *("prepare import", "prepare doctor"),
     *("prepare align", "prepare captions", "prepare curate", "prepare poses"),
     *("report error-time", "report knobs", "report stability"),
+    *("models list", "models get"),
 )
 
 

@@ -20,6 +20,7 @@ from diff4splat.cli.fit import Fit
 from diff4splat.cli.generate import Generate
 from diff4splat.cli.inspect import Inspect
 from diff4splat.cli.limits.forecast import Forecasts, forecasts
+from diff4splat.cli.models import GetModel, ListModels
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
@@ -33,6 +34,7 @@ from diff4splat.cli.train import Train
 
 subcommand = tyro.conf.subcommand
 Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
+Models = Annotated[ListModels, subcommand("list")] | Annotated[GetModel, subcommand("get")]
 Prepare = (
     Annotated[PrepareSynthetic, subcommand("synth")]
     | Annotated[PrepareLatents, subcommand("latents")]
@@ -62,6 +64,7 @@ Command = (
     | Annotated[View, subcommand("view")]
     | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
+    | Annotated[Models, subcommand("models", description="Public depth networks: list, download.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Forecasts, subcommand("forecast")]
     | Annotated[

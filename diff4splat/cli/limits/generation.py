@@ -163,7 +163,8 @@ def _side(command: "Generate") -> tuple[int, int]:
     from diff4splat.io.photos.images import photo_size
 
     photo_px = photo_size(command.image)
-    return find_image_size(command.model, command.resolution, command.fill, photo_px)
+    given = command.depth is not None
+    return find_image_size(command.model, command.resolution, command.fill, photo_px, given)
 
 
 def _size(command: "Generate", side_px: int, multiple_px: int) -> tuple[int, int]:

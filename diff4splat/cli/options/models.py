@@ -75,5 +75,5 @@ def require_runtime(model: str, runtime: str | None, device: str) -> None:
             f"--runtime torch: expected --model with PyTorch weights, got ONNX graphs in {model}; "
             "leave out --runtime, or name the model that was exported"
         )
-    if graphs and device != "cpu":
+    if graphs and device not in ("cpu", "auto"):
         raise ConfigError(f"--device: expected cpu for ONNX graphs, got {device}; use cpu")

@@ -15,6 +15,7 @@ from diff4splat.cli.options.camera import (
     scene_path,
 )
 from diff4splat.cli.options.constraints import InputPath, Number, OutputFile, require_writable
+from diff4splat.cli.options.device import render_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.optics import OpticsOptions, require_consistent
 from diff4splat.cli.options.scene_time import require_scene_time
@@ -47,6 +48,9 @@ class Render:
     dataset: bool = False
     """Write a folder of sequences along the same path with exact cameras: pinhole, fisheye, depth
     of field, rolling shutter, motion blur, and all effects combined."""
+    device: str = "cpu"
+    """Where frames are rendered: cpu, cuda (by gsplat), or auto, which is cuda where there is one.
+    Optics are traced on the CPU."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
     optics: Annotated[OpticsOptions, tyro.conf.arg(name="")] = field(default_factory=OpticsOptions)
     limits: Annotated[LimitOptions, tyro.conf.arg(name="")] = field(default_factory=LimitOptions)
@@ -89,6 +93,7 @@ class Render:
         from diff4splat.progress.run_log import RunLog
 
         promised, watch = promise(self), Stopwatch.of_process()
+        device = render_device(self.device)
         for line in promised.lines():
             note(line)
         imported = import_scene(self.scene)
@@ -113,7 +118,7 @@ class Render:
         needed = estimate_frames(len(path), size_px, suffix == ".exr", suffix == ".gif")
         if line := require_fits(needed, self.out.parent, "choose fewer --frames"):
             note(line)
-        for line in write_view(scene, path, self.out, self.time, log, settings):
+        for line in write_view(scene, path, self.out, self.time, log, settings, device):
             note(line)
         measured = watch.read()
         if promised.limits.tolerance_db is not None:

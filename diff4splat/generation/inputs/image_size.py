@@ -9,7 +9,11 @@ import math
 from collections.abc import Collection
 
 from diff4splat.generation.inputs.input_image import require_side
-from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
+from diff4splat.generation.plan import (
+    GenerationPlan,
+    RequestFacts,
+    plan_generation,
+)
 from diff4splat.models.config.model import Fill, ModelConfig
 from diff4splat.models.hub.folders import find_config, find_provenance
 
@@ -59,6 +63,7 @@ def find_image_size(
     side_px: int | None = None,
     fill: Fill | None = None,
     photo_px: tuple[int, int] | None = None,
+    depth_given: bool = False,
 ) -> tuple[int, int]:
     """(side, multiple) in pixels for a model, before any weights are read.
 
@@ -66,14 +71,18 @@ def find_image_size(
         ConfigError, CheckpointError, FileFormatError: as ``load_model``.
     """
     config = find_config(name_or_folder)
-    plan = image_plan(config, find_provenance(name_or_folder).trained, fill)
+    plan = image_plan(config, find_provenance(name_or_folder).trained, fill, depth_given)
     side_px = default_side_px(config, plan, photo_px) if side_px is None else side_px
     require_side(side_px, config.token_px)
     return side_px, size_multiple_px(config, plan, side_px)
 
 
 def image_plan(
-    config: ModelConfig, trained: Collection[str], fill: Fill | None = None
+    config: ModelConfig,
+    trained: Collection[str],
+    fill: Fill | None = None,
+    depth_given: bool = False,
 ) -> GenerationPlan:
     """The plan as far as it decides about sizes: prompts do not."""
-    return plan_generation(config, trained, RequestFacts(prompt=False, fill=fill))
+    facts = RequestFacts(prompt=False, fill=fill, depth_given=depth_given)
+    return plan_generation(config, trained, facts)

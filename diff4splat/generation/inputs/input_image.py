@@ -16,6 +16,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError
+from diff4splat.generation.inputs.photo_window import PhotoWindow
 from diff4splat.geometry.camera import Camera, focal_from_35mm, focal_from_fov, pinhole
 from diff4splat.io.photos.images import read_photo
 
@@ -54,6 +55,8 @@ class InputImage:
     """What was done to the photograph, in words."""
     reduction: int = 1
     """Pixels of the photograph on a side of each pixel here; above 1 in the networks' copy."""
+    window: PhotoWindow | None = None
+    """The part of the photograph that is left; None is all."""
 
     def to(self, device: torch.device) -> "InputImage":
         """Move pixels and camera."""
@@ -89,7 +92,8 @@ def load_image(
     size_px = (photo.rgb.shape[0], photo.rgb.shape[1])
     focal = choose_focal(size_px, fov_deg, photo.focal_35mm)
     image = prepare_image(photo.rgb, focal, side_px, multiple_px, fit)
-    return replace(image, notes=(*photo.notes, *image.notes))
+    window = replace(image.window, orientation=photo.orientation)
+    return replace(image, window=window, notes=(*photo.notes, *image.notes))
 
 
 def choose_focal(
@@ -181,6 +185,7 @@ def prepare_image(
         focal_source=focal.source,
         focal_known=focal.known,
         notes=_fit_notes(photo_size, window, size),
+        window=PhotoWindow(photo_px=photo_size, corner_px=(top, left), size_px=window),
     )
 
 

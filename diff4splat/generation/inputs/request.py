@@ -6,6 +6,7 @@ from pathlib import Path
 import torch
 
 from diff4splat.captions.known_words import why_static
+from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.image_size import (
     default_side_px,
     downsampling_factor,
@@ -18,7 +19,11 @@ from diff4splat.generation.inputs.input_cameras import (
     to_camera_path,
 )
 from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
-from diff4splat.generation.plan import GenerationPlan, RequestFacts, plan_generation
+from diff4splat.generation.plan import (
+    GenerationPlan,
+    RequestFacts,
+    plan_generation,
+)
 from diff4splat.generation.settings import GenerationSettings, require_seed
 from diff4splat.io.photos.images import photo_size
 from diff4splat.models.hub.model import Model
@@ -35,6 +40,7 @@ class UserInput:
     prompt: str | None
     seed: int
     settings: GenerationSettings
+    depth: DepthSource | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +58,7 @@ class Request:
     seed: int
     settings: GenerationSettings
     plan: GenerationPlan
+    depth: DepthSource | None = None
 
 
 def prepare_request(model: Model, user: UserInput, device: torch.device) -> Request:
@@ -71,6 +78,7 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         fill=settings.fill,
         still=settings.still,
         frames=config.frames,
+        depth_given=user.depth is not None,
         static_prompt="" if user.prompt is None else why_static(user.prompt),
     )
     plan = plan_generation(config, model.trained, facts)
@@ -85,6 +93,7 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         seed=require_seed(user.seed),
         settings=settings,
         plan=plan,
+        depth=user.depth,
     )
 
 
@@ -92,7 +101,8 @@ def _load(model: Model, user: UserInput) -> InputImage:
     """The image at a size that the model can take, in single precision."""
     config, image = model.config, user.image
     if not isinstance(image, InputImage):
-        plan = image_plan(config, model.trained, user.settings.fill)
+        given = user.depth is not None
+        plan = image_plan(config, model.trained, user.settings.fill, given)
         side_px = default_side_px(config, plan, photo_size(Path(image)))
         multiple_px = size_multiple_px(config, plan, side_px)
         image = load_image(Path(image), side_px, multiple_px=multiple_px)

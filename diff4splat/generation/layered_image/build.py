@@ -36,6 +36,8 @@ class FineDepth:
 
     rgb: Float[Tensor, "h w 3"]
     depth: Float[Tensor, "h w"]
+    smooth: bool = True
+    """Whether cells of a prediction have to be smoothed away; not of depth that was given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +84,8 @@ def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list
 def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageLayer:
     """One opaque cell per pixel of the image."""
     depth, displacement = _pixel_maps(small.rgb, image.rgb, maps)
-    if small.camera.size_px != image.camera.size_px:
+    shows_cells = small.camera.size_px != image.camera.size_px
+    if shows_cells and (maps.fine is None or maps.fine.smooth):
         depth, displacement = smooth_maps(depth, displacement, image.rgb)
     return ImageLayer(
         camera=image.camera,

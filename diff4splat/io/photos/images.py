@@ -34,6 +34,8 @@ class Photo:
     rgb: Float[Tensor, "h w 3"]
     focal_35mm: float | None
     """35 mm equivalent focal length from EXIF, in millimetres; None when the file does not say."""
+    orientation: int = 1
+    """EXIF orientation of the file; ``rgb`` is upright."""
     notes: tuple[str, ...] = ()
     """What was done to the image, in words."""
 
@@ -94,7 +96,12 @@ def _decode(image: Image.Image, file: Path) -> Photo:
         notes += reduced
     image, converted = to_srgb(_upright(image))
     rgb = from_bytes(np.asarray(image))
-    return Photo(rgb=rgb, focal_35mm=exif.focal_35mm, notes=(*notes, *exif.notes, *converted))
+    return Photo(
+        rgb=rgb,
+        focal_35mm=exif.focal_35mm,
+        orientation=exif.orientation,
+        notes=(*notes, *exif.notes, *converted),
+    )
 
 
 def _load(image: Image.Image, file: Path) -> None:

@@ -345,3 +345,25 @@ def test_a_network_has_the_same_weights_alone_and_with_others() -> None:
     alone = create_networks(config, parts=("text_encoder",)).text_encoder.state_dict()
     together = create_networks(config).text_encoder.state_dict()
     assert all(torch.equal(alone[key], together[key]) for key in together)
+
+
+@pytest.mark.parametrize("dtype", ["bfloat16", "float16"])
+def test_half_precision_is_near_and_gives_a_scene_in_float32(image: InputImage, dtype: str) -> None:
+    exact, half = (
+        Diff4SplatPipeline.from_pretrained("test")
+        .to("cpu", name)(image, "spiral", settings=QUICK)
+        .gaussians
+        for name in ("float32", dtype)
+    )
+    assert half.means.dtype == torch.float32 and torch.isfinite(half.means).all()
+    assert len(half) == len(exact)
+    assert 0 <= float((half.means - exact.means).norm() / exact.means.norm()) < 0.05
+
+
+def test_networks_go_where_they_are_asked_to(image: InputImage) -> None:
+    """A device without memory: whatever stays behind would be an error there."""
+    pipeline = Diff4SplatPipeline.from_pretrained("test").to("meta")
+    pipeline.model = with_parts(pipeline.model, pipeline.model.parts)
+    pipeline.model.networks.to(pipeline.device)
+    for _, part in pipeline.model.networks.parts():
+        assert {tensor.device.type for tensor in part.state_dict().values()} <= {"meta"}

@@ -119,3 +119,20 @@ def test_free_space_is_known_before_a_folder_exists(tmp_path: Path) -> None:
     assert free is not None
     assert free > 0
     assert run_estimate.free_memory_bytes() is None or run_estimate.free_memory_bytes() > 1e6
+
+
+def test_frames_of_another_device_come_back_to_the_cpu(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A device that computes nothing: only where tensors go is looked at."""
+    moved: list[torch.device] = []
+
+    def to(self: Scene, target: torch.device) -> Scene:
+        moved.append(target)
+        return self
+
+    monkeypatch.setattr(Scene, "to", to)
+    record = FilmRecord(path=scene.path, device="cuda:0")
+    frames = list(film(scene, record, RunLog()))
+    assert moved == [torch.device("cuda:0")]
+    assert all(frame.device.type == "cpu" for frame in (*frames, record.depth, record.first_rgb))

@@ -1,0 +1,1 @@
+"""Depth that a request brings along: by a network of others, or as a map from any tool."""

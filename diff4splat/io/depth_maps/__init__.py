@@ -1,0 +1,1 @@
+"""Depth maps of any tool: OpenEXR, PNG and NumPy arrays."""

@@ -1,0 +1,1 @@
+"""Depth networks of others as ONNX graphs: recognised, checked, run."""
