@@ -26,6 +26,7 @@ from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.augment import mirrored
 from diff4splat.training.batches.motion_targets import (
     extend_to_all_cells,
+    motion_known,
     moving_mask,
     pixel_motion,
 )
@@ -131,5 +132,9 @@ def _first_frame(
     motion = pixel_motion(clip, data.input_stride)
     moving = moving_mask(motion)
     return FirstFrame(
-        rgb=rgb, field=extend_to_all_cells(motion, moving), moving=moving, cameras=cameras
+        rgb=rgb,
+        field=extend_to_all_cells(motion, moving),
+        moving=moving,
+        cameras=cameras,
+        motion_known=motion_known(clip, data.input_stride),
     )

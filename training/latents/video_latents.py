@@ -3,7 +3,7 @@
 Axes: ``b`` batch, ``f`` frames, ``h w`` pixels, ``c t h2 w2`` latents, ``hc wc`` cells.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float
@@ -67,6 +67,8 @@ class FirstFrame:
     """Pixels that truly move."""
     cameras: Camera
     """Batch shape (f,), relative to the first."""
+    motion_known: bool = True
+    """Whether ``field`` and ``moving`` are the truth."""
 
 
 @torch.no_grad()
@@ -74,6 +76,7 @@ def render_condition(model: Model, first: FirstFrame) -> RenderCondition | None:
     """The layered image along the path, on predicted depth and with true motion; None without.
 
     With predicted motion the true video would be no fair target where the prediction is wrong.
+    Where the true motion is not known, all but the first frame is a guess: not valid.
     """
     if not model.config.dit.render_condition:
         return None
@@ -85,7 +88,11 @@ def render_condition(model: Model, first: FirstFrame) -> RenderCondition | None:
     layered = build_layered_image(image, image, maps, border_cells)
     times_s = torch.linspace(0, 1, len(first.cameras), device=depth.device)
     path = CameraPath(cameras=first.cameras, times_s=times_s)
-    return encode_condition(model, render_layered_image(layered, path, times_s))
+    rendered = render_layered_image(layered, path, times_s)
+    if not first.motion_known:
+        is_first = torch.arange(len(path), device=depth.device) == 0
+        rendered = replace(rendered, valid=rendered.valid & is_first[:, None, None])
+    return encode_condition(model, rendered)
 
 
 @torch.no_grad()
@@ -111,4 +118,5 @@ def first_frame(batch: ClipBatch, index: int) -> FirstFrame:
         field=batch.field[index],
         moving=batch.moving[index],
         cameras=batch.cameras[index],
+        motion_known=bool(batch.motion_known[index]),
     )

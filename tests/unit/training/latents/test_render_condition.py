@@ -13,10 +13,14 @@ from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.training.batches.clip_batch import collate
+from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.latents import video_latents
 from diff4splat.training.latents.encode import encode_clip
 from diff4splat.training.latents.latent_shards import LatentPack
+from diff4splat.training.latents.video_latents import encode_batch
 from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.stage import SampleKey
 
 SIDE, FRAMES, FOCAL_PX = 32, 5, 32.0
 ROWS, COLUMNS = slice(8, 24), slice(8, 16)
@@ -167,9 +171,25 @@ def test_the_first_frame_is_the_image_itself(rendered) -> None:
     torch.testing.assert_close(found.pack.render_latent[:, :, 0], found.pack.latent[:, :, 0])
 
 
-def test_a_clip_without_tracks_is_rendered_as_static(rendered) -> None:
-    clip = replace(box_clip(box_px=8), tracks=None)
-    assert bool(rendered(clip).valid.all())
+def without_motion(clip: Clip) -> Clip:
+    """The same images of which nobody knows what moves."""
+    views = [replace(v, instances=None, track_uv=None, track_visible=None) for v in clip.views]
+    return replace(clip, views=tuple(views), tracks=None)
+
+
+def test_unknown_motion_is_not_shown_as_stillness(rendered) -> None:
+    found = rendered(without_motion(box_clip(box_px=8)))
+    assert bool(found.valid[0].all()) and not bool(found.valid[1:].any())
+
+
+def test_batches_tell_the_video_model_which_motion_is_known() -> None:
+    """The static clip beside it keeps what it shows."""
+    origin = Origin(key=SampleKey(0, "video_diffusion", 0, "sample"), source="made")
+    clips = without_motion(box_clip(box_px=8)), without_motion(box_clip())
+    batch = collate([make_sample(clip, DATA, origin) for clip in clips])
+    unknown, static = encode_batch(model_of(), batch).validity[:, 0].bool()
+    assert bool(unknown[0].all()) and not bool(unknown[1:].any())
+    assert bool(static.all())
 
 
 def test_the_depth_prior_sets_the_depth(rendered) -> None:
