@@ -5,6 +5,7 @@ to the next 512; two blocks of zeros end the archive, filled up to 10240 as tar 
 1003.1-1988, as Python's ``tarfile`` writes it.
 """
 
+import filecmp
 import os
 import tarfile
 import zlib
@@ -16,7 +17,7 @@ from diff4splat.data.shard_index import ShardIndex, Slot
 
 
 class ShardFile:
-    """Collects clips in ``temporary``; ``finish`` renames it, ``discard`` removes it."""
+    """Collects clips in ``temporary``: ``close``, then ``rename``; or ``discard``."""
 
     def __init__(self, temporary: Path) -> None:
         self._temporary = temporary
@@ -39,14 +40,21 @@ class ShardFile:
             self._stream.write(bytes(-len(content) % tarfile.BLOCKSIZE))
         self._clips[clip.entry.identifier] = slots
 
-    def finish(self, target: Path) -> tuple[ShardIndex, int]:
-        """Close the archive and give it its name; its index and its size in bytes."""
+    def close(self) -> tuple[ShardIndex, int]:
+        """End the archive; its index and its size in bytes."""
         self._stream.write(bytes(2 * tarfile.BLOCKSIZE))
         self._stream.write(bytes(-self.size % tarfile.RECORDSIZE))
         size = self.size
         self._stream.close()
-        os.replace(self._temporary, target)
         return ShardIndex(clips=self._clips), size
+
+    def equals(self, other: Path) -> bool:
+        """Whether a file has the bytes of the closed archive."""
+        return other.is_file() and filecmp.cmp(self._temporary, other, shallow=False)
+
+    def rename(self, target: Path) -> None:
+        """Give the closed archive its name."""
+        os.replace(self._temporary, target)
 
     def discard(self) -> None:
         """Leave nothing behind."""

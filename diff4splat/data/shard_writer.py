@@ -150,9 +150,13 @@ class ShardWriter:
                 f"{self._folder}: expected to be the only writer, but another changed {MANIFEST}; "
                 "let one finish before the next begins"
             )
-        target = self._free_name()
+        index, size = shard.close()
+        target = self._free_name(shard)
+        entry = ShardEntry(name=target.name, size=size, clips=tuple(self._entries))
         try:
-            self._manifest = self._list(target, shard)
+            shard.rename(target)
+            write_index(index, target)
+            self._manifest = self._list(entry)
         except BaseException:
             if _digest(self._folder) == self._digest:
                 # Whole, but nothing names it: the next writer would leave it there for ever.
@@ -162,11 +166,8 @@ class ShardWriter:
             raise
         self._shard, self._entries, self._digest = None, [], _digest(self._folder)
 
-    def _list(self, target: Path, shard: ShardFile) -> Manifest:
+    def _list(self, entry: ShardEntry) -> Manifest:
         """The manifest, as it is on the disk now."""
-        index, size = shard.finish(target)
-        write_index(index, target)
-        entry = ShardEntry(name=target.name, size=size, clips=tuple(self._entries))
         manifest = replace(
             self._manifest,
             shards=(*self._manifest.shards, entry),
@@ -175,12 +176,15 @@ class ShardWriter:
         write_manifest(manifest, self._folder)
         return manifest
 
-    def _free_name(self) -> Path:
-        """The first number after all that are listed, past files that somebody else put there."""
+    def _free_name(self, shard: ShardFile) -> Path:
+        """The first number after all that are listed, past files that somebody else put there.
+
+        A run that was killed before it could list its shard has left one of the same bytes.
+        """
         names = (
             self._folder / f"shard-{number:05d}.tar" for number in count(len(self._manifest.shards))
         )
-        return next(n for n in names if not n.exists() and not index_file(n).exists())
+        return next(name for name in names if _is_free(name) or shard.equals(name))
 
     def _stop(self) -> None:
         if self._shard is not None:
@@ -189,6 +193,10 @@ class ShardWriter:
             self._partial.discard()
         self._shard, self._partial, self._stopped = None, None, True
         self._lock.close()
+
+
+def _is_free(name: Path) -> bool:
+    return not name.exists() and not index_file(name).exists()
 
 
 def _digest(folder: Path) -> str | None:

@@ -106,6 +106,21 @@ def test_resuming_gives_the_bytes_of_one_run(tmp_path: Path, encoded: list[Encod
     assert contents(tmp_path / "once") == contents(tmp_path / "twice")
 
 
+@pytest.mark.parametrize("lost", [(), ("shard-00001.index.json",)])
+def test_a_shard_that_a_killed_run_did_not_list_is_taken_up(
+    tmp_path: Path, encoded: list[EncodedClip], lost: tuple[str, ...]
+) -> None:
+    fill(tmp_path / "first", encoded[:1])
+    for name in ("once", "killed"):
+        fill(tmp_path / name, encoded[:2])
+    manifest = (tmp_path / "first" / "manifest.json").read_bytes()
+    (tmp_path / "killed" / "manifest.json").write_bytes(manifest)
+    for name in lost:
+        (tmp_path / "killed" / name).unlink()
+    fill(tmp_path / "killed", encoded[1:2], append=True)
+    assert contents(tmp_path / "once") == contents(tmp_path / "killed")
+
+
 def test_appending_to_nothing_begins(tmp_path: Path, encoded: list[EncodedClip]) -> None:
     fill(tmp_path, encoded[:1], append=True)
     assert len(ClipFolder(tmp_path)) == 1
@@ -205,7 +220,7 @@ def test_a_full_disk_leaves_what_was_there(
 def test_a_full_disk_at_the_last_flush(
     tmp_path: Path, encoded: list[EncodedClip], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ShardFile, "finish", full_disk)
+    monkeypatch.setattr(ShardFile, "close", full_disk)
     with pytest.raises(OutputError, match="the disk is full"), ShardWriter(tmp_path, OPTIONS) as w:
         w.write(encoded[0])
     assert names(tmp_path) == set()
