@@ -20,8 +20,10 @@ MOST_CLIPS = 64
 
 
 def write_clip_sheet(folder: Path, file: Path) -> None:
-    """Up to ``MOST_CLIPS`` clips, spread evenly over the folder."""
+    """Up to ``MOST_CLIPS`` clips, spread evenly over the folder; nothing of an empty one."""
     clips = ClipFolder(folder)
+    if not len(clips):
+        return
     part = ClipPart(views=(0,), flow=False, instances=False, tracks=False)
     write_png(clip_sheet([clips.clip(place, part) for place in clips.spread(MOST_CLIPS)]), file)
 

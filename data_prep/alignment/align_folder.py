@@ -10,6 +10,7 @@ import numpy as np
 
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
+from diff4splat.data.manifest import ensure_manifest
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.alignment.align_clip import AlignmentSettings, align_clip
 from diff4splat.data_prep.alignment.opencv.flow_disparity import flow_disparity
@@ -71,6 +72,7 @@ def align_folder(job: AlignJob, phases: Phases) -> tuple[ReportRow, ...]:
                     advance()
         finally:
             write_rows(rows, job.folder / REPORT)
+    ensure_manifest(job.folder, options.generator)
     return tuple(rows)
 
 

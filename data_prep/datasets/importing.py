@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from diff4splat.data.codecs.encode import Coding
+from diff4splat.data.manifest import ensure_manifest
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.datasets.common.sequence import ListedSequence
 from diff4splat.data_prep.datasets.common.windows import WindowOptions
@@ -59,6 +60,7 @@ def import_dataset(job: ImportJob, phases: Phases) -> tuple[ReportRow, ...]:
                     advance()
         finally:
             write_rows(rows, job.folder / REPORT)
+    ensure_manifest(job.folder, options.generator)
     return tuple(rows)
 
 

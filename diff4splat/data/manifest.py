@@ -75,6 +75,12 @@ def write_manifest(manifest: Manifest, folder: Path) -> None:
     write_text(folder / MANIFEST, dumps(document))
 
 
+def ensure_manifest(folder: Path, generator: str) -> None:
+    """A manifest without clips where there is none: the folder of a task that had nothing to do."""
+    if not (folder / MANIFEST).exists():
+        write_manifest(Manifest(generator=generator, sources=(), shards=()), folder)
+
+
 def read_manifest(folder: Path) -> Manifest:
     """What ``folder`` holds.
 

@@ -53,20 +53,20 @@ class ShardWriter:
         Raises:
             ConfigError: the shard size is not positive.
             OutputError: the folder has clips and ``append`` is False.
-            FileFormatError: the manifest to append to is damaged.
+            FileFormatError: the manifest is damaged.
         """
         self._folder, self._options = Path(folder), options
         if options.shard_bytes < 1:
             raise ConfigError(f"shard_bytes: expected at least 1, got {options.shard_bytes}")
         self._digest = _digest(self._folder)
-        if self._digest is not None and not append:
+        old = Manifest(generator=options.generator, sources=(), shards=())
+        if self._digest is not None:
+            old = replace(read_manifest(self._folder), generator=options.generator)
+        if old.shards and not append:
             raise OutputError(
                 f"{self._folder}: expected a folder without clips, got one with {MANIFEST}; "
                 "append to it or choose another folder"
             )
-        old = Manifest(generator=options.generator, sources=(), shards=())
-        if self._digest is not None:
-            old = replace(read_manifest(self._folder), generator=options.generator)
         self._manifest = old
         self._identifiers = {clip.identifier for clip in old.clips}
         self._sources: set[str] = set()

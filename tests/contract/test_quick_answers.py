@@ -74,6 +74,7 @@ prepare align folder --out folder --reference megasam
 prepare curate nowhere --out folder
 prepare poses nowhere.mp4 --out poses.json
 prepare captions folder --out folder
+prepare pipeline nowhere.toml
 train --config nowhere --stage vae
 train --config small --stage nowhere
 train --config small --stage vae --clips nowhere

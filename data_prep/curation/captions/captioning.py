@@ -13,6 +13,7 @@ from pathlib import Path
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.codecs.encode import EncodedClip, Member
 from diff4splat.data.codecs.metadata import decode_metadata, encode_metadata
+from diff4splat.data.manifest import ensure_manifest
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.curation.captions.side_car import SideCarCaptions, clean_caption
 from diff4splat.data_prep.curation.hooks import load_hook
@@ -53,7 +54,8 @@ def write_captions(job: CaptionJob, phases: Phases) -> tuple[ReportRow, ...]:
     side_car = None if job.side_car is None else SideCarCaptions(job.side_car)
     captioner = load_hook(job.captioner) if job.captioner else None
     clips, rows = ClipFolder(job.clips), []
-    with ShardWriter(job.folder, ShardOptions(generator="prepare captions"), append=True) as writer:
+    options = ShardOptions(generator="prepare captions")
+    with ShardWriter(job.folder, options, append=True) as writer:
         try:
             with phases.phase("write captions", len(clips)) as advance:
                 for position in range(len(clips)):
@@ -61,6 +63,7 @@ def write_captions(job: CaptionJob, phases: Phases) -> tuple[ReportRow, ...]:
                     advance()
         finally:
             write_rows(rows, job.folder / REPORT)
+    ensure_manifest(job.folder, options.generator)
     return tuple(rows)
 
 

@@ -13,6 +13,7 @@ from diff4splat.cli.datasets.prepare_curation import (
     PreparePoses,
 )
 from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
+from diff4splat.cli.datasets.prepare_pipeline import PreparePipeline
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
 from diff4splat.cli.export_onnx import ExportOnnx
@@ -44,6 +45,7 @@ Prepare = (
     | Annotated[PrepareAlign, subcommand("align")]
     | Annotated[PrepareCaptions, subcommand("captions")]
     | Annotated[PrepareCurate, subcommand("curate")]
+    | Annotated[PreparePipeline, subcommand("pipeline")]
     | Annotated[PrepareCheck, subcommand("check")]
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]

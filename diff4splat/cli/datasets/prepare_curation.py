@@ -124,18 +124,18 @@ class PrepareCurate:
         from diff4splat.data_prep.curation.curate import CurationJob, curate
         from diff4splat.data_prep.curation.hooks import Hooks
         from diff4splat.data_prep.curation.report.page import write_report
+        from diff4splat.data_prep.curation.score_folders import ScoringJob
         from diff4splat.data_prep.curation.selection import write_selection
         from diff4splat.data_prep.curation.thresholds import read_thresholds
 
         phases, thresholds = ConsolePhases(), read_thresholds(self.thresholds)
-        job = CurationJob(
+        scoring = ScoringJob(
             folders=self.clips,
             out=self.out,
-            thresholds=thresholds,
             hooks=Hooks(quality=self.quality),
             workers=self.workers,
         )
-        decisions = curate(job, phases)
+        decisions = curate(CurationJob(scoring=scoring, thresholds=thresholds), phases)
         report = write_report(decisions, thresholds, self.clips, self.out, phases)
         if self.shards is not None:
             write_selection(decisions, self.clips, self.shards, phases, self.complete)

@@ -10,12 +10,13 @@ from textured_clips import textured_clip
 
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
-from diff4splat.data_prep.curation import curate as curate_module
+from diff4splat.data_prep.curation import score_folders
 from diff4splat.data_prep.curation.curate import CurationJob, curate
 from diff4splat.data_prep.curation.hooks import Hooks, load_hook
 from diff4splat.data_prep.curation.record_store import RecordStore
 from diff4splat.data_prep.curation.report.histograms import histogram_svg
 from diff4splat.data_prep.curation.report.page import write_report
+from diff4splat.data_prep.curation.score_folders import ScoringJob
 from diff4splat.data_prep.curation.selection import write_selection
 from diff4splat.data_prep.curation.thresholds import Gate, read_thresholds
 from diff4splat.errors import ConfigError, OutputError
@@ -50,7 +51,8 @@ def clips(tmp_path_factory):
 
 
 def job(clips, out, **options) -> CurationJob:
-    return CurationJob(folders=(clips,), out=out, thresholds=read_thresholds(None), **options)
+    scoring = ScoringJob(folders=(clips,), out=out, **options)
+    return CurationJob(scoring=scoring, thresholds=read_thresholds(None))
 
 
 def test_one_bad_clip_is_a_row_and_the_others_are_decided(clips, tmp_path) -> None:
@@ -76,7 +78,7 @@ def test_a_second_run_measures_nothing_and_equal_runs_have_equal_bytes(
     (tmp_path / "b" / "scores.jsonl").write_bytes(lines[3] + lines[0] + lines[1][:40])
     curate(job(clips, tmp_path / "b"), Phases())
     assert (tmp_path / "b" / "scores.jsonl").read_bytes() == first
-    monkeypatch.setattr(curate_module, "score_stored_clip", None)
+    monkeypatch.setattr(score_folders, "score_stored_clip", None)
     curate(job(clips, tmp_path / "a"), Phases())
 
 
@@ -157,7 +159,7 @@ def test_a_quality_model_is_a_hook_and_its_faults_are_rows(clips, tmp_path, monk
 
 def test_folders_of_one_name_are_refused(clips, tmp_path) -> None:
     with pytest.raises(ConfigError, match="different names"):
-        CurationJob(folders=(clips, clips), out=tmp_path, thresholds=read_thresholds(None))
+        ScoringJob(folders=(clips, clips), out=tmp_path)
 
 
 def test_damaged_lines_of_a_store_are_ignored(tmp_path) -> None:

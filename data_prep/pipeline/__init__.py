@@ -1,0 +1,1 @@
+"""Import, alignment, captions and scores in tasks, on one machine or many."""
