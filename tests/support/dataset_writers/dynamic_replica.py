@@ -59,9 +59,9 @@ def _write_frame(truth: Truth, eye: Eye, name: str, split: Path, t: int) -> dict
             },
             file,
         )
-    height, width = SIZE_PX
+    height, width = eye.depth.shape[1:]
     fx, fy, cx, cy = eye.lens
-    unit = min(SIZE_PX) / 2
+    unit = min(height, width) / 2
     axes = np.stack([-eye.poses[t, :3, 0], -eye.poses[t, :3, 1], eye.poses[t, :3, 2]], 1)
     return {
         "sequence_name": base,

@@ -14,7 +14,7 @@ NAME = "000c3ab189999a83"
 
 def write(truth: Truth, root: Path, poses: int | None = None) -> Path:
     lines = ["https://www.youtube.com/watch?v=abc"]
-    height, width = SIZE_PX
+    height, width = truth.size_px
     fx, fy, cx, cy = truth.left.lens
     for t, pose in enumerate(truth.left.poses[:poses]):
         stamp = START_US + t * STEP_US
