@@ -12,7 +12,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.data.json_fields import take, take_number
 from diff4splat.errors import FileFormatError
 
-SCORING_VERSION = 1
+SCORING_VERSION = 2
 """Changes when a stage gives other numbers: older scores are then measured again."""
 
 

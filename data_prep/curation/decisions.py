@@ -8,7 +8,8 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 from diff4splat.data_prep.curation.clip_record import ClipRecord
-from diff4splat.data_prep.curation.duplicates import duplicates_of
+from diff4splat.data_prep.curation.duplicates.cells import alike_features
+from diff4splat.data_prep.curation.duplicates.hashes import duplicates_of
 from diff4splat.data_prep.curation.scoring import STAGES
 from diff4splat.data_prep.curation.thresholds import Gate, Thresholds
 
@@ -100,9 +101,15 @@ def _applies(record: ClipRecord, gate: Gate) -> bool:
 
 def _duplicates(records: list[ClipRecord], thresholds: Thresholds):
     ranked = sorted(records, key=lambda record: (*(-m for m in merit(record)), record.key))
+    rejected: set[tuple[str, str]] = set()
     for record, original in duplicates_of(ranked, thresholds.hash_bits):
         detail = f"looks like {original.identifier}"
         yield record, Reason(stage="duplicates", text="duplicate of a better clip", detail=detail)
+        rejected.add(record.key)
+    remaining = [record for record in ranked if record.key not in rejected]
+    for record, original in alike_features(remaining, thresholds.cosine):
+        detail = f"features like those of {original.identifier}"
+        yield record, Reason(stage="duplicates", text="looks like a better clip", detail=detail)
     if thresholds.per_group:
         yield from _over(
             ranked,

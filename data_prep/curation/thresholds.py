@@ -36,6 +36,8 @@ class Thresholds:
 
     gates: tuple[Gate, ...]
     hash_bits: int = 3
+    cosine: float = 0.97
+    """Of features from which clips are duplicates; above 1 is never."""
     per_group: int = 0
     quotas: dict[str, dict[str, int]] = field(default_factory=dict)
     text: str = ""
@@ -73,7 +75,7 @@ def _thresholds(document: dict[str, Any], text: str) -> Thresholds:
     if document.get("version") != _VERSION:
         raise ConfigError(f"version: expected {_VERSION}, got {document.get('version')!r}")
     duplicates = _table(document, "duplicates")
-    _known(duplicates, {"hash_bits", "per_group"}, "keys of duplicates")
+    _known(duplicates, {"hash_bits", "cosine", "per_group"}, "keys of duplicates")
     gates = document.get("gate", [])
     if not isinstance(gates, list) or not all(isinstance(each, dict) for each in gates):
         raise ConfigError("gate: expected tables [[gate]], got something else")
@@ -82,6 +84,7 @@ def _thresholds(document: dict[str, Any], text: str) -> Thresholds:
     return Thresholds(
         gates=tuple(_gate(each, number) for number, each in enumerate(gates, 1)),
         hash_bits=_count(duplicates.get("hash_bits", 3), "hash_bits"),
+        cosine=_number(duplicates.get("cosine", 0.97), "cosine"),
         per_group=_count(duplicates.get("per_group", 0), "per_group"),
         quotas={kind: _quota(quotas, kind) for kind in quotas},
         text=text,
@@ -101,12 +104,11 @@ def _gate(table: dict[str, Any], number: int) -> Gate:
         known = ", ".join(get_args(AppliesTo))
         raise ConfigError(f"{where}, applies_to: expected one of {known}, got another")
     limits = {key: table.get(key) for key in ("least", "most")}
-    for key, value in limits.items():
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise ConfigError(f"{where}, {key}: expected a number, got {value!r:.60}")
+    numbers = {
+        key: _number(value, f"{where}, {key}") for key, value in limits.items() if value is not None
+    }
     if not isinstance(table.get("required", False), bool):
         raise ConfigError(f"{where}, required: expected true or false, got another value")
-    numbers = {key: float(value) for key, value in limits.items() if value is not None}
     return Gate(**table | numbers)
 
 
@@ -121,6 +123,12 @@ def _table(document: dict[str, Any], key: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ConfigError(f"{key}: expected a table, got {value!r:.60}")
     return value
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigError(f"{where}: expected a number, got {value!r:.60}")
+    return float(value)
 
 
 def _count(value: Any, where: str) -> int:

@@ -1,4 +1,4 @@
-"""Stage 11: perceptual hashes of three frames and the group that a clip belongs to.
+"""Stage 11: perceptual hashes and features of three frames, and the group of a clip.
 
 The hash is 64 bits: signs of the low frequencies of a 32 × 32 grey image against their median
 (pHash). Which clips are duplicates of which is decided later, over all of them.
@@ -10,18 +10,20 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from diff4splat.data_prep.curation.duplicates.features import clip_features, features_text
 from diff4splat.data_prep.curation.working_clip import WorkingClip
 
 _SIDE, _FREQUENCIES = 32, 8
 
 
 def score_fingerprints(working: WorkingClip) -> WorkingClip:
-    """Labels ``hash`` (three numbers of 16 hex digits) and ``group`` (data set and scene)."""
+    """Labels ``hash`` (three numbers of 16 hex digits), ``features`` and ``group``."""
     frames = working.images[[0, len(working.images) // 2, -1]]
     hashes = " ".join(f"{perceptual_hash(frame):016x}" for frame in frames)
     note = working.clip.note
     group = f"{note.dataset}/{note.scene or note.identifier}"
-    return replace(working, record=working.record.with_labels(hash=hashes, group=group))
+    labels = {"hash": hashes, "features": features_text(clip_features(frames)), "group": group}
+    return replace(working, record=working.record.with_labels(**labels))
 
 
 def perceptual_hash(image: UInt8[np.ndarray, "h w 3"]) -> int:

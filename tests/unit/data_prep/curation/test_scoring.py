@@ -12,7 +12,7 @@ from diff4splat.data.clip import Clip, Flow
 from diff4splat.data_prep.curation.clip_record import ClipRecord, record_of
 from diff4splat.data_prep.curation.completion import completed
 from diff4splat.data_prep.curation.decisions import decide
-from diff4splat.data_prep.curation.duplicates import duplicates_of
+from diff4splat.data_prep.curation.duplicates.hashes import duplicates_of
 from diff4splat.data_prep.curation.scoring import STAGES, score_clip
 from diff4splat.data_prep.curation.stages.dynamic_mask import estimated_moving
 from diff4splat.data_prep.curation.stages.fingerprints import perceptual_hash

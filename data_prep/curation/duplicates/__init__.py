@@ -1,0 +1,1 @@
+"""Clips that look alike: by perceptual hashes, and by features of images."""
