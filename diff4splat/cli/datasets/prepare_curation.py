@@ -106,6 +106,8 @@ class PrepareCurate:
     """Also copy the selected clips into this folder of shards."""
     complete: bool = False
     """With --shards: add estimated motion masks, and tracks chained from true flow and depth."""
+    parquet: bool = False
+    """Also write manifest.parquet, one row per clip with scores and reasons (needs pyarrow)."""
     workers: Annotated[int, Number(least=1, most=256)] = 1
     """Number of scoring processes."""
 
@@ -123,12 +125,15 @@ class PrepareCurate:
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.data_prep.curation.curate import CurationJob, curate
         from diff4splat.data_prep.curation.hooks import Hooks
+        from diff4splat.data_prep.curation.parquet_manifest import require_parquet, write_parquet
         from diff4splat.data_prep.curation.report.page import write_report
         from diff4splat.data_prep.curation.score_folders import ScoringJob
         from diff4splat.data_prep.curation.selection import write_selection
         from diff4splat.data_prep.curation.thresholds import read_thresholds
 
         phases, thresholds = ConsolePhases(), read_thresholds(self.thresholds)
+        if self.parquet:
+            require_parquet()
         scoring = ScoringJob(
             folders=self.clips,
             out=self.out,
@@ -137,6 +142,8 @@ class PrepareCurate:
         )
         decisions = curate(CurationJob(scoring=scoring, thresholds=thresholds), phases)
         report = write_report(decisions, thresholds, self.clips, self.out, phases)
+        if self.parquet:
+            write_parquet(decisions, self.out)
         if self.shards is not None:
             write_selection(decisions, self.clips, self.shards, phases, self.complete)
         selected = sum(each.is_selected for each in decisions)
