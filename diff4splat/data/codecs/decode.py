@@ -10,7 +10,7 @@ from torch import Tensor
 from diff4splat.data.clip import Clip, Flow, Tracks, View
 from diff4splat.data.clip_part import ClipPart, chosen_frames, chosen_views
 from diff4splat.data.codecs.cameras import decode_cameras
-from diff4splat.data.codecs.depth import decode_exr
+from diff4splat.data.codecs.depth import decode_exr, decode_npy
 from diff4splat.data.codecs.images import decode_jpeg, decode_png
 from diff4splat.data.codecs.masks import decode_masks
 from diff4splat.data.codecs.metadata import decode_metadata
@@ -52,7 +52,7 @@ def wanted_members(stored: Collection[str], entry: ClipEntry, part: ClipPart) ->
     names = ["meta.json", "camera.npz", *(["tracks.npz"] if part.tracks else [])]
     for view in chosen_views(part, entry):
         names += [f"rgb{view:02d}.{suffix}" for suffix in ("png", "jpg", "mp4")]
-        names += [f"depth{view:02d}.exr"]
+        names += [f"depth{view:02d}.{suffix}" for suffix in ("exr", "npy")]
         names += [f"instances{view:02d}.png"] if part.instances else []
         names += [f"masks{view:02d}.npz"] if part.masks else []
         names += [f"flow{view:02d}.npz"] if part.flow else []
@@ -87,7 +87,7 @@ def _view(job: _Job, number: int, camera: Camera, seen: VisibleTracks | None) ->
     shape = (job.entry.frames, *job.entry.size_px)
     return View(
         rgb=job.of_frames(_rgb(job, number)),
-        depth=_depth(job, f"depth{number:02d}.exr", shape),
+        depth=_depth(job, f"depth{number:02d}", shape),
         cameras=_cameras(job, camera),
         instances=_instances(job, instances, shape) if instances in job.members else None,
         **_masks(job, f"masks{number:02d}.npz"),
@@ -118,7 +118,10 @@ def _rgb(job: _Job, number: int) -> Tensor:
     return torch.from_numpy(job.decode(image, lambda content: decode_png(content, shape)))
 
 
-def _depth(job: _Job, suffix: str, shape: tuple[int, int, int]) -> Tensor | None:
+def _depth(job: _Job, name: str, shape: tuple[int, int, int]) -> Tensor | None:
+    plain, suffix = f"{name}.npy", f"{name}.exr"
+    if plain in job.members:
+        return job.decode(plain, lambda content: decode_npy(content, shape, job.frames))
     if suffix not in job.members and "depth" not in job.entry.layers:
         return None
     decoded = job.decode(suffix, lambda content: decode_exr(content, shape))

@@ -1,18 +1,23 @@
-"""Depth of all frames as one OpenEXR file, one part per frame, channel ``Z``.
+"""Depth of all frames as one OpenEXR file, one part per frame, channel ``Z``; or a NumPy array.
 
 Axes: ``t`` frames, ``h w`` pixels. PXR24 keeps 24 of 32 bits (relative error up to 1.5e-5) and is
-several times smaller than ZIP; half precision has an error up to 4.9e-4 and a range.
+several times smaller than ZIP; half precision has an error up to 4.9e-4 and a range. The plain
+array of halves is read five times as fast as any OpenEXR file, whose library copies every part.
 """
 
 import io
 import math
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 import OpenEXR
+import torch
 from jaxtyping import Float32
+from torch import Tensor
 
 from diff4splat.errors import FileFormatError, InputError
+from diff4splat.io.npy_header import START_BYTES, read_npy_header
 
 DepthCoding = Literal["pxr24", "half", "half_plain", "float"]
 """For truth, for training copies, for those that are read fast, and without loss."""
@@ -27,10 +32,9 @@ def encode_exr(depth: Float32[np.ndarray, "t h w"], coding: DepthCoding) -> byte
     Raises:
         InputError: half precision cannot hold these depths.
     """
-    if coding in ("half", "half_plain"):
+    if coding == "half":
         depth = _halved(depth)
-    packings = {"pxr24": OpenEXR.PXR24_COMPRESSION, "half_plain": OpenEXR.NO_COMPRESSION}
-    packing = packings.get(coding, OpenEXR.ZIP_COMPRESSION)
+    packing = OpenEXR.PXR24_COMPRESSION if coding == "pxr24" else OpenEXR.ZIP_COMPRESSION
     header = {"compression": packing, "type": OpenEXR.scanlineimage}
     parts = [
         OpenEXR.Part(dict(header), {"Z": frame}, f"frame_{index:04d}")
@@ -40,6 +44,39 @@ def encode_exr(depth: Float32[np.ndarray, "t h w"], coding: DepthCoding) -> byte
     with OpenEXR.File(parts) as opened:
         opened.write(written)
     return written.getvalue()
+
+
+def encode_npy(depth: Float32[np.ndarray, "t h w"]) -> bytes:
+    """A NumPy array of halves.
+
+    Raises:
+        InputError: half precision cannot hold these depths.
+    """
+    written = io.BytesIO()
+    halves = np.ascontiguousarray(_halved(depth), "<f2")
+    np.lib.format.write_array(written, halves, version=(1, 0), allow_pickle=False)
+    return written.getvalue()
+
+
+def decode_npy(
+    content: bytes, shape: tuple[int, int, int], frames: Sequence[int]
+) -> Float32[Tensor, "f h w"]:
+    """The chosen ``frames`` of depth of ``shape``, in float32; the others are not touched.
+
+    Raises:
+        FileFormatError: damaged, or of another length, size or kind.
+    """
+    header = read_npy_header(content[:START_BYTES])
+    values = content[header.data_start :]
+    if (header.shape, header.dtype, header.by_columns) != (shape, np.dtype("<f2"), False):
+        raise FileFormatError(
+            f"expected depth of half precision and shape {shape}, got {header.dtype} of shape "
+            f"{header.shape}"
+        )
+    if len(values) != header.data_bytes:
+        raise FileFormatError(f"expected {header.data_bytes} bytes of depth, got {len(values)}")
+    halves = torch.frombuffer(bytearray(values), dtype=torch.float16).reshape(shape)
+    return (halves if len(frames) == shape[0] else halves[list(frames)]).float()
 
 
 def _halved(depth: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from torch import Tensor
 from diff4splat.data.checks import require_first_camera, require_valid_clip
 from diff4splat.data.clip import Clip, View
 from diff4splat.data.codecs.cameras import encode_cameras
-from diff4splat.data.codecs.depth import DepthCoding, encode_exr
+from diff4splat.data.codecs.depth import DepthCoding, encode_exr, encode_npy
 from diff4splat.data.codecs.images import encode_jpeg, encode_png
 from diff4splat.data.codecs.masks import encode_masks, has_masks
 from diff4splat.data.codecs.metadata import encode_metadata
@@ -74,7 +74,7 @@ def _members(clip: Clip, coding: Coding) -> Iterator[tuple[str, bytes]]:
     yield "meta.json", encode_metadata(clip.note, entry_of(clip))
     yield "camera.npz", encode_cameras(clip)
     if clip.tracks is not None and clip.tracks.positions.shape[1]:
-        yield "tracks.npz", encode_tracks(clip, clip.tracks)
+        yield "tracks.npz", encode_tracks(clip, clip.tracks, packed=coding.depth != "half_plain")
     fps = _fps(clip.times_s)
     for number, view in enumerate(clip.views):
         yield from ((f"{name}{number:02d}.{ext}", c) for name, ext, c in _pixels(view, coding, fps))
@@ -88,7 +88,9 @@ def _pixels(view: View, coding: Coding, fps: float) -> Iterator[tuple[str, str, 
         jpeg = coding.images == "jpeg"
         yield "rgb", "jpg" if jpeg else "png", encode_jpeg(rgb) if jpeg else encode_png(rgb)
     if view.depth is not None:
-        yield "depth", "exr", encode_exr(view.depth.numpy(), coding.depth)
+        depth, plain = view.depth.numpy(), coding.depth == "half_plain"
+        content = encode_npy(depth) if plain else encode_exr(depth, coding.depth)
+        yield "depth", "npy" if plain else "exr", content
     if view.instances is not None:
         yield "instances", "png", encode_png(view.instances.numpy())
     if has_masks(view):

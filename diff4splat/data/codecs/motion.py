@@ -55,8 +55,11 @@ def decode_flow(content: bytes, entry: ClipEntry) -> Flow:
         )
 
 
-def encode_tracks(clip: Clip, tracks: Tracks) -> bytes:
-    """The member's bytes; a view that does not say where it sees the points has no arrays."""
+def encode_tracks(clip: Clip, tracks: Tracks, packed: bool = True) -> bytes:
+    """The member's bytes; a view that does not say where it sees the points has no arrays.
+
+    What is not ``packed`` is larger and read faster.
+    """
     arrays = {
         "positions": tracks.positions.numpy(),
         "found_at": tracks.found_at.numpy().astype(np.int32),
@@ -69,7 +72,7 @@ def encode_tracks(clip: Clip, tracks: Tracks) -> bytes:
         if view.track_uv is not None and view.track_visible is not None:
             arrays[f"uv{number:02d}"] = view.track_uv.numpy()
             arrays[f"visible{number:02d}"] = pack(view.track_visible.numpy())
-    return encode_npz(arrays)
+    return encode_npz(arrays, packed)
 
 
 def decode_tracks(

@@ -22,18 +22,18 @@ _LEVEL = 1
 """Deflate; higher levels save a hundredth of the size and take half as long again."""
 
 
-def encode_npz(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """An archive in the order given."""
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
+def encode_npz(arrays: Mapping[str, np.ndarray], packed: bool = True) -> bytes:
+    """An archive in the order given, deflated or as it is."""
+    written, kind = io.BytesIO(), zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
+    with zipfile.ZipFile(written, "w", kind, compresslevel=_LEVEL) as archive:
         for name, array in arrays.items():
             plain = io.BytesIO()
             little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
             np.lib.format.write_array(plain, little, version=(1, 0), allow_pickle=False)
             entry = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
-            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            entry.compress_type, entry.external_attr = kind, 0o644 << 16
             archive.writestr(entry, plain.getvalue())
-    return packed.getvalue()
+    return written.getvalue()
 
 
 @contextmanager

@@ -17,12 +17,15 @@ from PIL import Image
 
 from diff4splat.data.clip import Clip, Tracks
 from diff4splat.data.clip_folder import ClipFolder
+from diff4splat.data.clip_part import ClipPart
+from diff4splat.data.codecs.depth import decode_npy, encode_npy
 from diff4splat.data.codecs.encode import Coding, Member, encode_clip
 from diff4splat.data.codecs.images import decode_jpeg, encode_jpeg
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError, InputError
 
 PXR24_ERROR = 2.0**-16
+PLAIN = Coding(images="jpeg", depth="half_plain")
 
 
 def stored(folder: Path, clip: Clip, coding: Coding | None = None) -> Clip:
@@ -72,9 +75,29 @@ def test_half_precision_refuses_what_it_cannot_hold(value: float) -> None:
 
 def test_jpeg_images_and_plain_half_depth(tmp_path: Path) -> None:
     clip = make_clip(views=1, size_px=(25, 33))
-    view = stored(tmp_path, clip, Coding(images="jpeg", depth="half_plain")).views[0]
+    view = stored(tmp_path, clip, PLAIN).views[0]
     assert (view.rgb.float() - clip.views[0].rgb.float()).abs().mean() < 3
     assert torch.equal(view.depth, clip.views[0].depth.half().float())
+
+
+def test_plain_depth_of_some_frames_alone(tmp_path: Path) -> None:
+    clip = make_clip(views=1, tracks=12)
+    with ShardWriter(tmp_path, ShardOptions(generator="t", coding=PLAIN)) as writer:
+        writer.write(clip)
+    found = ClipFolder(tmp_path).clip(0, ClipPart(frames=(1, 2, 3), flow=False))
+    assert torch.equal(found.views[0].depth, clip.views[0].depth[1:4].half().float())
+    assert torch.equal(found.tracks.positions, clip.tracks.positions[1:4])
+
+
+@pytest.mark.parametrize("kept", [0, 5, 60, 128, 1000, -1])
+def test_damaged_plain_depth_is_refused(kept: int) -> None:
+    content = encode_npy(np.ones((3, 20, 20), np.float32))
+    with pytest.raises(FileFormatError, match="expected"):
+        decode_npy(content[:kept], (3, 20, 20), range(3))
+    with pytest.raises(FileFormatError, match=r"shape \(3, 20, 21\), got float16"):
+        decode_npy(content, (3, 20, 21), range(3))
+    with pytest.raises(InputError, match="half precision"):
+        encode_npy(np.full((1, 2, 2), 1e-6, np.float32))
 
 
 def test_jpeg_has_no_room_for_many_rows() -> None:
