@@ -46,10 +46,8 @@ def write_parquet(decisions: list[Decision], out: Path) -> Path:
     scores = sorted({name for each in decisions for name in each.record.scores})
     labels = sorted({name for each in decisions for name in each.record.labels} - _NOT_SHOWN)
     kinds = {"is_static": "bool_", "commercial_ok": "bool_", "selected": "bool_"}
-    columns = (
-        {name: kinds.get(name, "string") for name in _facts(decisions[0])} if decisions else {}
-    )
-    fields = [(name, getattr(pyarrow, kind)()) for name, kind in columns.items()]
+    facts = _facts(Decision(record=ClipRecord(identifier="")))
+    fields = [(name, getattr(pyarrow, kinds.get(name, "string"))()) for name in facts]
     fields += [(f"score_{name}", pyarrow.float64()) for name in scores]
     fields += [(f"label_{name}", pyarrow.string()) for name in labels]
     rows = [_row(each, scores, labels) for each in decisions]

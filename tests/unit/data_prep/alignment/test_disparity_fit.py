@@ -107,3 +107,20 @@ def test_excluded_infinite_and_edge_pixels_are_no_samples() -> None:
     assert not usable[0, :, 2:4].any()
     assert usable[0, 3, 0]
     assert usable[0, :, 5].all()
+
+
+def test_no_mask_of_a_fit_undoes_another() -> None:
+    """A public pipeline replaces the mask of sky by the one that it computes last."""
+    rng = np.random.default_rng(3)
+    depth = np.full((2, 24, 24), 5.0)
+    disparity = 1 / depth
+    excluded = np.zeros(depth.shape, bool)
+    excluded[:, :12] = rng.random((2, 12, 24)) < 0.5
+    depth[:, 12:15] = np.nan
+    disparity[:, 15:17] = 0
+    depth[:, 18:20] = 500.0
+    disparity[:, :, 12:] *= 2
+    found = candidate_pixels(disparity, depth, excluded, SampleSettings())
+    wrong = excluded | ~np.isfinite(depth) | (disparity == 0) | (depth > 80)
+    wrong[:, :, 11:13] = True
+    assert found.any() and not found[wrong].any()
