@@ -19,6 +19,7 @@ ELSEWHERE = {
     "DrawSettings": "ground truth of drawn worlds",
     "ExportSettings": "which files an export writes",
     "OptimizerSettings": "a recipe of training",
+    "PipelineSettings": "preparation of training data",
     "PathSettings": "where cameras go: what is asked for",
     "RasterSettings": "`RenderSettings` as kernels read them",
     "RunSettings": "where and how long a training runs",

@@ -18,7 +18,7 @@ class PreparePipeline:
     ]
     """TOML file: the steps, the number of tasks, and the executor (local, slurm or ray)."""
     task: Annotated[int | None, Number(least=0)] = None
-    """Run this task alone, here, without datatrove: for xargs, or a scheduler of your own."""
+    """Run this task alone, here, without datatrove: for xargs, or another scheduler."""
     again: bool = False
     """Run complete tasks too, after files were repaired; finished clips are kept."""
     show: bool = False
