@@ -62,7 +62,6 @@ class ImportSettings:
     frames: int = DEFAULT_FRAMES
     size_px: tuple[int, int] | None = None
     """(height, width); None: what the public model was trained at."""
-    license: str = NOT_STATED
     seed: int = 0
     """Of the new layers that are not zero."""
 
@@ -83,6 +82,19 @@ class PublicModel:
     def size(self) -> int:
         """Bytes of all weights."""
         return sum(tensor.size for part in self.tensors.values() for tensor in part.values())
+
+    def summary(self) -> str:
+        """One line per part: weights, bytes, and what is added."""
+        lines = []
+        for part, tensors in self.tensors.items():
+            size = sum(tensor.size for tensor in tensors.values()) / 1e9
+            kinds = " and ".join(sorted({tensor.dtype for tensor in tensors.values()}))
+            added = ", ".join(sorted({key.split(".")[0] for key in self.fresh[part]})) or "nothing"
+            lines.append(
+                f"{part:<14}{len(tensors):>5} tensors{size:>9.3f} GB in {kinds}; "
+                f"none unknown, none missing; added: {added}"
+            )
+        return "\n".join(lines)
 
 
 def open_public_model(root: Path, settings: ImportSettings | None = None) -> PublicModel:
