@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Literal
 
 import torch
+
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
@@ -179,9 +180,7 @@ class Diff4SplatPipeline:
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
         return replace(found, motion=motion), layered.visible_count
 
-    def _fill_request(
-        self, request: Request, maps: ImageMaps, text: TextStates
-    ) -> FillRequest:
+    def _fill_request(self, request: Request, maps: ImageMaps, text: TextStates) -> FillRequest:
         border_cells = self.model.config.refinement.border_cells
         return FillRequest(
             image=request.small,

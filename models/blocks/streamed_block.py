@@ -14,7 +14,7 @@ from torch.func import functional_call
 
 
 class StreamedBlock(nn.Module):
-    """Runs ``block`` on copies of its weights; ``to`` moves what it computes, not what it stores."""
+    """Runs ``block`` on copies of its weights; ``to`` moves the computation, not what is stored."""
 
     def __init__(self, block: nn.Module) -> None:
         super().__init__()

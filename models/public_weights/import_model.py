@@ -106,7 +106,11 @@ def open_public_model(root: Path, settings: ImportSettings | None = None) -> Pub
     """
     settings, folder = settings or ImportSettings(), SourceFolder(root=root)
     config = _model_config(folder, settings)
-    fresh = {"vae": _statistics(folder, config), "text_encoder": {}, "dit": _added(config, settings)}
+    fresh = {
+        "vae": _statistics(folder, config),
+        "text_encoder": {},
+        "dit": _added(config, settings),
+    }
     networks = dict(create_networks(config, "meta", parts=IMPORTED).parts())
     shapes = {
         part: {key: tuple(value.shape) for key, value in networks[part].state_dict().items()}

@@ -89,7 +89,9 @@ class SourceFolder:
         """From a list of checksums, or from the name that a download cache gives the file."""
         if self.has(SUMS_FILE):
             lines = read_text(self.file(SUMS_FILE), "a list of checksums", CheckpointError)
-            sums = {match[2]: match[1] for match in map(_SUM.fullmatch, lines.splitlines()) if match}
+            sums = {
+                match[2]: match[1] for match in map(_SUM.fullmatch, lines.splitlines()) if match
+            }
             return sums.get(name, "")
         blob = path.resolve()
         named = blob.parent.name == "blobs" and re.fullmatch(r"[0-9a-f]{64}", blob.name)

@@ -30,6 +30,7 @@ from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
 from diff4splat.models.blocks.norm import EPSILON
 from diff4splat.models.blocks.patches import patchify, unpatchify
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
 from diff4splat.models.config.model import ModelConfig
@@ -124,11 +125,12 @@ class VideoDiT(nn.Module):
                 f"render condition: expected {want}, got {got}; DitConfig.render_condition decides"
             )
         states = None if text is None else self.text_projection(text)
+        pooled = self.config.pooled_text and states is not None
         return DitConditions(
             camera=None if camera is None else self.camera_adapter(camera),
             text=states,
             text_mask=text_mask,
-            pooled_text=None if states is None else self._pooled(states, text_mask),
+            pooled_text=self._pooled(states, text_mask) if pooled else None,
             image=None if image is None else self._image_states(image),
             channel_tokens=None if image is None else self._channel_tokens(image.channels),
             render_latent=None if condition is None else condition.latent,
@@ -154,16 +156,12 @@ class VideoDiT(nn.Module):
         patches = patchify(latent, PATCH)
         if not self.config.condition_channels:
             return layer(patches)
-        return torch.nn.functional.linear(
-            patches, layer.weight[:, : patches.shape[-1]], layer.bias
-        )
+        return torch.nn.functional.linear(patches, layer.weight[:, : patches.shape[-1]], layer.bias)
 
     def _pooled(
         self, states: Float[Tensor, "b s d"], mask: Bool[Tensor, "b s"] | None
-    ) -> Float[Tensor, "b d"] | None:
+    ) -> Float[Tensor, "b d"]:
         """From the mean over real tokens."""
-        if not self.config.pooled_text:
-            return None
         if mask is None:
             return self.pooled_text(states.mean(1))
         real = mask[..., None].to(states)
@@ -195,8 +193,10 @@ class VideoDiT(nn.Module):
         tokens = tokens.flatten(2, 3)
         for block in self.blocks:
             tokens = block(tokens, modulation, rope, conditions)
-        shift, scale = (embedding[..., None, :] + self.modulation_out)[..., None, :].unbind(2)
-        patches = self.head(modulate(self.norm_out(tokens), shift, scale))
+        wide = at_least_float32(embedding)[..., None, :] + at_least_float32(self.modulation_out)
+        shift, scale = wide[..., None, :].unbind(2)
+        modulated = modulate(self.norm_out(at_least_float32(tokens)), shift, scale)
+        patches = self.head(modulated.to(tokens.dtype))
         output = unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
         return self._as_velocity(output, latent, level, conditions.render_latent)
 

@@ -14,6 +14,7 @@ from diff4splat.models.blocks.feedforward import FeedForward
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import modulate
 from diff4splat.models.blocks.norm import EPSILON
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.blocks.rope import RopeTables
 from diff4splat.models.config.networks import DitConfig
 from diff4splat.models.video_dit.conditions import DitConditions
@@ -49,17 +50,23 @@ class DitBlock(nn.Module):
 
         Nothing is added to a sample of which the text mask marks no token as real.
         """
-        shift, scale, gate, ff_shift, ff_scale, ff_gate = (modulation + self.modulation)[
-            ..., None, :
-        ].unbind(2)
+        wide = at_least_float32(modulation) + at_least_float32(self.modulation)
+        shift, scale, gate, ff_shift, ff_scale, ff_gate = wide[..., None, :].unbind(2)
         frames = tokens.shape[1]
-        modulated = modulate(self.attention_norm(tokens), shift, scale).flatten(1, 2)
-        tokens = tokens + gate * self.attention(modulated, rope=rope).unflatten(1, (frames, -1))
+        modulated = self._modulated(self.attention_norm, tokens, shift, scale).flatten(1, 2)
+        update = self.attention(modulated, rope=rope).unflatten(1, (frames, -1))
+        tokens = (tokens + gate * update).to(tokens.dtype)
         if conditions.text is not None:
             queries = self.text_norm(tokens).flatten(1, 2)
             tokens = tokens + self._from_text(queries, conditions).unflatten(1, (frames, -1))
-        modulated = modulate(self.feedforward_norm(tokens), ff_shift, ff_scale)
-        return tokens + ff_gate * self.feedforward(modulated)
+        modulated = self._modulated(self.feedforward_norm, tokens, ff_shift, ff_scale)
+        return (tokens + ff_gate * self.feedforward(modulated)).to(tokens.dtype)
+
+    def _modulated(
+        self, norm: nn.LayerNorm, tokens: Float[Tensor, "b t m d"], shift: Tensor, scale: Tensor
+    ) -> Float[Tensor, "b t m d"]:
+        """Norms, scales and sums are those of single precision, as in Wan."""
+        return modulate(norm(at_least_float32(tokens)), shift, scale).to(tokens.dtype)
 
     def _from_text(
         self, queries: Float[Tensor, "b n d"], conditions: DitConditions

@@ -29,7 +29,9 @@ def dit_config(source: Source) -> DitConfig:
     where = "transformer/config.json"
     _require(source, where, patch_size=[1, 2, 2], cross_attn_norm=True, pos_embed_seq_len=None)
     _require(source, where, qk_norm="rms_norm_across_heads", eps=1e-6)
-    width = _count(source, "num_attention_heads", where) * _count(source, "attention_head_dim", where)
+    width = _count(source, "num_attention_heads", where) * _count(
+        source, "attention_head_dim", where
+    )
     inputs, outputs = (_count(source, name, where) for name in ("in_channels", "out_channels"))
     image_width = source.get("image_dim") or 0
     _require(source, where, added_kv_proj_dim=width if image_width else None)

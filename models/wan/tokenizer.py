@@ -3,6 +3,7 @@
 import html
 import re
 from pathlib import Path
+from typing import Any
 
 from diff4splat.errors import ConfigError, FileFormatError
 from diff4splat.io.require_file import read_text
@@ -29,7 +30,7 @@ def clean_prompt(prompt: str) -> str:
     return re.sub(r"\s+", " ", resolved).strip()
 
 
-def _read(file: Path):  # noqa: ANN202
+def _read(file: Path) -> Any:
     try:
         from tokenizers import Tokenizer as Reader
     except ImportError as error:

@@ -21,7 +21,11 @@ class Umt5Block(nn.Module):
 
     def __init__(self, config: TextConfig) -> None:
         super().__init__()
-        width, hidden, inner = config.width, config.feedforward_width, config.heads * config.head_width
+        width, hidden, inner = (
+            config.width,
+            config.feedforward_width,
+            config.heads * config.head_width,
+        )
         self.heads = config.heads
         self.attention_norm = TokenRmsNorm(width)
         self.to_query = nn.Linear(width, inner, bias=False)
@@ -44,9 +48,7 @@ class Umt5Block(nn.Module):
             for layer in (self.to_query, self.to_key, self.to_value)
         )
         bias = self.distance_bias(buckets).permute(2, 0, 1)[None].to(query.dtype)
-        mixed = torch.nn.functional.scaled_dot_product_attention(
-            query, key, value, bias, scale=1.0
-        )
+        mixed = torch.nn.functional.scaled_dot_product_attention(query, key, value, bias, scale=1.0)
         states = states + self.to_output(mixed.transpose(1, 2).flatten(2))
         normed = self.feedforward_norm(states)
         gate = torch.nn.functional.gelu(self.gate(normed), approximate="tanh")

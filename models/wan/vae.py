@@ -1,9 +1,9 @@
 """The autoencoders of Wan 2.1 (4×8×8, 16 channels) and Wan 2.2 (4×16×16, 48 channels).
 
-Axes: ``b`` batch, ``c`` latent channels, ``f`` = 1 + 4 k video frames, ``t h w`` latent frames, rows
-and columns. The calls are those of ``VideoVae``: video in [−1, 1], standardised latents. Video goes
-through in chunks, frame 0 alone and then four frames at a time, so memory does not grow with the
-length of the video; a layer over time takes its history from the chunk before.
+Axes: ``b`` batch, ``c`` latent channels, ``f`` = 1 + 4 k video frames, ``t h w`` latent frames,
+rows and columns. The calls are those of ``VideoVae``: video in [−1, 1], standardised latents. Video
+goes through in chunks, frame 0 alone and then four frames at a time, so memory does not grow with
+the length of the video; a layer over time takes its history from the chunk before.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from diff4splat.models.wan.vae_encoder import WanEncoder
 
 
 class WanVae(nn.Module):
-    """Encoder, decoder and the statistics of their latents, under the names of the public weights."""
+    """Encoder, decoder and latent statistics, under the names of the public weights."""
 
     def __init__(self, config: VaeConfig) -> None:
         super().__init__()

@@ -89,7 +89,9 @@ def _levels(config: VaeConfig, widths: tuple[int, ...]) -> list[nn.Module]:
     kind = WanUpBlock if halves else WanShortcutUpBlock
     before = (widths[0], *(width // 2 if halves else width for width in widths[:-1]))
     last = len(widths) - 1
-    doubles = [halves_time(last - level, last + 1) if level < last else None for level in range(last + 1)]
+    doubles = [
+        halves_time(last - level, last + 1) if level < last else None for level in range(last + 1)
+    ]
     return [
         kind(channels, width, config.blocks, double)
         for channels, width, double in zip(before, widths, doubles, strict=True)

@@ -74,9 +74,13 @@ def _levels(config: VaeConfig) -> list[nn.Module]:
 
 def _grouped_levels(config: VaeConfig) -> list[nn.Module]:
     last = len(config.widths) - 1
-    halves = [halves_time(level + 1, last + 1) if level < last else None for level in range(last + 1)]
+    halves = [
+        halves_time(level + 1, last + 1) if level < last else None for level in range(last + 1)
+    ]
     pairs = _pairs(config.widths)
-    return [WanDownBlock(*pair, config.blocks, half) for pair, half in zip(pairs, halves, strict=True)]
+    return [
+        WanDownBlock(*pair, config.blocks, half) for pair, half in zip(pairs, halves, strict=True)
+    ]
 
 
 def _pairs(widths: tuple[int, ...]) -> list[tuple[int, int]]:

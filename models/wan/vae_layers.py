@@ -73,7 +73,9 @@ class WanDownsample(nn.Module):
 
     def __init__(self, channels: int, in_time: bool) -> None:
         super().__init__()
-        self.resample = nn.Sequential(nn.ZeroPad2d((0, 1, 0, 1)), nn.Conv2d(channels, channels, 3, 2))
+        self.resample = nn.Sequential(
+            nn.ZeroPad2d((0, 1, 0, 1)), nn.Conv2d(channels, channels, 3, 2)
+        )
         if in_time:
             self.time_conv = nn.Conv3d(channels, channels, (3, 1, 1), (2, 1, 1))
         self.in_time = in_time
@@ -97,7 +99,9 @@ class WanUpsample(nn.Module):
 
     def __init__(self, channels: int, out_channels: int, in_time: bool) -> None:
         super().__init__()
-        self.resample = nn.Sequential(nn.Identity(), nn.Conv2d(channels, out_channels, 3, padding=1))
+        self.resample = nn.Sequential(
+            nn.Identity(), nn.Conv2d(channels, out_channels, 3, padding=1)
+        )
         if in_time:
             self.time_conv = WanCausalConv3d(channels, 2 * channels, space=1)
         self.in_time = in_time
@@ -125,7 +129,9 @@ class WanUpsample(nn.Module):
         return later.new_zeros(later.shape[0], 2 * later.shape[1], *later.shape[2:])
 
 
-def per_frame(layer: nn.Module, frames: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b c2 t h w"]:
+def per_frame(
+    layer: nn.Module, frames: Float[Tensor, "b c t h w"]
+) -> Float[Tensor, "b c2 t h2 w2"]:
     """A layer over images, applied to each frame."""
     flat = frames.transpose(1, 2).flatten(0, 1)
     return layer(flat).unflatten(0, (frames.shape[0], -1)).transpose(1, 2)

@@ -16,7 +16,8 @@ def spread_(module: torch.nn.Module) -> torch.nn.Module:
         for name, value in module.named_parameters():
             centre = 1.0 if "norm" in name and name.endswith("weight") else 0.0
             centre = 1.0 if name.endswith("gamma") else centre
-            value.normal_(centre, 0.2)
+            spread = value[0].numel() ** -0.5 if value.dim() > 1 and centre == 0 else 0.2
+            value.normal_(centre, spread)
     return module.eval()
 
 
@@ -84,7 +85,9 @@ def write_tokenizer(folder: Path) -> None:
     tokenizer.save(str(folder / "tokenizer.json"))
 
 
-def write_wan(folder: Path, kind: str = "t2v", dtype: torch.dtype = torch.float32, **options) -> Path:
+def write_wan(
+    folder: Path, kind: str = "t2v", dtype: torch.dtype = torch.float32, **options
+) -> Path:
     """A whole model folder, saved by the libraries; ``max_shard_size`` cuts it into shards."""
     version = "2.2" if kind == "ti2v" else "2.1"
     transformer(kind).to(dtype).save_pretrained(folder / "transformer", **options)

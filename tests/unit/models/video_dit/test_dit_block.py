@@ -41,4 +41,6 @@ def test_block_follows_the_formula() -> None:
 def test_fresh_block_is_the_identity() -> None:
     tokens, text = torch.randn(1, 2, 2, CONFIG.width), torch.randn(1, 3, CONFIG.width)
     no_modulation = torch.zeros(1, 2, 6, CONFIG.width)
-    assert torch.equal(DitBlock(CONFIG)(tokens, no_modulation, ROPE, DitConditions(text=text)), tokens)
+    assert torch.equal(
+        DitBlock(CONFIG)(tokens, no_modulation, ROPE, DitConditions(text=text)), tokens
+    )
