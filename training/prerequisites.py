@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
 from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.mapped_weights import mapped_parts
 from diff4splat.models.hub.model import Model
 from diff4splat.models.networks import PARTS, Networks
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
@@ -94,17 +95,29 @@ def trained_networks(
 ) -> tuple[Networks, frozenset[str]]:
     """Networks with the newest averaged weights of all stages begun, and the parts that are done.
 
+    Those of ``kept_parts`` are not built.
+
     Raises:
         CheckpointError, FileFormatError: as ``starting_networks``.
     """
     begun = [stage for stage in recipe.stages if _has_weights(stage, folder / stage.name)]
     finished = [stage for stage in begun if read_result(folder / stage.name).finished]
     sources = {part: stage for stage in begun for part in stage.trained}
-    networks = create_networks(recipe.model, seed=recipe.seed)
-    _take(networks, start, PARTS)
+    kept = kept_parts(recipe, start)
+    networks = create_networks(recipe.model, seed=recipe.seed, parts=set(PARTS) - kept)
+    _take(networks, start, set(PARTS) - kept)
     done = frozenset(part for stage in finished for part in stage.trained)
-    ready = frozenset() if start is None else start.trained.intersection(dict(networks.parts()))
+    present = kept.union(dict(networks.parts()))
+    ready = frozenset() if start is None else start.trained & present
     return _filled(networks, sources, folder), done | (ready - sources.keys())
+
+
+def kept_parts(recipe: Recipe, start: Model | None) -> frozenset[str]:
+    """Parts with public weights that no stage trains: their files are handed over as they are."""
+    if start is None or start.folder is None:
+        return frozenset()
+    learnt = {part for stage in recipe.stages for part in stage.trained}
+    return (mapped_parts(recipe.model) & start.trained) - learnt
 
 
 def _take(networks: Networks, start: Model | None, parts: Collection[str]) -> None:

@@ -28,6 +28,10 @@ class StreamedBlock(nn.Module):
         weights = {name: value.to(**target) for name, value in self.block.named_parameters()}
         return functional_call(self.block, weights, inputs)
 
+    def state_dict(self, *args: Any, **options: Any) -> dict[str, Any]:
+        """The block's own, under the names that it has without streaming."""
+        return self.block.state_dict(*args, **options)
+
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "StreamedBlock":
         del recurse
         self.computes = fn(self.computes)

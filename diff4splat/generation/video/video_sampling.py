@@ -69,7 +69,7 @@ def sample_video(
     calls = CallCount()
     latent = solve(
         settings.sampler,
-        _velocity(dit, conditions, settings.guidance, calls),
+        video_velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
         (settings.levels, settings.step_control),
         advance,
@@ -87,9 +87,10 @@ def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w
     return torch.cat([image, noise], 2) if given else noise
 
 
-def _velocity(
+def video_velocity(
     dit: VideoVelocity, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
+    """The velocity that the solver follows, with guidance; ``calls`` counts network evaluations."""
     # Cameras and text are embedded once: they are the same at every level.
     embedded = _prepare(dit, conditions, conditions.text)
     without = replace(embedded, text=None, text_mask=None, pooled_text=None)
