@@ -1,4 +1,7 @@
-"""LDRM and deformation on the latents of a public video model, whose own weights stay as they are.
+"""LDRM and deformation on the latents of a public video model, and cameras for that model.
+
+Its own weights stay as they are: the video stage trains the camera adapter, the layer of the render
+condition and low-rank corrections.
 
 Stages, losses and steps are those of the ``paper`` recipe; there is no stage for the autoencoder.
 The model is that of an imported folder, so the recipe is made for it: ``train --config backbone
@@ -14,7 +17,7 @@ from diff4splat.training.recipe.recipe import Recipe
 
 BACKBONE = "backbone"
 """Name of the recipe."""
-KINDS = ("static", "dynamic")
+KINDS = ("static", "dynamic", "video_diffusion")
 """Stages that train what the public model lacks."""
 TOY_SIDE_PX = 128
 """Models for smaller images are those of tests."""
@@ -35,6 +38,8 @@ def backbone_recipe(model: ModelConfig) -> Recipe:
         stages=tuple(
             replace(
                 stage,
+                trained=tuple(part for part in stage.trained if part != "text_encoder"),
+                tuning="lora" if stage.kind == "video_diffusion" else "full",
                 data=replace(stage.data, size_px=sizes[stage.name], frames=model.frames),
             )
             for stage in stages

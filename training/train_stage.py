@@ -141,7 +141,7 @@ def _hand_over(
 def _kept_files(request: StageRequest) -> dict[str, Path]:
     """Files of public weights, and of the vocabulary that belongs to them."""
     start = request.start
-    kept = kept_parts(request.recipe, start)
+    kept = kept_parts(request.recipe, request.folder, start)
     names = [part_file(Path(), part).name for part in sorted(kept)]
     if "text_encoder" in kept:
         names.append(TOKENIZER_FILE)

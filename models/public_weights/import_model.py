@@ -18,6 +18,7 @@ from torch import Tensor
 
 from diff4splat.errors import CheckpointError
 from diff4splat.io.atomic import atomic_folder, write_text
+from diff4splat.models.adapters.tuning import ADDED
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.factory import create_networks
@@ -35,7 +36,7 @@ from diff4splat.models.public_weights.source_folder import SourceFolder, require
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
 from diff4splat.models.video_dit.render_condition import RenderConditionEmbedding
 from diff4splat.models.wan import source_config
-from diff4splat.models.wan.key_map import ADDED, video_dit_key
+from diff4splat.models.wan.key_map import video_dit_key
 from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
 from diff4splat.models.wan.umt5 import umt5_key
 

@@ -34,8 +34,6 @@ RENAMED: Mapping[str, str] = {
 """Pattern → replacement; all that match are applied, in this order."""
 IGNORED = ".norm_added_q."
 """In some files, but no model uses it."""
-ADDED = ("camera_adapter.", "condition_embedding.")
-"""Prefixes of what Wan does not have: our camera adapter and render condition."""
 
 
 def video_dit_key(key: str) -> str | None:

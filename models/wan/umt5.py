@@ -6,7 +6,7 @@ prompts to.
 """
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from diff4splat.errors import ConfigError
@@ -88,6 +88,15 @@ class Umt5Encoder(nn.Module):
             )
         row = self.tokenizer.token_row(text)
         return self(torch.tensor([row], device=self.embedding.weight.device))
+
+    def encode_prompts(
+        self, texts: list[str]
+    ) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
+        """States of several prompts, padded with zeros to the longest, and which are real."""
+        rows = [self.encode_prompt(text)[0] for text in texts]
+        lengths = torch.tensor([len(row) for row in rows], device=rows[0].device)
+        states = torch.nn.utils.rnn.pad_sequence(rows, batch_first=True)
+        return states, torch.arange(states.shape[1], device=states.device) < lengths[:, None]
 
 
 UMT5_KEYS = {

@@ -38,6 +38,9 @@ OPTIONAL = (
     "viser",
     "zstandard",
     "pxr",
+    "tokenizers",
+    "transformers",
+    "diffusers",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 

@@ -9,10 +9,11 @@ from imported_models import settings
 from safetensors.torch import load_file
 
 from diff4splat.errors import FileFormatError
+from diff4splat.models.adapters.tuning import ADDED
 from diff4splat.models.hub.mapped_weights import resident_bytes
 from diff4splat.models.hub.model import load_model
 from diff4splat.models.public_weights.import_model import open_public_model, write_model
-from diff4splat.models.wan.key_map import ADDED, video_dit_key
+from diff4splat.models.wan.key_map import video_dit_key
 
 
 def test_weights_are_copied_bit_by_bit(wan_source: Path, imported: dict[str, Path]) -> None:
