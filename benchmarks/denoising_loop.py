@@ -7,6 +7,8 @@ alternate. Memory is the peak of the process above what it held before the loop.
 """
 
 import argparse
+import ctypes
+import json
 import statistics
 import tempfile
 import time
@@ -153,7 +155,8 @@ def our_loop(transformer: torch.nn.Module, case: Case, levels: list[float]) -> C
 
 def our_network(transformer: torch.nn.Module) -> torch.nn.Module:
     """Ours, with these weights."""
-    settings = replace(source_config.dit_config(dict(transformer.config)), render_condition=False)
+    public = json.loads(json.dumps(dict(transformer.config)))
+    settings = replace(source_config.dit_config(public), render_condition=False)
     base = paper_size()
     vae = replace(base.vae, latent_channels=CHANNELS)
     config = replace(base, dit=settings, vae=vae, text=replace(base.text, width=TEXT_WIDTH))
@@ -178,6 +181,8 @@ def padded(text: Tensor) -> Tensor:
 
 def reset_peak() -> int:
     """The memory that the process holds now, from which on its peak counts; in kB."""
+    # What earlier rounds freed must not hide what this one needs.
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")
     return memory_kb("VmRSS")
 

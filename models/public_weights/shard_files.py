@@ -89,37 +89,48 @@ def read_header(file: Path) -> dict[str, StoredTensor]:
             )
         try:
             entries = decode_json(stream.read(length).decode())
-            return {
-                key: _stored(file, entry, 8 + length, size)
+            found = {
+                key: _stored(file, entry, 8 + length)
                 for key, entry in entries.items()
                 if key != "__metadata__"
             }
         except (UnicodeDecodeError, AttributeError, KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(
-                f"{file}: expected the header of a .safetensors file, got a damaged one; "
-                "download it again"
-            ) from error
+            raise _damaged(file) from error
+    for tensor in found.values():
+        _require_readable(tensor, size)
+    return found
 
 
-def _stored(file: Path, entry: dict, base: int, size: int) -> StoredTensor:
-    dtype, (start, end) = entry["dtype"], entry["data_offsets"]
+def _damaged(file: Path) -> FileFormatError:
+    return FileFormatError(
+        f"{file}: expected the header of a .safetensors file, got a damaged one; download it again"
+    )
+
+
+def _stored(file: Path, entry: dict, base: int) -> StoredTensor:
+    dtype, (start, end) = str(entry["dtype"]), entry["data_offsets"]
     shape = tuple(int(side) for side in entry["shape"])
-    if dtype not in BYTES_PER_NUMBER or len(shape) > MAX_AXES:
+    needed = BYTES_PER_NUMBER.get(dtype, 0)
+    for side in shape[:MAX_AXES]:
+        needed *= side
+    known = dtype in BYTES_PER_NUMBER
+    if not 0 <= start <= end or (known and end - start != needed) or len(shape) > MAX_AXES:
+        raise ValueError("offsets do not fit the shape")
+    return StoredTensor(file=file, dtype=dtype, shape=shape, start=base + start, size=end - start)
+
+
+def _require_readable(tensor: StoredTensor, size: int) -> None:
+    file, end = tensor.file, tensor.start + tensor.size
+    if tensor.dtype not in BYTES_PER_NUMBER:
         raise CheckpointError(
-            f"{file}: expected weights in {', '.join(BYTES_PER_NUMBER)}, got {str(dtype)[:20]}; "
+            f"{file}: expected weights in {', '.join(BYTES_PER_NUMBER)}, got {tensor.dtype[:20]}; "
             "download the model that is not quantised"
         )
-    needed = BYTES_PER_NUMBER[dtype]
-    for side in shape:
-        needed *= side
-    if not 0 <= start <= end or end - start != needed:
-        raise ValueError("offsets do not fit the shape")
-    if base + end > size:
+    if end > size:
         raise FileFormatError(
-            f"{file}: expected at least {base + end:,} bytes, got {size:,}; the file is cut off, "
+            f"{file}: expected at least {end:,} bytes, got {size:,}; the file is cut off, "
             "download it again"
         )
-    return StoredTensor(file=file, dtype=dtype, shape=shape, start=base + start, size=needed)
 
 
 def _require_types(tensors: dict[str, StoredTensor], part: str) -> None:
