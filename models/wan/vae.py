@@ -23,6 +23,9 @@ from diff4splat.models.wan.vae_encoder import WanEncoder
 class WanVae(nn.Module):
     """Encoder, decoder and latent statistics, under the names of the public weights."""
 
+    pca_shortcut = None
+    """Only ours has one."""
+
     def __init__(self, config: VaeConfig) -> None:
         super().__init__()
         self.config = config
