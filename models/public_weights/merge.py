@@ -25,7 +25,7 @@ Shapes = Mapping[str, tuple[int, ...]]
 
 
 def match_keys(
-    found: Mapping[str, StoredTensor],
+    stored: Mapping[str, StoredTensor],
     wanted: Shapes,
     rename: Callable[[str], str | None],
     what: str,
@@ -37,8 +37,8 @@ def match_keys(
     Raises:
         CheckpointError: names are unknown or missing, all listed, or a shape is another.
     """
-    renamed = {key: rename(key) for key in found}
-    named = {new: found[key] for key, new in renamed.items() if new is not None}
+    renamed = {key: rename(key) for key in stored}
+    named = {new: stored[key] for key, new in renamed.items() if new is not None}
     unknown = [key for key, new in renamed.items() if new is not None and new not in wanted]
     _refuse(unknown, f"{what}: unknown")
     _refuse([key for key in wanted if key not in named], f"{what}: missing")
