@@ -55,7 +55,7 @@ DEFAULT_SIZE_PX = {8: (480, 832), 16: (704, 1280)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ImportSettings:
+class ImportOptions:
     """What the public model does not decide."""
 
     reconstruction: str = "paper"
@@ -98,14 +98,14 @@ class PublicModel:
         return "\n".join(lines)
 
 
-def open_public_model(root: Path, settings: ImportSettings | None = None) -> PublicModel:
+def open_public_model(root: Path, settings: ImportOptions | None = None) -> PublicModel:
     """Check a folder in the layout of diffusers, and match every weight.
 
     Raises:
         CheckpointError: another architecture, a missing file, unknown or missing weights.
         FileFormatError: a damaged or cut off file, or one with another hash.
     """
-    settings, folder = settings or ImportSettings(), SourceFolder(root=root)
+    settings, folder = settings or ImportOptions(), SourceFolder(root=root)
     config = _model_config(folder, settings)
     fresh = {
         "vae": _statistics(folder, config),
@@ -156,7 +156,7 @@ def write_model(
         write_sums(staging)
 
 
-def _model_config(folder: SourceFolder, settings: ImportSettings) -> ModelConfig:
+def _model_config(folder: SourceFolder, settings: ImportOptions) -> ModelConfig:
     index = folder.json("model_index.json")
     if folder.has("transformer_2/config.json"):
         raise CheckpointError(
@@ -208,7 +208,7 @@ def _statistics(folder: SourceFolder, config: ModelConfig) -> dict[str, Tensor]:
     return {"latent_mean": torch.tensor(mean), "latent_std": torch.tensor(std)}
 
 
-def _added(config: ModelConfig, settings: ImportSettings) -> dict[str, Tensor]:
+def _added(config: ModelConfig, settings: ImportOptions) -> dict[str, Tensor]:
     """Fresh adapters: their last layers are zero, so the model is the public one exactly."""
     dit, added = config.dit, {}
     with torch.random.fork_rng(devices=[]):

@@ -6,7 +6,7 @@ import pytest
 import wan_folder
 
 from diff4splat.models.public_weights.import_model import (
-    ImportSettings,
+    ImportOptions,
     open_public_model,
     write_model,
 )
@@ -14,10 +14,10 @@ from diff4splat.models.public_weights.import_model import (
 KINDS = ("t2v", "i2v", "ti2v")
 
 
-def settings(kind: str) -> ImportSettings:
+def settings(kind: str) -> ImportOptions:
     """Few frames, two tokens a side."""
     side = 64 if kind == "ti2v" else 32
-    return ImportSettings(reconstruction="test", frames=5, size_px=(side, side))
+    return ImportOptions(reconstruction="test", frames=5, size_px=(side, side))
 
 
 @pytest.fixture(scope="session")

@@ -62,12 +62,12 @@ class ImportModel:
         """Check everything, then copy."""
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.models.public_weights.import_model import (
-            ImportSettings,
+            ImportOptions,
             open_public_model,
             write_model,
         )
 
-        settings = ImportSettings(
+        settings = ImportOptions(
             reconstruction=self.reconstruction,
             frames=self.frames,
             size_px=self.size_px(),
