@@ -70,7 +70,7 @@ Command = (
     | Annotated[View, subcommand("view")]
     | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
-    | Annotated[Models, subcommand("models", description="Public models: list, get, import, check.")]
+    | Annotated[Models, subcommand("models", description="Public models: list, get, import.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Forecasts, subcommand("forecast")]
     | Annotated[
