@@ -22,6 +22,8 @@ from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.text_encoder.encoder import TextEncoder
 from diff4splat.models.video_dit.dit import VideoDiT
 from diff4splat.models.video_vae.vae import VideoVae
+from diff4splat.models.wan.umt5 import Umt5Encoder
+from diff4splat.models.wan.vae import WanVae
 
 
 def create_networks(
@@ -45,8 +47,8 @@ def create_networks(
 def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
     motion = config.motion_unet
     return {
-        "vae": lambda: VideoVae(config.vae),
-        "text_encoder": lambda: TextEncoder(config.text),
+        "vae": lambda: _vae(config),
+        "text_encoder": lambda: _text_encoder(config),
         "dit": lambda: VideoDiT(config),
         "ldrm": lambda: Ldrm(config),
         "deformation": lambda: _deformation(config),
@@ -55,6 +57,16 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
             motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
         ),
     }
+
+
+def _vae(config: ModelConfig) -> nn.Module:
+    """Ours, or one that holds public weights."""
+    return VideoVae(config.vae) if config.vae.layout == "plain" else WanVae(config.vae)
+
+
+def _text_encoder(config: ModelConfig) -> nn.Module:
+    bytewise = config.text.encoder == "bytes"
+    return TextEncoder(config.text) if bytewise else Umt5Encoder(config.text)
 
 
 def _deformation(config: ModelConfig) -> DeformationNetwork | RefinedDeformation:

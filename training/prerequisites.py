@@ -10,13 +10,16 @@ from the model that the run starts from, where they are trained, and are random 
 """
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.models.adapters.lora import merged
 from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.mapped_weights import mapped_parts
 from diff4splat.models.hub.model import Model
 from diff4splat.models.networks import PARTS, Networks
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
@@ -84,9 +87,12 @@ def starting_networks(
         CheckpointError, FileFormatError: a checkpoint is missing, damaged or of other networks.
     """
     needed = STAGES[stage.kind].needed(recipe.model)
-    networks = create_networks(recipe.model, seed=recipe.seed, parts=needed)
-    _take(networks, start, needed)
-    return _filled(networks, stages_before(recipe, stage, folder, start), folder)
+    frozen = kept_parts(recipe, folder, start).intersection(needed) - set(stage.trained)
+    made = set(needed) - frozen
+    networks = create_networks(recipe.model, seed=recipe.seed, parts=made)
+    _take(networks, start, made)
+    networks = _filled(networks, stages_before(recipe, stage, folder, start), folder)
+    return replace(networks, **{part: getattr(start.networks, part) for part in frozen})
 
 
 def trained_networks(
@@ -94,17 +100,30 @@ def trained_networks(
 ) -> tuple[Networks, frozenset[str]]:
     """Networks with the newest averaged weights of all stages begun, and the parts that are done.
 
+    Those of ``kept_parts`` are not built.
+
     Raises:
         CheckpointError, FileFormatError: as ``starting_networks``.
     """
     begun = [stage for stage in recipe.stages if _has_weights(stage, folder / stage.name)]
     finished = [stage for stage in begun if read_result(folder / stage.name).finished]
     sources = {part: stage for stage in begun for part in stage.trained}
-    networks = create_networks(recipe.model, seed=recipe.seed)
-    _take(networks, start, PARTS)
+    kept = kept_parts(recipe, folder, start)
+    networks = create_networks(recipe.model, seed=recipe.seed, parts=set(PARTS) - kept)
+    _take(networks, start, set(PARTS) - kept)
     done = frozenset(part for stage in finished for part in stage.trained)
-    ready = frozenset() if start is None else start.trained.intersection(dict(networks.parts()))
+    present = kept.union(dict(networks.parts()))
+    ready = frozenset() if start is None else start.trained & present
     return _filled(networks, sources, folder), done | (ready - sources.keys())
+
+
+def kept_parts(recipe: Recipe, folder: Path, start: Model | None) -> frozenset[str]:
+    """Parts with public weights that no stage has trained: they stay mapped in their files."""
+    if start is None or start.folder is None:
+        return frozenset()
+    begun = [stage for stage in recipe.stages if _has_weights(stage, folder / stage.name)]
+    learnt = {part for stage in begun for part in stage.trained}
+    return (mapped_parts(recipe.model) & start.trained) - learnt
 
 
 def _take(networks: Networks, start: Model | None, parts: Collection[str]) -> None:
@@ -131,7 +150,8 @@ def _filled(networks: Networks, sources: Mapping[str, StageRecipe], folder: Path
         place = folder / earlier.name
         stored = load_parts(last_checkpoint(place))
         for part in (part for part, source in sources.items() if source == earlier):
-            _fill(getattr(networks, part), stored.get(part, {}), f"{place}: {part}")
+            weights = merged(stored.get(part, {}))
+            _fill(getattr(networks, part), weights, f"{place}: {part}")
             if part == "vae":
                 networks.vae.set_statistics(*read_statistics(place))
     return networks

@@ -11,7 +11,9 @@ from pathlib import Path
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.features.load import load_features
 from diff4splat.models.hub.model import Model, save_model
+from diff4splat.models.hub.weight_files import part_file
 from diff4splat.models.networks import model_parts
+from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.earlier_release import earlier_fingerprint
@@ -20,6 +22,7 @@ from diff4splat.training.latents.samples import LatentSamples, open_samples
 from diff4splat.training.pca_init import init_from_principal_components
 from diff4splat.training.prerequisites import (
     continued_stage,
+    kept_parts,
     last_checkpoint,
     require_prerequisites,
     stages_before,
@@ -129,10 +132,20 @@ def _hand_over(
         _measure_latents(request, stage, samples)
     networks, trained = trained_networks(request.recipe, request.folder, request.start)
     model = Model(config=request.recipe.model, networks=networks, trained=trained)
-    save_model(model, request.folder / MODEL_FOLDER)
+    save_model(model, request.folder / MODEL_FOLDER, _kept_files(request))
     missing = ", ".join(part for part in model_parts(request.recipe.model) if part not in trained)
     state = f"not trained to the end: {missing}" if missing else "every part is trained"
     request.note(f"wrote {request.folder / MODEL_FOLDER}; {state}")
+
+
+def _kept_files(request: StageRequest) -> dict[str, Path]:
+    """Files of public weights, and of the vocabulary that belongs to them."""
+    start = request.start
+    kept = kept_parts(request.recipe, request.folder, start)
+    names = [part_file(Path(), part).name for part in sorted(kept)]
+    if "text_encoder" in kept:
+        names.append(TOKENIZER_FILE)
+    return {name: start.folder / name for name in names}
 
 
 def _measure_latents(request: StageRequest, stage: StageRecipe, samples: ClipSamples) -> None:

@@ -99,6 +99,8 @@ class Generate:
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: Annotated[float | None, Number(least=0)] = None
     """Classifier-free guidance weight, 1 is off. Default: 1 for motion, 5 for video."""
+    negative_prompt: str = ""
+    """Text that the video model keeps away from, beside --prompt. Default: none."""
     color_matching_steps: Annotated[int | None, Number(least=0, most=100)] = None
     """Corrections of the colours against the photo; 0 is off. Default: 7."""
     infill: Literal["subpixel", "none"] | None = None
@@ -340,6 +342,7 @@ class Generate:
             sampler=self.sampler,
             latent_tolerance=self.latent_tolerance,
             fill=self.fill,
+            negative_prompt=self.negative_prompt,
             still=self.still,
             min_opacity=self.min_opacity,
             motion=MotionSettings(**given),

@@ -19,7 +19,8 @@ class Train:
     """Train one stage; the same command resumes it. Works under torchrun."""
 
     config: str
-    """Recipe: test, small or paper; or a JSON file such as the recipe.json of a run."""
+    """Recipe: test, small, paper, or backbone for an imported model (with --from-model); or a JSON
+    file such as the recipe.json of a run."""
     stage: str
     """Stage to train, such as vae; another name is refused with a list of the recipe's stages."""
     out: OutFolder = Path("training-run")
@@ -94,14 +95,13 @@ class Train:
             ConfigError: no such recipe, stage or setting.
         """
         from diff4splat.configs.recipes import (
-            find_recipe,
             for_commercial_use,
             with_latents,
             with_mixture,
         )
         from diff4splat.training.recipe.overrides import override
 
-        recipe = override(find_recipe(self.config), [one for given in self.set for one in given])
+        recipe = override(self._base_recipe(), [one for given in self.set for one in given])
         if self.clips:
             recipe = with_mixture(recipe, self._folders())
         if self.commercial_only:
@@ -110,6 +110,21 @@ class Train:
             recipe = with_latents(recipe, self.stage, self.latents)
         recipe.stage(self.stage)
         return recipe
+
+    def _base_recipe(self) -> "Recipe":
+        from diff4splat.configs.public_backbone import BACKBONE, backbone_recipe
+        from diff4splat.configs.recipes import find_recipe
+        from diff4splat.errors import ConfigError
+        from diff4splat.models.hub.folders import find_config
+
+        if self.config != BACKBONE:
+            return find_recipe(self.config)
+        if self.from_model is None:
+            raise ConfigError(
+                "--config backbone: expected --from-model with an imported model, got none; "
+                "make one with diff4splat models import"
+            )
+        return backbone_recipe(find_config(self.from_model))
 
     def _folders(self) -> list[tuple[Path, float]]:
         from diff4splat.configs.recipes import weighted_folder

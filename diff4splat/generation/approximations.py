@@ -202,6 +202,7 @@ USER_CHOICES: UserChoices = {
     "GenerationSettings.motion": "the settings of the motion prior, each of its own",
     "GenerationSettings.fill": "what shows where the image hides: another scene, not a coarser one",
     "GenerationSettings.still": "whether anything may move",
+    "GenerationSettings.negative_prompt": "what the video is to keep away from",
     "MotionSettings.guidance": "how strongly the prompt counts: off by default, no exact value",
     "MotionSettings.threshold": "how probable motion must be: a decision, not an approximation",
     "StepControl.max_calls": "a limit for calls; a run that meets it says so",

@@ -14,14 +14,17 @@ from pathlib import Path
 from typing import Literal
 
 import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.inputs.request import Request, UserInput, prepare_request
+from diff4splat.generation.inputs.request import (
+    Request,
+    UserInput,
+    negative_prompt,
+    prepare_request,
+)
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.motion_sampling import MotionRequest
@@ -31,7 +34,7 @@ from diff4splat.generation.priors import Copies, image_maps
 from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
-from diff4splat.generation.video.video_fill import FillRequest, fill_hidden
+from diff4splat.generation.video.video_fill import FillRequest, TextStates, fill_hidden
 from diff4splat.generation.visible_fill import without_visible
 from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
 from diff4splat.paths.camera_path import CameraPath
@@ -125,7 +128,7 @@ class Diff4SplatPipeline:
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread(), self._autocast():
             text = self._text_states(request, log)
-            motion = MotionRequest(text=text, seed=request.seed, settings=request.settings)
+            motion = MotionRequest(text=text.prompt, seed=request.seed, settings=request.settings)
             maps = image_maps(model, copies, frames, motion, log)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(
@@ -146,7 +149,7 @@ class Diff4SplatPipeline:
         return match_input_view(scene, view, steps, log).to(torch.device("cpu"))
 
     def _gaussians(
-        self, request: Request, maps: ImageMaps, text: Tensor | None, log: RunLog
+        self, request: Request, maps: ImageMaps, text: TextStates, log: RunLog
     ) -> GaussianSet:
         """Those of the image, of the video model's fill, or of both."""
         if not request.plan.fills:
@@ -177,9 +180,7 @@ class Diff4SplatPipeline:
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
         return replace(found, motion=motion), layered.visible_count
 
-    def _fill_request(
-        self, request: Request, maps: ImageMaps, text: Float[Tensor, "1 s d"] | None
-    ) -> FillRequest:
+    def _fill_request(self, request: Request, maps: ImageMaps, text: TextStates) -> FillRequest:
         border_cells = self.model.config.refinement.border_cells
         return FillRequest(
             image=request.small,
@@ -203,11 +204,16 @@ class Diff4SplatPipeline:
         dtype = self.dtype if half else None
         return torch.autocast(self.device.type, dtype, enabled=half)
 
-    def _text_states(self, request: Request, log: RunLog) -> Float[Tensor, "1 s d"] | None:
+    def _text_states(self, request: Request, log: RunLog) -> TextStates:
         if "text_encoder" not in request.plan.parts:
-            return None
+            return TextStates()
+        encode = self.model.networks.text_encoder.encode_prompt
+        negative = negative_prompt(request, self.model.config)
         with log.phases.phase("encode text"):
-            return self.model.networks.text_encoder.encode_prompt(request.prompt)
+            return TextStates(
+                prompt=None if request.prompt is None else encode(request.prompt),
+                negative=None if negative is None else encode(negative),
+            )
 
     def _provenance(self, request: Request) -> Provenance:
         return Provenance(

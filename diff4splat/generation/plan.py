@@ -118,7 +118,9 @@ def plan_generation(
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
     unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
     asked = unread or _untrained("text_encoder", trained)
-    reasons["text_encoder"] = asked if facts.prompt else "no prompt"
+    # Models that pad prompts attend to the empty one where there is none.
+    padded = bool(config.dit.padded_text_tokens) and not reasons["dit"]
+    reasons["text_encoder"] = asked if facts.prompt or padded else "no prompt"
     parts = model_parts(config)
     skipped = [
         SkippedPart(part=part, why=reasons[part], changes_result=reasons[part] in CHOICES)
@@ -158,7 +160,7 @@ def _deformation_reason(config: ModelConfig, trained: Collection[str], facts: Re
 
 def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFacts) -> str:
     """Why the video model does not fill; empty where it does."""
-    usable = not trained or set(FILL_PARTS) <= set(trained)
+    usable = not trained or set(FILL_PARTS) <= set(trained) or _is_imported(config, trained)
     if facts.fill == "video" and not usable:
         missing = ", ".join(sorted(set(FILL_PARTS) - set(trained)))
         raise ConfigError(
@@ -171,3 +173,8 @@ def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFa
         return UNTRAINED_FILL
     wanted = facts.fill or config.default_fill
     return "" if wanted == "video" else WORSE_FILL
+
+
+def _is_imported(config: ModelConfig, trained: Collection[str]) -> bool:
+    """A public video model whose LDRM is fresh: what it adds is zero, which is the image."""
+    return config.vae.layout != "plain" and {"vae", "dit"} <= set(trained)

@@ -63,6 +63,8 @@ class GenerationSettings:
     """Error per step of the sampler ``adaptive``, in units of the latent; it sets the steps."""
     guidance: Guidance = DEFAULT_GUIDANCE
     """Used only when there is a prompt."""
+    negative_prompt: str = ""
+    """What guidance of the video model leads away from."""
     motion: MotionSettings = MotionSettings()
     """The same for the motion prior."""
     fill: Fill | None = None

@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import os
+import shutil
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -69,6 +70,22 @@ def write_text(target: Path, text: str) -> None:
     """Write a small text file whole or not at all."""
     with atomic_path(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def copy_file(source: Path, target: Path) -> None:
+    """The same file under another name, without a second copy of its bytes where that is possible.
+
+    Raises:
+        OutputError: the folder cannot be made or written.
+    """
+    if target.exists() and target.samefile(source):
+        return
+    with atomic_path(target) as temporary:
+        try:
+            os.link(source.resolve(), temporary)
+        except OSError:
+            # Another disk, or one without links.
+            shutil.copyfile(source, temporary)
 
 
 @contextmanager

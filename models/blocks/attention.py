@@ -59,9 +59,12 @@ class Attention(nn.Module):
         tokens: Float[Tensor, "b n d"],
         context: Float[Tensor, "b s e"] | None = None,
         rope: RopeTables | None = None,
-        mask: Bool[Tensor, "b s"] | None = None,
+        mask: Bool[Tensor, "b s"] | Float[Tensor, "b s"] | None = None,
     ) -> Float[Tensor, "b n d"]:
-        """Attend to ``context`` (default: the tokens themselves) where ``mask`` is true."""
+        """Attend to ``context`` (default: the tokens themselves) where ``mask`` is true.
+
+        A ``mask`` of numbers is added to the logits.
+        """
         source = tokens if context is None else context
         query = self._split(self.query_norm(self.to_query(tokens)))
         key = self._split(self.key_norm(self.to_key(source)))

@@ -46,9 +46,18 @@ class VaeConfig:
     """Residual blocks per resolution (2 in Wan 2.1)."""
     pca_shortcut: bool = False
     """Convolutions correct a linear (PCA) autoencoder instead of replacing it (ours; ADR 14)."""
+    layout: Literal["plain", "wan2.1", "wan2.2"] = "plain"
+    """Whose layers: ours, or those of Wan's public weights, which ``VideoVae`` cannot hold."""
+    decoder_widths: tuple[int, ...] = ()
+    """Channels of the decoder, finest first, where they differ (Wan 2.2)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "latent_channels", "pixel_patch", "blocks")
+        known = self.layout in ("plain", "wan2.1", "wan2.2")
+        require(known, "VaeConfig.layout", "plain, wan2.1 or wan2.2", self.layout)
+        same = isinstance(self.decoder_widths, tuple)
+        same = same and len(self.decoder_widths) in (0, len(self.widths))
+        require(same, "VaeConfig.decoder_widths", "none, or one per width", self.decoder_widths)
         known = isinstance(self.pca_shortcut, bool)
         require(known, "VaeConfig.pca_shortcut", "true or false", self.pca_shortcut)
         enough = isinstance(self.widths, tuple) and 3 <= len(self.widths) <= MAX_WIDTHS
@@ -58,7 +67,7 @@ class VaeConfig:
             f"at least 3 widths, for two halvings of time, and at most {MAX_WIDTHS}",
             self.widths,
         )
-        for width in self.widths:
+        for width in (*self.widths, *self.decoder_widths):
             require(
                 isinstance(width, int) and 1 <= width <= MAX_COUNT,
                 "VaeConfig.widths",
@@ -78,7 +87,7 @@ class VaeConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextConfig:
-    """Byte-level text encoder in the manner of T5 (the paper names only T5)."""
+    """Text encoder in the manner of T5 (the paper names only T5): over bytes, or UMT5 itself."""
 
     width: int
     """Width of the text states."""
@@ -90,11 +99,23 @@ class TextConfig:
     relative_position_buckets: int = 32
     """Relative-position buckets (T5)."""
     max_distance: int = 128
-    """Distance in bytes from which all positions share a bucket (T5)."""
+    """Distance in tokens from which all positions share a bucket (T5)."""
+    encoder: Literal["bytes", "umt5"] = "bytes"
+    """Bytes need no vocabulary; ``umt5`` is Wan's encoder, with a tokenizer beside its weights."""
+    vocabulary: int = 0
+    """Tokens that ``umt5`` knows."""
+    head_width: int = 0
+    """Width of a head of ``umt5``, which need not divide the width."""
 
     def __post_init__(self) -> None:
         require_counts(self, "width", "blocks", "heads", "feedforward_width", "max_bytes")
         require_counts(self, "relative_position_buckets", "max_distance")
+        known = self.encoder in ("bytes", "umt5")
+        require(known, "TextConfig.encoder", "bytes or umt5", self.encoder)
+        for name in ("vocabulary", "head_width"):
+            require_optional_width(self, name)
+            given = self.encoder == "bytes" or getattr(self, name) > 0
+            require(given, f"TextConfig.{name}", "a number above 0", getattr(self, name))
         require_heads(self, smallest=2)
         buckets = self.relative_position_buckets
         fits = buckets % 4 == 0
@@ -125,6 +146,14 @@ class DitConfig:
     render_condition: bool = False
     """Takes the layered image rendered along the path, with a mask of valid pixels. If it predicts
     clean latents it corrects that render (ours; as GEN3C and ViewCrafter; ADR 16, 26)."""
+    padded_text_tokens: int = 0
+    """Prompts count as padded with zeros to so many tokens, which are attended to (Wan: 512);
+    0: only real tokens are."""
+    condition_channels: int = 0
+    """Channels of a mask and image latents beside the noisy ones (Wan image-to-video: 20);
+    0: the first latent frame is the image's."""
+    image_width: int = 0
+    """Width of image states that every block also attends to (Wan image-to-video: 1280, CLIP)."""
     pooled_text: bool = False
     """The mean of the text states also modulates every block, as the noise level does (Stable
     Diffusion 3, arXiv 2403.03206)."""
@@ -139,6 +168,10 @@ class DitConfig:
         for name in ("render_condition", "pooled_text"):
             value = getattr(self, name)
             require(isinstance(value, bool), f"DitConfig.{name}", "true or false", value)
+        for name in ("padded_text_tokens", "condition_channels", "image_width"):
+            require_optional_width(self, name)
+        one = not (self.pooled_text and self.padded_text_tokens)
+        require(one, "DitConfig.pooled_text", "false with padded_text_tokens", self.pooled_text)
         require(
             self.frequency_width % 2 == 0,
             "DitConfig.frequency_width",

@@ -16,6 +16,7 @@ from diff4splat.io.require_file import read_text
 from diff4splat.models.hub.provenance import PROVENANCE_FILE
 from diff4splat.models.hub.weight_files import CONFIG_FILE, part_file
 from diff4splat.models.networks import PARTS
+from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
 
 SUMS_FILE = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64})  (\S+)")
@@ -23,7 +24,7 @@ _LINE = re.compile(r"([0-9a-f]{64})  (\S+)")
 
 def listed_files(folder: Path) -> list[Path]:
     """The files of a model folder that a list has to name."""
-    files = [folder / CONFIG_FILE, folder / PROVENANCE_FILE]
+    files = [folder / CONFIG_FILE, folder / PROVENANCE_FILE, folder / TOKENIZER_FILE]
     files += [part_file(folder, part) for part in PARTS]
     return [file for file in files if file.is_file()]
 

@@ -41,8 +41,16 @@ def require_parts(folder: Path, parts: Collection[str]) -> None:
     Raises:
         FileFormatError: a file is damaged, or a listed one is absent.
     """
+    require_files(folder, {weight_file(folder, part).name for part in parts})
+
+
+def require_files(folder: Path, names: Collection[str]) -> None:
+    """Compare named files with the folder's checksums, if it has any.
+
+    Raises:
+        FileFormatError: a file is damaged, or a listed one is absent.
+    """
     if (folder / SUMS_FILE).is_file():
-        names = {weight_file(folder, part).name for part in parts}
         require_complete(folder, _advice(folder), names)
 
 

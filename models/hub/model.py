@@ -11,6 +11,7 @@ from typing import Literal
 import torch
 
 from diff4splat.errors import ConfigError
+from diff4splat.io.atomic import copy_file
 from diff4splat.io.locks import sole_writer
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import size_by_name
@@ -23,7 +24,12 @@ from diff4splat.models.hub.provenance import (
     read_provenance,
     write_provenance,
 )
-from diff4splat.models.hub.weight_files import CONFIG_FILE, load_config, weights_sha256
+from diff4splat.models.hub.weight_files import (
+    CONFIG_FILE,
+    load_config,
+    part_file,
+    weights_sha256,
+)
 from diff4splat.models.networks import Networks, model_parts
 from diff4splat.models.onnx.manifest import has_graphs, read_manifest
 
@@ -126,9 +132,11 @@ def parameter_counts(model: Model) -> Mapping[str, int]:
     return built_counts(model.config)
 
 
-def save_model(model: Model, folder: Path) -> None:
+def save_model(model: Model, folder: Path, kept: Mapping[str, Path] | None = None) -> None:
     """Write a folder that ``load_model`` reads, all parts included, without checksums.
 
+    Files in ``kept``, by their names in the folder, are taken over as they are; a part that has
+    one is not loaded.
     Another process that writes there, such as a stage that ends at the same time, is waited for.
     """
     from diff4splat.models.hub.weights import save_networks
@@ -137,13 +145,17 @@ def save_model(model: Model, folder: Path) -> None:
         raise ConfigError(
             "save: expected a model of PyTorch weights, got one of ONNX graphs; copy its folder"
         )
-    complete = with_parts(model, model.parts)
+    kept = kept or {}
+    written = [part for part in model.parts if part_file(folder, part).name not in kept]
+    complete = with_parts(model, written)
     provenance = ModelProvenance(trained=model.trained, license=model.license, origin=model.origin)
     with sole_writer(folder, wait=True):
         write_provenance(provenance, folder)
         # Checksums of the files before would call the new ones damaged.
         (folder / SUMS_FILE).unlink(missing_ok=True)
-        save_networks(complete.networks, model.config, folder)
+        for name, source in kept.items():
+            copy_file(source, folder / name)
+        save_networks(complete.networks, model.config, folder, only=written)
 
 
 def model_device(model: Model) -> torch.device:

@@ -8,11 +8,13 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import SIZES
 from diff4splat.models.factory import create_networks, parameter_counts
-from diff4splat.models.hub.folders import require_parts
+from diff4splat.models.hub.folders import require_files, require_parts
 from diff4splat.models.hub.provenance import read_provenance
 from diff4splat.models.hub.weight_files import has_weights
 from diff4splat.models.hub.weights import load_networks
 from diff4splat.models.networks import Networks
+from diff4splat.models.wan.tokenizer import TOKENIZER_FILE, Tokenizer
+from diff4splat.models.wan.umt5 import Umt5Encoder
 
 BYTES_PER_WEIGHT = 4
 
@@ -32,7 +34,12 @@ def torch_networks(config: ModelConfig, folder: Path | None, parts: Collection[s
     may_lack = read_provenance(folder).may_lack
     drawn = [part for part in parts if part in may_lack and not has_weights(folder, part)]
     _require_memory(config, drawn)
-    return load_networks(folder, config, parts, may_lack)
+    networks = load_networks(folder, config, parts, may_lack)
+    if isinstance(networks.text_encoder, Umt5Encoder) and "text_encoder" not in drawn:
+        require_files(folder, (TOKENIZER_FILE,))
+        longest = config.dit.padded_text_tokens
+        networks.text_encoder.tokenizer = Tokenizer(folder / TOKENIZER_FILE, longest)
+    return networks
 
 
 def _require_memory(config: ModelConfig, drawn: Collection[str]) -> None:

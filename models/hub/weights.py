@@ -3,7 +3,8 @@
     config.json  {vae,text_encoder,dit,ldrm,deformation,monocular_depth,motion_unet}.safetensors
 
 Reading is strict: every key and every shape must be that of the configuration. Weights
-may be stored in half precision; they are read into float32. Folders of version 1 are read too
+may be stored in half precision; they are read into float32, but public ones are mapped
+(``mapped_weights.py``). Folders of version 1 are read too
 (``legacy.py``). provenance.py decides which parts may be absent.
 """
 
@@ -21,6 +22,7 @@ from diff4splat.io.scene_files.tensor_file import WEIGHT_DTYPES, read_tensors
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.legacy import upgrade_tensors
+from diff4splat.models.hub.mapped_weights import map_weights, mapped_parts
 from diff4splat.models.hub.weight_files import (
     CONFIG_FILE,
     has_weights,
@@ -77,8 +79,12 @@ def load_networks(
     wanted = [part for part in model_parts(config) if parts is None or part in parts]
     drawn = {part for part in wanted if part in may_lack and not has_weights(folder, part)}
     stored = create_networks(config, "meta", parts=set(wanted) - drawn)
+    mapped = mapped_parts(config)
     for name, part in stored.parts():
-        _fill(part, _read_part(folder, name, config), name)
+        if name in mapped:
+            map_weights(part, name, part_file(folder, name))
+        else:
+            _fill(part, _read_part(folder, name, config), name)
     random = create_networks(config, parts=drawn)
     return Networks(**dict(stored.parts()), **dict(random.parts()))
 

@@ -21,13 +21,27 @@ class RenderCondition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ImageCondition:
+    """The first frame as Wan's image-to-video weights take it."""
+
+    channels: Float[Tensor, "b c2 t h w"] | None = None
+    """Mask of known frames, then the latent of the image followed by grey frames."""
+    states: Float[Tensor, "b i e"] | None = None
+    """Of an image encoder."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DitConditions:
     """Embedded conditions, the same at all noise levels of a generation; None is skipped."""
 
     camera: Float[Tensor, "b t h2 w2 d"] | None = None
     text: Float[Tensor, "b s d"] | None = None
-    text_mask: Bool[Tensor, "b s"] | None = None
-    """True where a text token is real; None when all are."""
+    text_mask: Bool[Tensor, "b s"] | Float[Tensor, "b s"] | None = None
+    """True where a text token is real; None when all are. Numbers are added to the logits."""
+    image: Float[Tensor, "b i d"] | None = None
+    """States of the image that every block attends to."""
+    channel_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
+    """What the channels beside the noisy ones add to every token."""
     pooled_text: Float[Tensor, "b d"] | None = None
     """Added to the embedding of the level."""
     render_latent: Float[Tensor, "b c t h w"] | None = None

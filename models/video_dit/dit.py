@@ -12,6 +12,9 @@ gives it level 0.
     level ─ sinusoid, MLP ─ modulation ────────┘ │
     text ── MLP ─ cross-attention ───────────────┘
 
+A configuration may add what Wan's image-to-video weights have: channels beside the noisy ones
+(``condition_channels``), and states of the image in the cross-attention (``image_width``).
+
 The last linear layer is zero at first. Where the model predicts clean latents, that layer gives
 what to add to the render condition (to 0, where there is none), and the velocity follows from it: a
 fresh model leads any noise to the render condition.
@@ -27,13 +30,20 @@ from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
 from diff4splat.models.blocks.norm import EPSILON
 from diff4splat.models.blocks.patches import patchify, unpatchify
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TOKEN_PATCH
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
-from diff4splat.models.video_dit.conditions import DitConditions, RenderCondition
+from diff4splat.models.video_dit.conditions import (
+    DitConditions,
+    ImageCondition,
+    RenderCondition,
+)
 from diff4splat.models.video_dit.dit_block import MODULATIONS, DitBlock
+from diff4splat.models.video_dit.image_attention import ImageProjection
+from diff4splat.models.video_dit.padded_text import with_padding
 from diff4splat.models.video_dit.render_condition import RenderConditionEmbedding
 
 PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
@@ -59,11 +69,15 @@ class VideoDiT(nn.Module):
         super().__init__()
         dit, channels = config.dit, config.vae.latent_channels
         self.config = dit
-        self.patch_embedding = nn.Linear(channels * TOKEN_PATCH**2, dit.width)
+        self.latent_channels = channels
+        inputs = channels + dit.condition_channels
+        self.patch_embedding = nn.Linear(inputs * TOKEN_PATCH**2, dit.width)
         if dit.render_condition:
             self.condition_embedding = RenderConditionEmbedding(channels, dit.width)
         self.camera_adapter = CameraAdapter(dit.width, dit.camera_width, config.vae.space_stride)
         self.text_projection = TextProjection(config.text.width, dit.width)
+        if dit.image_width:
+            self.image_projection = ImageProjection(dit.image_width, dit.width)
         if dit.pooled_text:
             self.pooled_text = zero_(nn.Linear(dit.width, dit.width))
         self.level_mlp = EmbeddingMlp(dit.frequency_width, dit.width)
@@ -81,12 +95,14 @@ class VideoDiT(nn.Module):
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
         condition: RenderCondition | None = None,
+        image: ImageCondition | None = None,
     ) -> Float[Tensor, "b c t h w"]:
         """Velocity in one call: ``prepare``, then ``velocity``.
 
         A sample without a real token in ``text_mask`` gets the output of one without text.
         """
-        return self.velocity(latent, level, self.prepare(camera, text, text_mask, condition))
+        conditions = self.prepare(camera, text, text_mask, condition, image)
+        return self.velocity(latent, level, conditions)
 
     def prepare(
         self,
@@ -94,33 +110,58 @@ class VideoDiT(nn.Module):
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
         condition: RenderCondition | None = None,
+        image: ImageCondition | None = None,
     ) -> DitConditions:
         """Embed the conditions once for all steps of a sampler.
 
         Raises:
             ShapeError: a render condition is missing, or given to a model that takes none.
         """
+        if text is not None and self.config.padded_text_tokens:
+            text, text_mask = with_padding(text, text_mask, self.config.padded_text_tokens)
         if self.config.render_condition != (condition is not None):
             want, got = ("one", "none") if self.config.render_condition else ("none", "one")
             raise ShapeError(
                 f"render condition: expected {want}, got {got}; DitConfig.render_condition decides"
             )
         states = None if text is None else self.text_projection(text)
+        pooled = self.config.pooled_text and states is not None
         return DitConditions(
             camera=None if camera is None else self.camera_adapter(camera),
             text=states,
             text_mask=text_mask,
-            pooled_text=None if states is None else self._pooled(states, text_mask),
+            pooled_text=self._pooled(states, text_mask) if pooled else None,
+            image=None if image is None else self._image_states(image),
+            channel_tokens=None if image is None else self._channel_tokens(image.channels),
             render_latent=None if condition is None else condition.latent,
             render_tokens=None if condition is None else self.condition_embedding(condition),
         )
 
+    def _image_states(self, image: ImageCondition) -> Float[Tensor, "b i d"] | None:
+        if image.states is None or not self.config.image_width:
+            return None
+        return self.image_projection(image.states)
+
+    def _channel_tokens(
+        self, channels: Float[Tensor, "b c2 t h w"] | None
+    ) -> Float[Tensor, "b t h2 w2 d"] | None:
+        """The part of the patch embedding that is the same at every step."""
+        if channels is None:
+            return None
+        weight = self.patch_embedding.weight[:, self.latent_channels * TOKEN_PATCH**2 :]
+        return torch.nn.functional.linear(patchify(channels, PATCH), weight)
+
+    def _latent_tokens(self, latent: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b t h2 w2 d"]:
+        layer = self.patch_embedding
+        patches = patchify(latent, PATCH)
+        if not self.config.condition_channels:
+            return layer(patches)
+        return torch.nn.functional.linear(patches, layer.weight[:, : patches.shape[-1]], layer.bias)
+
     def _pooled(
         self, states: Float[Tensor, "b s d"], mask: Bool[Tensor, "b s"] | None
-    ) -> Float[Tensor, "b d"] | None:
+    ) -> Float[Tensor, "b d"]:
         """From the mean over real tokens."""
-        if not self.config.pooled_text:
-            return None
         if mask is None:
             return self.pooled_text(states.mean(1))
         real = mask[..., None].to(states)
@@ -134,7 +175,9 @@ class VideoDiT(nn.Module):
         conditions: DitConditions,
     ) -> Float[Tensor, "b c t h w"]:
         """Velocity at a noise level per latent frame."""
-        tokens = self.patch_embedding(patchify(latent, PATCH))
+        tokens = self._latent_tokens(latent)
+        if conditions.channel_tokens is not None:
+            tokens = tokens + conditions.channel_tokens
         if conditions.camera is not None:
             tokens = tokens + conditions.camera
         if conditions.render_tokens is not None:
@@ -149,9 +192,11 @@ class VideoDiT(nn.Module):
         modulation = self.level_modulation(embedding)
         tokens = tokens.flatten(2, 3)
         for block in self.blocks:
-            tokens = block(tokens, modulation, rope, conditions.text, conditions.text_mask)
-        shift, scale = (embedding[..., None, :] + self.modulation_out)[..., None, :].unbind(2)
-        patches = self.head(modulate(self.norm_out(tokens), shift, scale))
+            tokens = block(tokens, modulation, rope, conditions)
+        wide = at_least_float32(embedding)[..., None, :] + at_least_float32(self.modulation_out)
+        shift, scale = wide[..., None, :].unbind(2)
+        modulated = modulate(self.norm_out(at_least_float32(tokens)), shift, scale)
+        patches = self.head(modulated.to(tokens.dtype))
         output = unpatchify(patches.unflatten(2, (rows, columns)), PATCH).to(latent.dtype)
         return self._as_velocity(output, latent, level, conditions.render_latent)
 

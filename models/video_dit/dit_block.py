@@ -6,7 +6,7 @@ projection of the noise level plus a table per block (PixArt-α, arXiv 2310.0042
 """
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.attention import Attention
@@ -14,8 +14,11 @@ from diff4splat.models.blocks.feedforward import FeedForward
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import modulate
 from diff4splat.models.blocks.norm import EPSILON
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.blocks.rope import RopeTables
 from diff4splat.models.config.networks import DitConfig
+from diff4splat.models.video_dit.conditions import DitConditions
+from diff4splat.models.video_dit.image_attention import TextImageAttention
 
 MODULATIONS = 6
 
@@ -29,7 +32,8 @@ class DitBlock(nn.Module):
         self.attention_norm = nn.LayerNorm(width, eps=EPSILON, elementwise_affine=False)
         self.attention = Attention(width, config.heads)
         self.text_norm = nn.LayerNorm(width, eps=EPSILON)
-        self.text_attention = Attention(width, config.heads)
+        attention = TextImageAttention if config.image_width else Attention
+        self.text_attention = attention(width, config.heads)
         self.feedforward_norm = nn.LayerNorm(width, eps=EPSILON, elementwise_affine=False)
         self.feedforward = FeedForward(width, config.feedforward_width)
         self.modulation = nn.Parameter(torch.zeros(MODULATIONS, width))
@@ -40,33 +44,38 @@ class DitBlock(nn.Module):
         tokens: Float[Tensor, "b t m d"],
         modulation: Float[Tensor, "b t 6 d"],
         rope: RopeTables,
-        text: Float[Tensor, "b s d"] | None,
-        text_mask: Bool[Tensor, "b s"] | None,
+        conditions: DitConditions,
     ) -> Float[Tensor, "b t m d"]:
-        """Without ``text`` the cross-attention is not computed at all.
+        """Without text the cross-attention is not computed at all.
 
-        Nothing is added to a sample of which ``text_mask`` marks no token as real.
+        Nothing is added to a sample of which the text mask marks no token as real.
         """
-        shift, scale, gate, ff_shift, ff_scale, ff_gate = (modulation + self.modulation)[
-            ..., None, :
-        ].unbind(2)
+        wide = at_least_float32(modulation) + at_least_float32(self.modulation)
+        shift, scale, gate, ff_shift, ff_scale, ff_gate = wide[..., None, :].unbind(2)
         frames = tokens.shape[1]
-        modulated = modulate(self.attention_norm(tokens), shift, scale).flatten(1, 2)
-        tokens = tokens + gate * self.attention(modulated, rope=rope).unflatten(1, (frames, -1))
-        if text is not None:
+        modulated = self._modulated(self.attention_norm, tokens, shift, scale).flatten(1, 2)
+        update = self.attention(modulated, rope=rope).unflatten(1, (frames, -1))
+        tokens = (tokens + gate * update).to(tokens.dtype)
+        if conditions.text is not None:
             queries = self.text_norm(tokens).flatten(1, 2)
-            tokens = tokens + self._from_text(queries, text, text_mask).unflatten(1, (frames, -1))
-        modulated = modulate(self.feedforward_norm(tokens), ff_shift, ff_scale)
-        return tokens + ff_gate * self.feedforward(modulated)
+            tokens = tokens + self._from_text(queries, conditions).unflatten(1, (frames, -1))
+        modulated = self._modulated(self.feedforward_norm, tokens, ff_shift, ff_scale)
+        return (tokens + ff_gate * self.feedforward(modulated)).to(tokens.dtype)
+
+    def _modulated(
+        self, norm: nn.LayerNorm, tokens: Float[Tensor, "b t m d"], shift: Tensor, scale: Tensor
+    ) -> Float[Tensor, "b t m d"]:
+        """Norms, scales and sums are those of single precision, as in Wan."""
+        return modulate(norm(at_least_float32(tokens)), shift, scale).to(tokens.dtype)
 
     def _from_text(
-        self,
-        queries: Float[Tensor, "b n d"],
-        text: Float[Tensor, "b s d"],
-        mask: Bool[Tensor, "b s"] | None,
+        self, queries: Float[Tensor, "b n d"], conditions: DitConditions
     ) -> Float[Tensor, "b n d"]:
-        if mask is None:
-            return self.text_attention(queries, context=text)
+        text, mask = conditions.text, conditions.text_mask
+        if conditions.image is not None:
+            return self.text_attention(queries, text, mask, conditions.image)
+        if mask is None or mask.is_floating_point():
+            return self.text_attention(queries, context=text, mask=mask)
         has_text = mask.any(1, keepdim=True)
         # Softmax needs a token even where the result is thrown away.
         update = self.text_attention(queries, context=text, mask=mask | ~has_text)

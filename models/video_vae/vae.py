@@ -1,4 +1,4 @@
-"""Causal 3D video autoencoder, 4×8×8 (layout of Wan 2.1): video to latents and back.
+"""Causal 3D video autoencoder, 4×8×8 (close to Wan 2.1): video to latents and back.
 
 Axes: ``b`` batch, ``c`` latent channels, ``f`` = 1 + 4 k video frames, ``t h w`` latent frames,
 rows and columns. Video is ``b c t h w`` in [−1, 1]. Latents outside this class are *standardised*,
@@ -42,7 +42,7 @@ class VideoVae(nn.Module):
         Raises:
             ShapeError: f is not 1 + 4 k, or a side is not a multiple of ``space_stride``.
         """
-        self._require_shape(video)
+        require_video_shape(video, self.config)
         mean, log_variance = self.encoder(video).chunk(2, 1)
         if self.pca_shortcut is not None:
             mean = mean + self.pca_shortcut.encode(video)
@@ -87,17 +87,23 @@ class VideoVae(nn.Module):
     def _statistics(self) -> tuple[Float[Tensor, "c 1 1 1"], Float[Tensor, "c 1 1 1"]]:
         return self.latent_mean[:, None, None, None], self.latent_std[:, None, None, None]
 
-    def _require_shape(self, video: Tensor) -> None:
-        frames, height, width = video.shape[2:]
-        if frames % TIME_STRIDE != 1:
-            nearest = 1 + TIME_STRIDE * (frames // TIME_STRIDE)
-            raise ShapeError(f"video frames: expected 1 + 4 k, got {frames}; use {nearest}")
-        stride = self.config.space_stride
-        if height % stride or width % stride:
-            raise ShapeError(
-                f"video size: expected sides that are multiples of {stride} px, "
-                f"got {height} by {width}; crop or pad"
-            )
+
+def require_video_shape(video: Tensor, config: VaeConfig) -> None:
+    """Require 1 + 4 k frames and sides that the stride divides.
+
+    Raises:
+        ShapeError: other frames or sides.
+    """
+    frames, height, width = video.shape[2:]
+    if frames % TIME_STRIDE != 1:
+        nearest = 1 + TIME_STRIDE * (frames // TIME_STRIDE)
+        raise ShapeError(f"video frames: expected 1 + 4 k, got {frames}; use {nearest}")
+    stride = config.space_stride
+    if height % stride or width % stride:
+        raise ShapeError(
+            f"video size: expected sides that are multiples of {stride} px, "
+            f"got {height} by {width}; crop or pad"
+        )
 
 
 def _pca_shortcut(

@@ -41,6 +41,9 @@ OPTIONAL = (
     "datatrove",
     "ray",
     "pyarrow",
+    "tokenizers",
+    "transformers",
+    "diffusers",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 

@@ -19,8 +19,8 @@ from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.hub.model import Model
 from diff4splat.models.motion_unet.motion_field import masked_offsets, upsample_to_pixels
+from diff4splat.models.protocols import VideoCodec
 from diff4splat.models.video_dit.conditions import RenderCondition
-from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
@@ -44,7 +44,7 @@ def camera_rays(cameras: Camera) -> Float[Tensor, "b 6 f h w"]:
 
 
 @torch.no_grad()
-def encode_video(vae: VideoVae, batch: ClipBatch) -> Float[Tensor, "b c t h2 w2"]:
+def encode_video(vae: VideoCodec, batch: ClipBatch) -> Float[Tensor, "b c t h2 w2"]:
     """Standardised latents of the input video, by the frozen autoencoder."""
     return vae.encode(network_video(batch)).mean
 

@@ -25,7 +25,7 @@ def fingerprint(recipe: Recipe, stage: str, features: str = "") -> str:
 def fingerprint_of(recipe: Mapping[str, Any], stage: str, features: str) -> str:
     """The same of a recipe as plain values, of any version."""
     (found,) = (one for one in recipe["stages"] if one["name"] == stage)
-    facts = {"seed": recipe["seed"], "model": recipe["model"], "stage": decisive(found)}
+    facts = {"seed": recipe["seed"], "model": _model(recipe["model"]), "stage": decisive(found)}
     if _uses_features(found["losses"]):
         facts["features"] = features
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:12]
@@ -44,10 +44,45 @@ def decisive(stage: Mapping[str, Any]) -> dict[str, Any]:
     ]
     # Stages of recipes from before these settings keep their fingerprint.
     data = {key: value for key, value in data.items() if not _unchanged(key, value)}
-    kept = {key: value for key, value in stage.items() if key != "micro_batch"}
+    kept = {
+        key: value
+        for key, value in stage.items()
+        if key != "micro_batch" and not (key in _STAGE_ADDED and _STAGE_ADDED[key] == value)
+    }
     return kept | {"data": data}
 
 
+def _model(model: Mapping[str, Any]) -> dict[str, Any]:
+    """Without settings of later releases that change nothing: runs from before them go on."""
+    return {
+        key: {name: one for name, one in value.items() if one or name not in _MODEL_ADDED}
+        if isinstance(value, Mapping)
+        else value
+        for key, value in _without_plain(model).items()
+    }
+
+
+def _without_plain(model: Mapping[str, Any]) -> dict[str, Any]:
+    """The same without the layout and the encoder that all models had."""
+    plain = {("vae", "layout"): "plain", ("text", "encoder"): "bytes"}
+    return {
+        key: {n: one for n, one in value.items() if plain.get((key, n)) != one}
+        if isinstance(value, Mapping)
+        else value
+        for key, value in model.items()
+    }
+
+
+_MODEL_ADDED = (
+    "decoder_widths",
+    "vocabulary",
+    "head_width",
+    "padded_text_tokens",
+    "condition_channels",
+    "image_width",
+)
+"""Settings of networks that are off where they are empty or 0."""
+_STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
 _NOT_DECISIVE = ("workers", "in_memory")
 _ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False}
 """Settings of later releases, with the value that changes nothing."""

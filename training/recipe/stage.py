@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from diff4splat.errors import ConfigError
+from diff4splat.models.adapters.tuning import TUNINGS, Tuning
 from diff4splat.training.recipe.checks import require
 from diff4splat.training.recipe.data import DataSettings
 from diff4splat.training.recipe.kinds import StageKind
@@ -52,7 +53,19 @@ class StageRecipe:
     """Above 1 samples high levels more often; 5 in the paper's public code, at 512² and 49
     frames."""
 
+    tuning: Tuning = "full"
+    """What of the video model learns: everything, the layers added to a public model alone
+    (adapters), or these and low-rank corrections of its attention (lora)."""
+    lora_rank: int = 16
+
     def __post_init__(self) -> None:
+        require(
+            self.tuning in TUNINGS,
+            f"stage {self.name}: tuning",
+            "full, adapters or lora",
+            self.tuning,
+        )
+        require(self.lora_rank >= 1, f"stage {self.name}: lora_rank", "at least 1", self.lora_rank)
         counts = (self.steps, self.micro_batch, self.global_batch)
         if min(counts) < 1 or self.global_batch % self.micro_batch:
             raise ConfigError(

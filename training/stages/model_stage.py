@@ -8,6 +8,7 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.metrics.features.protocol import PerceptualFeatures
+from diff4splat.models.adapters.tuning import prepare_tuning
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.networks import Networks
 from diff4splat.training.recipe.stage import StageRecipe
@@ -57,6 +58,8 @@ class ModelStage(Stage):
         for name, part in networks.parts():
             if name in self.parts:
                 self.add_module(name, part.requires_grad_(name in self.trained))
+        if "dit" in self.trained:
+            prepare_tuning(networks.dit, plan.recipe.tuning, plan.recipe.lora_rank)
         self.train()
 
     def train(self, mode: bool = True) -> "ModelStage":

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from diff4splat.captions.paraphrase import paraphrase
 from diff4splat.models.text_encoder.encoder import tokenize
+from diff4splat.models.wan.umt5 import Umt5Encoder
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.stages.model_stage import StagePlan
@@ -32,6 +33,8 @@ class TextConditioning:
     ) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
         """States of the captions, and the mask of real tokens."""
         captions = [caption or DEFAULT_CAPTION for caption in self._captions(batch, training)]
+        if isinstance(self.encoder, Umt5Encoder):
+            return self.encoder.encode_prompts(captions)
         tokens, mask = tokenize(captions, self.plan.model.text.max_bytes)
         device = batch.cameras.focal_px.device
         tokens, mask = tokens.to(device), mask.to(device)
@@ -40,8 +43,12 @@ class TextConditioning:
     def encode_or_drop(
         self, batch: ClipBatch | LatentBatch, training: bool
     ) -> tuple[Float[Tensor, "b s d"] | None, Bool[Tensor, "b s"] | None]:
-        """The same; None in steps without text."""
-        return (None, None) if self.drop_text(batch, training) else self.encode(batch, training)
+        """The same; None in steps without text, or the empty prompt for models that need one."""
+        if not self.drop_text(batch, training):
+            return self.encode(batch, training)
+        if isinstance(self.encoder, Umt5Encoder):
+            return self.encoder.encode_prompts([""] * len(batch.captions))
+        return None, None
 
     def drop_text(self, batch: ClipBatch | LatentBatch, training: bool) -> bool:
         """Whether this step trains without text."""

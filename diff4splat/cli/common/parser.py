@@ -25,6 +25,7 @@ from diff4splat.cli.models import GetModel, ListModels
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
+from diff4splat.cli.public_models.import_model import CheckModel, ImportModel
 from diff4splat.cli.report import ErrorTime, ListKnobs, Stability
 from diff4splat.cli.scenes.bake import Bake
 from diff4splat.cli.scenes.convert import Convert
@@ -35,7 +36,12 @@ from diff4splat.cli.train import Train
 
 subcommand = tyro.conf.subcommand
 Paths = Annotated[PreviewPath, subcommand("preview")] | Annotated[ListPaths, subcommand("list")]
-Models = Annotated[ListModels, subcommand("list")] | Annotated[GetModel, subcommand("get")]
+Models = (
+    Annotated[ListModels, subcommand("list")]
+    | Annotated[GetModel, subcommand("get")]
+    | Annotated[ImportModel, subcommand("import")]
+    | Annotated[CheckModel, subcommand("check")]
+)
 Prepare = (
     Annotated[PrepareSynthetic, subcommand("synth")]
     | Annotated[PrepareLatents, subcommand("latents")]
@@ -66,7 +72,7 @@ Command = (
     | Annotated[View, subcommand("view")]
     | Annotated[Serve, subcommand("serve")]
     | Annotated[Paths, subcommand("paths", description="Camera paths: list and draw them.")]
-    | Annotated[Models, subcommand("models", description="Public depth networks: list, download.")]
+    | Annotated[Models, subcommand("models", description="Public models: list, get, import.")]
     | Annotated[Inspect, subcommand("inspect")]
     | Annotated[Forecasts, subcommand("forecast")]
     | Annotated[

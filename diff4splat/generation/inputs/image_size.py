@@ -26,18 +26,23 @@ def default_side_px(
     config: ModelConfig, plan: GenerationPlan, photo_px: tuple[int, int] | None = None
 ) -> int:
     """Side of a square with as many pixels as an image of ``photo_px``, read from a file."""
-    trained_px = max(config.size_px)
+    trained_px = trained_side_px(config)
     if not plan.shows_image:
         return trained_px
     side_px = DEFAULT_SIDE_PX if photo_px is None else round(math.sqrt(math.prod(photo_px)))
     return max(trained_px, LEAST_DEFAULT_PX, min(side_px, DEFAULT_SIDE_PX))
 
 
+def trained_side_px(config: ModelConfig) -> int:
+    """Side of a square with as many pixels as the model was made for."""
+    return round(math.sqrt(math.prod(config.size_px)))
+
+
 def size_multiple_px(config: ModelConfig, plan: GenerationPlan, side_px: int) -> int:
     """What sides of images of about ``side_px`` must be multiples of."""
     if not plan.shows_image:
         return config.token_px
-    return config.token_px * max(round(side_px / max(config.size_px)), 1)
+    return config.token_px * max(round(side_px / trained_side_px(config)), 1)
 
 
 def downsampling_factor(config: ModelConfig, plan: GenerationPlan, size_px: tuple[int, int]) -> int:
@@ -46,7 +51,7 @@ def downsampling_factor(config: ModelConfig, plan: GenerationPlan, size_px: tupl
     Of the factors that leave whole tokens it is the one whose result has most nearly as many
     pixels as the networks were trained for.
     """
-    side_px, trained_px = math.sqrt(math.prod(size_px)), max(config.size_px)
+    side_px, trained_px = math.sqrt(math.prod(size_px)), trained_side_px(config)
     wanted = max(round(side_px / trained_px), 1)
     if wanted == 1 or not plan.shows_image:
         return 1

@@ -26,6 +26,7 @@ from diff4splat.generation.plan import (
 )
 from diff4splat.generation.settings import GenerationSettings, require_seed
 from diff4splat.io.photos.images import photo_size
+from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.hub.model import Model
 from diff4splat.models.text_encoder.prompt import require_prompt
 from diff4splat.paths.camera_path import CameraPath
@@ -71,6 +72,8 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
     config, settings = model.config, user.settings
     if user.prompt is not None:
         require_prompt(user.prompt, config.text.max_bytes)
+    if settings.negative_prompt:
+        require_prompt(settings.negative_prompt, config.text.max_bytes)
     image = _load(model, user)
     image, path = reconcile_intrinsics(image, to_camera_path(user.path, image.camera))
     facts = RequestFacts(
@@ -95,6 +98,18 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         plan=plan,
         depth=user.depth,
     )
+
+
+def negative_prompt(request: Request, config: ModelConfig) -> str | None:
+    """The text of the pass without the prompt; None where that pass has no text.
+
+    Models that pad prompts need text in any case: without a prompt that is the empty one.
+    """
+    if not request.plan.fills:
+        return None
+    if config.dit.padded_text_tokens:
+        return "" if request.prompt is None else request.settings.negative_prompt
+    return request.settings.negative_prompt or None
 
 
 def _load(model: Model, user: UserInput) -> InputImage:

@@ -46,12 +46,22 @@ from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.deformation.keyframes import DeformationUnits
 from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.video_dit.conditions import ImageCondition
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.motion.keyframe_algebra import hold_until
 
 FOOTPRINT_CELLS = 0.6
 """Standard deviation of a hidden cell: the scene is drawn without dilation, and cells must meet."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextStates:
+    """Encoded text of one generation."""
+
+    prompt: Float[Tensor, "1 s d"] | None = None
+    negative: Float[Tensor, "1 s2 d"] | None = None
+    """What guidance leads away from; all there is for a model that needs text, without a prompt."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +74,7 @@ class FillRequest:
     """Where the video is sampled."""
     key_times_s: Float[Tensor, " k"]
     """Of the image's motion, evenly spread over the whole path."""
-    text: Float[Tensor, "1 s d"] | None
+    text: TextStates
     seed: int
     settings: GenerationSettings
     hidden_only: bool
@@ -125,7 +135,7 @@ def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
     with log.phases.phase("sample video", settings.expected_steps) as advance:
         sample = sample_video(model.networks.dit, conditions, settings, request.seed, advance)
     if sample.calls.saved:
-        why = "no prompt" if request.text is None else why_unguided(settings.guidance)
+        why = "no prompt" if request.text.prompt is None else why_unguided(settings.guidance)
         log.record_skipped("guidance pass", why, f"{sample.calls.saved} network calls")
     latent = VideoLatent(
         latent=sample.latent, first_frame=request.image, cameras=request.path.cameras
@@ -145,10 +155,25 @@ def _conditions(
         conditions = Conditions(
             image_latent=model.networks.vae.encode(image).mean,
             plucker=plucker_map(relative_to_first(request.path.cameras)).movedim(0, 1)[None],
-            text=request.text,
+            text=request.text.prompt,
+            negative_text=request.text.negative,
+            image=_image_condition(model, request, image),
             render=encode_condition(model, rendered) if conditioned else None,
         )
     return rendered, conditions
+
+
+def _image_condition(
+    model: Model, request: FillRequest, image: Float[Tensor, "1 3 1 h w"]
+) -> ImageCondition | None:
+    """The image followed by grey frames, and which of them are known (Wan 2.1 image-to-video)."""
+    if not model.config.dit.condition_channels:
+        return None
+    grey = torch.zeros_like(image).expand(-1, -1, len(request.path) - 1, -1, -1)
+    latent = model.networks.vae.encode(torch.cat([image, grey], 2)).mean
+    known = torch.zeros_like(latent[:, :1]).expand(-1, TIME_STRIDE, -1, -1, -1).clone()
+    known[:, :, 0] = 1
+    return ImageCondition(channels=torch.cat([known, latent], 1))
 
 
 def _grid(model: Model, request: FillRequest, video: _FilledVideo, raw: RawVideoMaps) -> FillGrid:

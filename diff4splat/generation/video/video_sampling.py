@@ -2,7 +2,8 @@
 
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid, ``f`` video frames, ``s d`` text.
 The first latent frame is the image's own, clean at every step: it has level 0 and velocity 0
-(Wan 2.2 TI2V), so the solver carries it through unchanged.
+(Wan 2.2 TI2V), so the solver carries it through unchanged. A model that takes the image as channels
+of its own (Wan 2.1 image-to-video) makes the first frame like all others.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,11 @@ from diff4splat.flow.samplers import VelocityFn
 from diff4splat.flow.solve import solve
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.protocols import VideoVelocity
-from diff4splat.models.video_dit.conditions import DitConditions, RenderCondition
+from diff4splat.models.video_dit.conditions import (
+    DitConditions,
+    ImageCondition,
+    RenderCondition,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +35,15 @@ class Conditions:
     """None without a prompt: then neither the text encoder nor the guidance pass exists."""
     render: RenderCondition | None = None
     """For a model that takes one."""
+    negative_text: Float[Tensor, "b s2 d"] | None = None
+    """What guidance leads away from, or all text without a prompt; None: no text at all."""
+    image: ImageCondition | None = None
+    """For a model that takes the image as channels."""
+
+    @property
+    def first_frame_is_given(self) -> bool:
+        """Whether the first latent frame is the image's and stays so."""
+        return self.image is None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +69,7 @@ def sample_video(
     calls = CallCount()
     latent = solve(
         settings.sampler,
-        _velocity(dit, conditions, settings.guidance, calls),
+        video_velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
         (settings.levels, settings.step_control),
         advance,
@@ -66,26 +80,46 @@ def sample_video(
 def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w"]:
     """Seeded noise after the clean first frame; drawn on the CPU, so every device starts alike."""
     image = conditions.image_latent
-    frames = (conditions.plucker.shape[2] - 1) // 4
+    given = conditions.first_frame_is_given
+    frames = (conditions.plucker.shape[2] - 1) // 4 + (0 if given else 1)
     generator = torch.Generator().manual_seed(seed)
-    noise = torch.randn(*image.shape[:2], frames, *image.shape[3:], generator=generator)
-    return torch.cat([image, noise.to(image)], 2)
+    noise = torch.randn(*image.shape[:2], frames, *image.shape[3:], generator=generator).to(image)
+    return torch.cat([image, noise], 2) if given else noise
 
 
-def _velocity(
+def video_velocity(
     dit: VideoVelocity, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
+    """The velocity that the solver follows, with guidance; ``calls`` counts network evaluations."""
     # Cameras and text are embedded once: they are the same at every level.
-    embedded = dit.prepare(conditions.plucker, conditions.text, condition=conditions.render)
-    unconditional = _branch(dit, replace(embedded, text=None, pooled_text=None))
+    embedded = _prepare(dit, conditions, conditions.text)
+    without = replace(embedded, text=None, text_mask=None, pooled_text=None)
+    if conditions.negative_text is not None:
+        negative = _prepare(dit, conditions, conditions.negative_text)
+        # Cameras and images are those of the other branch, and held once.
+        without = replace(
+            without,
+            text=negative.text,
+            text_mask=negative.text_mask,
+            pooled_text=negative.pooled_text,
+        )
+    first_is_given = conditions.first_frame_is_given
+    unconditional = _branch(dit, without, first_is_given)
     if conditions.text is None:
         return guided(None, unconditional, UNGUIDED, calls)
-    return guided(_branch(dit, embedded), unconditional, guidance, calls)
+    return guided(_branch(dit, embedded, first_is_given), unconditional, guidance, calls)
 
 
-def _branch(dit: VideoVelocity, embedded: DitConditions) -> VelocityFn:
+def _prepare(dit: VideoVelocity, conditions: Conditions, text: Tensor | None) -> DitConditions:
+    image = {} if conditions.image is None else {"image": conditions.image}
+    return dit.prepare(conditions.plucker, text, condition=conditions.render, **image)
+
+
+def _branch(dit: VideoVelocity, embedded: DitConditions, first_is_given: bool) -> VelocityFn:
     def call(state: Tensor, level: float) -> Tensor:
         levels = state.new_full((state.shape[0], state.shape[2]), level)
+        if not first_is_given:
+            return dit.velocity(state, levels, embedded)
         levels[:, 0] = 0
         velocity = dit.velocity(state, levels, embedded)
         return torch.cat([torch.zeros_like(velocity[:, :, :1]), velocity[:, :, 1:]], 2)

@@ -137,3 +137,18 @@ def test_the_default_never_refuses() -> None:
         for name in ("test", "small", "paper"):
             for fill in (None, "none"):
                 planned(name, trained, {"prompt": True, "fill": fill})
+
+
+@pytest.mark.parametrize("prompt", [True, False])
+def test_an_imported_model_runs_with_a_fresh_ldrm_and_always_reads_text(prompt: bool) -> None:
+    plain = config("test")
+    imported = replace(
+        plain,
+        vae=replace(plain.vae, layout="wan2.1"),
+        dit=replace(plain.dit, padded_text_tokens=512),
+    )
+    trained = frozenset({"vae", "text_encoder", "dit"})
+    plan = plan_generation(imported, trained, RequestFacts(prompt=prompt, fill="video"))
+    assert plan.parts == VIDEO | {"text_encoder"}
+    still = plan_generation(imported, trained, RequestFacts(prompt=prompt, fill="none"))
+    assert not still.fills

@@ -23,6 +23,7 @@ from torch.distributed.fsdp import (
 from torch.nn.parallel import DistributedDataParallel
 
 from diff4splat.errors import ConfigError, ShapeError
+from diff4splat.models.adapters.tuning import learns
 from diff4splat.training.recipe.trainer import Precision, TrainerSettings
 from diff4splat.training.stage import TOTAL, Batch, Stage
 from diff4splat.training.trainer.distributed.compiling import compile_networks
@@ -129,6 +130,7 @@ def trained_parameters(stage: Stage) -> Mapping[str, nn.Parameter]:
         f"{part}.{name}": parameter
         for part in stage.trained
         for name, parameter in stage.get_submodule(part).named_parameters()
+        if learns(stage.get_submodule(part), name)
     }
 
 

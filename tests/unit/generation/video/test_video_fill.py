@@ -9,7 +9,7 @@ from image_layers import input_image, random_rgb, sliding_path
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video.video_fill import FillRequest, VideoFill, fill_hidden
+from diff4splat.generation.video.video_fill import FillRequest, TextStates, VideoFill, fill_hidden
 from diff4splat.geometry.camera import project
 from diff4splat.models.config.sizes import small_size
 from diff4splat.models.config.sizes import test_size as tiny_size
@@ -60,7 +60,7 @@ def filled(
         layered=build_layered_image(image, image, maps, 2),
         path=path,
         key_times_s=path.times_s,
-        text=text,
+        text=TextStates(prompt=text),
         seed=0,
         settings=replace(GenerationSettings(steps=1, static_threshold_px=0.0), **changes),
         hidden_only=hidden_only,

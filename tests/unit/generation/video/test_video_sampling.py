@@ -10,7 +10,7 @@ from diff4splat.flow.guidance import Guidance
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_sampling import Conditions, initial_noise, sample_video
 from diff4splat.models.config.sizes import size_by_name
-from diff4splat.models.video_dit.conditions import DitConditions
+from diff4splat.models.video_dit.conditions import DitConditions, ImageCondition
 from diff4splat.models.video_dit.dit import VideoDiT
 
 STEPS = 8
@@ -83,3 +83,29 @@ def test_noise_is_seeded_and_keeps_the_image() -> None:
     assert not torch.equal(first, other)
     single = replace(given, plucker=given.plucker[:, :, :1])
     assert torch.equal(initial_noise(single, 0), given.image_latent)
+
+
+def test_a_negative_prompt_is_what_the_other_pass_sees() -> None:
+    dit = RecordingDit()
+    given = replace(conditions(with_text=True), negative_text=torch.randn(1, 5, 16))
+    sample_video(dit, given, settings(4.0), seed=0)
+    inside = [0.2 <= 1 - i / STEPS <= 0.9 for i in range(STEPS)]
+    assert dit.with_text == [True] * (STEPS + sum(inside))
+
+
+def test_without_a_prompt_the_empty_one_is_the_only_pass() -> None:
+    dit = RecordingDit()
+    given = replace(conditions(with_text=False), negative_text=torch.randn(1, 1, 16))
+    sample_video(dit, given, settings(4.0), seed=0)
+    assert dit.with_text == [True] * STEPS
+
+
+def test_a_model_that_takes_the_image_as_channels_makes_every_frame() -> None:
+    dit = RecordingDit()
+    given = replace(conditions(with_text=False), image=ImageCondition())
+    noise = initial_noise(given, seed=0)
+    assert noise.shape == (1, 4, 3, 4, 4)
+    assert not torch.equal(noise[:, :, :1], given.image_latent)
+    sample_video(dit, given, settings(1.0), seed=0)
+    for levels in dit.levels:
+        assert len(set(levels[0].tolist())) == 1

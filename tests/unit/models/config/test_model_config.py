@@ -41,9 +41,16 @@ OTHER_VALUES = {
     "prediction_type": "clean",
     "render_condition": True,
     "pooled_text": True,
+    "layout": "wan2.1",
+    "decoder_widths": [4, 6, 9],
+    "vocabulary": 300,
+    "head_width": 8,
+    "padded_text_tokens": 16,
+    "condition_channels": 8,
+    "image_width": 12,
 }
 """Valid values where doubling the old one is not."""
-BOUND = [("ldrm", "input"), ("motion_unet", "mask_refiner_width")]
+BOUND = [("ldrm", "input"), ("text", "encoder"), ("motion_unet", "mask_refiner_width")]
 """Fields that may not change alone."""
 
 

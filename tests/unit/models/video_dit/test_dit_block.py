@@ -3,6 +3,7 @@ import torch
 
 from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.video_dit.conditions import DitConditions
 from diff4splat.models.video_dit.dit_block import DitBlock
 
 CONFIG = tiny_size().dit
@@ -33,11 +34,13 @@ def test_block_follows_the_formula() -> None:
         tokens.shape
     )
     want = want + ff_gate * trained.feedforward(normed(want) * (1 + ff_scale) + ff_shift)
-    got = trained(tokens, modulation, ROPE, text, None)
+    got = trained(tokens, modulation, ROPE, DitConditions(text=text))
     torch.testing.assert_close(got, want, atol=1e-5, rtol=1e-5)
 
 
 def test_fresh_block_is_the_identity() -> None:
     tokens, text = torch.randn(1, 2, 2, CONFIG.width), torch.randn(1, 3, CONFIG.width)
     no_modulation = torch.zeros(1, 2, 6, CONFIG.width)
-    assert torch.equal(DitBlock(CONFIG)(tokens, no_modulation, ROPE, text, None), tokens)
+    assert torch.equal(
+        DitBlock(CONFIG)(tokens, no_modulation, ROPE, DitConditions(text=text)), tokens
+    )

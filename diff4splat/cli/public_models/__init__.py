@@ -1,0 +1,1 @@
+"""``diff4splat models``: public models as ours."""

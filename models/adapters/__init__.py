@@ -1,0 +1,1 @@
+"""Training on top of a network whose own weights stay as they are."""

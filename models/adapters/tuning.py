@@ -1,0 +1,29 @@
+"""Which weights of the video model learn: all, the added layers alone, or these and LoRA."""
+
+from typing import Literal
+
+from torch import nn
+
+from diff4splat.models.adapters.lora import add_lora
+
+Tuning = Literal["full", "adapters", "lora"]
+TUNINGS = ("full", "adapters", "lora")
+ADDED = ("camera_adapter.", "condition_embedding.")
+"""What we add to a public video model."""
+
+
+def prepare_tuning(network: nn.Module, tuning: Tuning, rank: int) -> None:
+    """Mark the weights that learn; ``lora`` also adds its layers, in place."""
+    if tuning == "full":
+        return
+    if tuning == "lora":
+        add_lora(network, rank)
+    network.learning = frozenset(
+        name for name, _ in network.named_parameters() if name.startswith(ADDED) or ".lora_" in name
+    )
+
+
+def learns(network: nn.Module, name: str) -> bool:
+    """Whether a weight of a network that is trained learns; all do unless marked."""
+    learning = getattr(network, "learning", None)
+    return learning is None or name in learning

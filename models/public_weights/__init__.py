@@ -1,0 +1,1 @@
+"""Model folders that other projects publish: reading, checking, turning into one of ours."""
