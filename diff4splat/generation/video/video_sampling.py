@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
@@ -28,6 +28,8 @@ class Conditions:
     plucker: Float[Tensor, "b 6 f height width"]
     text: Float[Tensor, "b s d"] | None
     """None without a prompt: then neither the text encoder nor the guidance pass exists."""
+    text_mask: Bool[Tensor, "b s"] | None = None
+    """True where a token is real; None when all are."""
     render: RenderCondition | None = None
     """For a model that takes one."""
 
@@ -55,9 +57,9 @@ def sample_video(
     calls = CallCount()
     latent = solve(
         settings.sampler,
-        _velocity(dit, conditions, settings.guidance, calls),
+        video_velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
-        (settings.levels, settings.step_control),
+        settings.solver_path,
         advance,
     )
     return VideoSample(latent=latent, calls=calls)
@@ -72,12 +74,16 @@ def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w
     return torch.cat([image, noise.to(image)], 2)
 
 
-def _velocity(
+def video_velocity(
     dit: VideoVelocity, conditions: Conditions, guidance: Guidance, calls: CallCount
 ) -> VelocityFn:
+    """Velocity of the video model, guided where there is a prompt."""
     # Cameras and text are embedded once: they are the same at every level.
-    embedded = dit.prepare(conditions.plucker, conditions.text, condition=conditions.render)
-    unconditional = _branch(dit, replace(embedded, text=None, pooled_text=None))
+    embedded = dit.prepare(
+        conditions.plucker, conditions.text, conditions.text_mask, conditions.render
+    )
+    untold = replace(embedded, text=None, text_mask=None, pooled_text=None)
+    unconditional = _branch(dit, untold)
     if conditions.text is None:
         return guided(None, unconditional, UNGUIDED, calls)
     return guided(_branch(dit, embedded), unconditional, guidance, calls)
