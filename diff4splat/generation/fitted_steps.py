@@ -18,7 +18,10 @@ FILE = Path(__file__).with_suffix(".json")
 def known_steps() -> dict[int, FittedSteps]:
     """By the number of steps."""
     made = [
-        FittedSteps(levels=tuple(one["levels"]), weights=tuple(map(tuple, one["weights"])))
+        FittedSteps(
+            levels=tuple(map(float, one["levels"])),
+            weights=tuple(tuple(map(float, row)) for row in one["weights"]),
+        )
         for one in json.loads(FILE.read_text())
     ]
     return {len(one.levels): one for one in made}
