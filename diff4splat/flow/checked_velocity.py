@@ -35,6 +35,10 @@ class _CheckedJumping:
     def jumps(self) -> tuple[float, ...]:
         return self.velocity.jumps
 
+    @property
+    def strong(self) -> bool:
+        return self.velocity.strong
+
     def __call__(self, state: Tensor, level: float) -> Tensor:
         return _as_state(self.velocity(state, level), state)
 

@@ -50,6 +50,7 @@ class Guidance:
         return tuple(end for end in ends if 0 < end < 1)
 
 
+STRONG = 10.0
 UNGUIDED = Guidance(weight=1.0)
 """The condition unchanged."""
 DEFAULT_GUIDANCE = Guidance(weight=5.0, low=0.2, high=1.0)
@@ -84,6 +85,11 @@ class GuidedVelocity:
     def jumps(self) -> tuple[float, ...]:
         """Ends of the interval; none without a condition."""
         return () if self.conditional is None else self.guidance.jumps
+
+    @property
+    def strong(self) -> bool:
+        """From ``STRONG`` on, few steps of higher order end further off than Euler's."""
+        return self.conditional is not None and self.guidance.weight >= STRONG
 
     def __call__(self, state: Tensor, level: float) -> Tensor:
         """The guided velocity inside the interval, its ends included."""

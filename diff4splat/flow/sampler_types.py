@@ -21,6 +21,10 @@ class JumpingVelocity(Protocol):
     def jumps(self) -> tuple[float, ...]:
         """Levels at which it jumps."""
 
+    @property
+    def strong(self) -> bool:
+        """Whether last changes may mislead at few steps: strong guidance."""
+
     def __call__(self, state: Tensor, level: float) -> Tensor:
         """The velocity; at a jump, that of the side which guides."""
 

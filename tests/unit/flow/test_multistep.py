@@ -69,7 +69,7 @@ def test_is_exact_for_linear_clean_predictions_that_jump() -> None:
     slope, base = 0.2 * seeded_normal(16, 12, seed=4), seeded_normal(16, 12, seed=5)
 
     class Jumping:
-        jumps = (0.5,)
+        jumps, strong = (0.5,), False
 
         def __call__(self, state: torch.Tensor, level: float) -> torch.Tensor:
             return (above if level > 0.5 else below)(state, level)
@@ -98,7 +98,7 @@ def test_an_end_of_the_interval_costs_one_evaluation_of_both_branches() -> None:
 
 def test_sides_are_checked_and_stay_in_the_dtype_of_the_state() -> None:
     class Wrong:
-        jumps = (0.5,)
+        jumps, strong = (0.5,), False
 
         def __call__(self, state: torch.Tensor, level: float) -> torch.Tensor:
             return state
@@ -112,7 +112,7 @@ def test_sides_are_checked_and_stay_in_the_dtype_of_the_state() -> None:
 
 @pytest.mark.parametrize("deviation", [1.0, 0.1, 1e-4])
 def test_is_never_worse_than_euler_under_strong_guidance(deviation: float) -> None:
-    weights = (5.0, 10.0, 20.0, 30.0)
+    weights = (10.0, 20.0, 30.0)
     exact = sampler_fields.exact_end_points(deviation, weights)
     for weight, want in zip(weights, exact, strict=True):
         field = sampler_fields.thin_data(deviation).velocity(weight)
