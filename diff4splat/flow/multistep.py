@@ -7,8 +7,8 @@ linear in the level. From a to b, with the clean prediction D:
     predict    state_b = b/a state_a + (1 - b/a) D_a + slope (b ln(a/b) - a + b)
 
 The slope of the predictor is the last one, never for more than the last change, since plain
-extrapolation diverges where steps grow. Where D changed by more than ``LARGEST_CHANGE`` of its or
-the state's length (guidance of 10 or more, few steps), the last change says nothing about the next: the
+extrapolation diverges where steps grow. Where, under guidance of 10 or more, D changed by more than
+``LARGEST_CHANGE`` of its or the state's length, the last change says nothing about the next: the
 predictor then takes no slope, as Euler, sample by sample. The corrector interpolates, and stays.
 
 ``piecewise2`` is for velocities that jump at some levels, as guidance does at the ends of its
@@ -72,7 +72,7 @@ def _strong(velocity: VelocityFn) -> bool:
 
 
 def _slope(known: Memory, next_level: float, before: Memory | None, strong: bool) -> Tensor:
-    """Of the clean prediction over the next step; ``strong`` guidance gets 0 after a large change."""
+    """Of the clean prediction; 0 after a large change under ``strong`` guidance."""
     if before is None:
         return torch.zeros_like(known.clean)
     change = known.clean - before.clean
