@@ -88,11 +88,20 @@ class Generate:
     """Nothing moves, with or without a prompt."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Steps of the sampler. Default: 1 for motion, 8 for video."""
-    sampler: Literal["euler", "midpoint", "heun", "multistep2", "dpmpp2m", "unipc", "adaptive"] = (
-        "multistep2"
-    )
+    sampler: Literal[
+        "euler",
+        "midpoint",
+        "heun",
+        "multistep2",
+        "dpmpp2m",
+        "unipc",
+        "piecewise2",
+        "adaptive",
+        "fitted",
+    ] = "multistep2"
     """ODE solver of motion and video; without a prompt and `--fill video` nothing is sampled.
-    adaptive chooses the steps by --latent-tolerance. `report error-time` compares the solvers."""
+    adaptive chooses the steps by --latent-tolerance; fitted (8 or 12 steps) is fitted to the video
+    model of small. `report error-time` compares the solvers."""
     latent_tolerance: Annotated[float, Number(above=0)] = 0.1
     """Error per step that --sampler adaptive allows, in units of the video latents."""
     shift: Annotated[float | None, Number(above=0)] = None

@@ -1,7 +1,12 @@
-"""Approximations of the shipped networks themselves, on whole scenes of the fixed inputs.
+"""Approximations of networks, scene files and key frames, on whole scenes of the fixed inputs.
 
 precision-NETWORK   weights in bfloat16, float16 or int8 with one scale per output channel;
-                    computed in float32, as ONNX graphs of this project do
+                    computed in float32, as ONNX graphs of this project do. "computed": linear
+                    layers and convolutions multiply in that precision too, everything between
+                    them stays float32. int8: linear layers, one scale per token; float32 holds
+                    the whole numbers, so its error counts and its time does not
+scene-compression   what a scene file keeps
+bake-tolerance      key frames in place of a motion
 network-resolution  pixels of the copy of the image that the networks see
 vae-chunks          latent frames that the decoder takes at a time: exact
 """
@@ -10,8 +15,11 @@ from collections.abc import Callable
 from typing import Any
 
 from diff4splat.error_time.knobs import ApproximationSetting
+from diff4splat.error_time.scene_knobs import rmse
+from diff4splat.scene.motion.bake import TOLERANCE_PX
 
-PRECISIONS = ("float32", "bfloat16", "float16", "int8")
+COMPUTED = ("bfloat16 computed", "float16 computed", "int8 computed")
+PRECISIONS = ("float32", "bfloat16", "float16", "int8", *COMPUTED)
 NETWORKS = ("text_encoder", "monocular_depth", "motion_unet", "dit", "vae", "ldrm")
 RGB_UNIT = "RMSE of RGB in [0, 1]"
 
@@ -22,6 +30,8 @@ def network_settings(inputs: tuple[int, ...]) -> tuple[ApproximationSetting, ...
         *(_precision(part, inputs) for part in NETWORKS),
         _resolution(inputs),
         _vae_chunks(inputs),
+        _compression(inputs),
+        _bake_tolerance(),
     )
 
 
@@ -62,9 +72,6 @@ def _vae_chunks(inputs: tuple[int, ...]) -> ApproximationSetting:
 
         return networks.decoded_in_chunks(frames, inputs)
 
-    def error(result: Any, reference: Any) -> float:
-        return float((result - reference).square().mean().sqrt())
-
     return ApproximationSetting(
         name="vae-chunks",
         summary="decoding a few latent frames at a time: nothing, as its memory is carried on",
@@ -73,9 +80,47 @@ def _vae_chunks(inputs: tuple[int, ...]) -> ApproximationSetting:
         default=16,
         reference=16,
         run=run,
-        error=error,
+        error=rmse,
         repeats=1,
         label_meaning="latent frames",
+    )
+
+
+def _compression(inputs: tuple[int, ...]) -> ApproximationSetting:
+    def run(compression: str) -> Any:
+        from diff4splat.error_time.subjects import files
+
+        return files.kept(compression, inputs)
+
+    return _of_scenes(
+        "scene-compression",
+        "writing a scene with fewer bits, and reading it again",
+        {
+            "settings": ("small", "standard", "lossless"),
+            "default": "standard",
+            "reference": "lossless",
+        },
+        run,
+    )
+
+
+def _bake_tolerance() -> ApproximationSetting:
+    def run(tolerance_px: float | None) -> Any:
+        from diff4splat.error_time.subjects import files
+
+        return files.baked(tolerance_px)
+
+    return ApproximationSetting(
+        name="bake-tolerance",
+        summary="straight lines between key frames in place of a motion",
+        error_unit=RGB_UNIT,
+        settings=(3.0, 1.0, 0.3, TOLERANCE_PX, 0.03),
+        default=TOLERANCE_PX,
+        reference=None,
+        run=run,
+        error=rmse,
+        repeats=1,
+        label_meaning="pixels that a Gaussian may be off",
     )
 
 

@@ -37,7 +37,7 @@ class PartialReport:
                 **stored[str(setting)],
             )
             for setting in knob.settings
-            if str(setting) in stored
+            if _is_row(stored.get(str(setting)))
         }
 
     def add(self, result: SweepResult) -> None:
@@ -58,6 +58,16 @@ class PartialReport:
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             # A damaged note of an earlier run is worth no more than none.
             return {}
+
+
+def _is_row(stored: Any) -> bool:
+    return isinstance(stored, dict) and set(stored) == {
+        "seconds",
+        "median_s",
+        "error",
+        "more_errors",
+        "peak_bytes",
+    }
 
 
 def _numbers(row: Measurement) -> dict[str, Any]:

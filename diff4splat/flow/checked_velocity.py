@@ -1,10 +1,12 @@
 """What every solver asks of its velocity and its start."""
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.flow.sampler_types import VelocityFn
+from diff4splat.flow.sampler_types import JumpingVelocity, VelocityFn
 
 
 def solver_state(start: Tensor) -> Tensor:
@@ -20,12 +22,33 @@ def solver_state(start: Tensor) -> Tensor:
 
 def checked(velocity: VelocityFn) -> VelocityFn:
     """``velocity`` in the state's dtype; an answer that would broadcast is refused."""
+    if isinstance(velocity, JumpingVelocity):
+        return _CheckedJumping(velocity)
+    return lambda state, level: _as_state(velocity(state, level), state)
 
-    def call(state: Tensor, level: float) -> Tensor:
-        answer = velocity(state, level)
-        if answer.shape != state.shape:
-            want, got = tuple(state.shape), tuple(answer.shape)
-            raise ShapeError(f"velocity: expected the state's shape {want}, got {got}")
-        return answer.to(state.dtype)
 
-    return call
+@dataclass(frozen=True, slots=True)
+class _CheckedJumping:
+    velocity: JumpingVelocity
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        return self.velocity.jumps
+
+    @property
+    def strong(self) -> bool:
+        return self.velocity.strong
+
+    def __call__(self, state: Tensor, level: float) -> Tensor:
+        return _as_state(self.velocity(state, level), state)
+
+    def sides(self, state: Tensor, level: float) -> tuple[Tensor, Tensor]:
+        above, below = self.velocity.sides(state, level)
+        return _as_state(above, state), _as_state(below, state)
+
+
+def _as_state(answer: Tensor, state: Tensor) -> Tensor:
+    if answer.shape != state.shape:
+        want, got = tuple(state.shape), tuple(answer.shape)
+        raise ShapeError(f"velocity: expected the state's shape {want}, got {got}")
+    return answer.to(state.dtype)

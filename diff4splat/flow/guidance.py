@@ -43,7 +43,14 @@ class Guidance:
         """Whether both branches are mixed at ``level``."""
         return self.weight != 1 and self.low <= level <= self.high
 
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Levels where guidance begins or ends on the way from noise to data."""
+        ends = () if self.weight == 1 else dict.fromkeys((self.high, self.low))
+        return tuple(end for end in ends if 0 < end < 1)
 
+
+STRONG = 10.0
 UNGUIDED = Guidance(weight=1.0)
 """The condition unchanged."""
 DEFAULT_GUIDANCE = Guidance(weight=5.0, low=0.2, high=1.0)
@@ -65,32 +72,74 @@ class CallCount:
         return 2 * self.total - self.conditional - self.unconditional
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuidedVelocity:
+    """A ``JumpingVelocity`` of two branches; each is asked only where its answer counts."""
+
+    conditional: VelocityFn | None
+    unconditional: VelocityFn | None
+    guidance: Guidance
+    count: CallCount
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Ends of the interval; none without a condition."""
+        return () if self.conditional is None else self.guidance.jumps
+
+    @property
+    def strong(self) -> bool:
+        """From ``STRONG`` on, few steps of higher order end further off than Euler's."""
+        return self.conditional is not None and self.guidance.weight >= STRONG
+
+    def __call__(self, state: Tensor, level: float) -> Tensor:
+        """The guided velocity inside the interval, its ends included."""
+        active = self.guidance.active(level)
+        ask_unconditional = active or self.conditional is None
+        ask_conditional = self.conditional is not None and not (
+            active and self.guidance.weight == 0
+        )
+        self._counted(ask_conditional, ask_unconditional)
+        if ask_conditional and ask_unconditional:
+            return mix(
+                self.unconditional(state, level),
+                self.conditional(state, level),
+                self.guidance.weight,
+            )
+        return (self.conditional if ask_conditional else self.unconditional)(state, level)
+
+    def sides(self, state: Tensor, level: float) -> tuple[Tensor, Tensor]:
+        """At an end of the interval: one guided evaluation, whose conditional branch is outside."""
+        self._counted(True, True)
+        outside = self.conditional(state, level)
+        inside = mix(self.unconditional(state, level), outside, self.guidance.weight)
+        if self.guidance.low == self.guidance.high:
+            return outside, outside
+        return (outside, inside) if level == self.guidance.high else (inside, outside)
+
+    def _counted(self, conditional: bool, unconditional: bool) -> None:
+        self.count.total += 1
+        self.count.conditional += conditional
+        self.count.unconditional += unconditional
+
+
 def guided(
     conditional: VelocityFn | None,
     unconditional: VelocityFn | None,
     guidance: Guidance,
     count: CallCount | None = None,
-) -> VelocityFn:
+) -> GuidedVelocity:
     """One velocity from the two branches; either may be absent where it is never needed.
 
     Raises:
         ConfigError: a branch is missing that ``guidance`` needs.
     """
     _require_branches(conditional, unconditional, guidance)
-    count = CallCount() if count is None else count
-
-    def call(state: Tensor, level: float) -> Tensor:
-        active = guidance.active(level)
-        ask_unconditional = active or conditional is None
-        ask_conditional = conditional is not None and not (active and guidance.weight == 0)
-        count.total += 1
-        count.conditional += ask_conditional
-        count.unconditional += ask_unconditional
-        if ask_conditional and ask_unconditional:
-            return mix(unconditional(state, level), conditional(state, level), guidance.weight)
-        return conditional(state, level) if ask_conditional else unconditional(state, level)
-
-    return call
+    return GuidedVelocity(
+        conditional=conditional,
+        unconditional=unconditional,
+        guidance=guidance,
+        count=CallCount() if count is None else count,
+    )
 
 
 def mix(

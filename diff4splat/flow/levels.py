@@ -1,6 +1,6 @@
 """Noise levels that a sampler visits: Python floats (float64) from 1 (noise) down to 0 (data).
 
-``n`` steps need n + 1 levels. Four rules:
+``n`` steps need n + 1 levels. Five rules:
 
     uniform   level_i = 1 - i / n
     log_snr   log((1 - level) / level) evenly spaced between its values at 1 - edge and edge, with
@@ -8,6 +8,8 @@
               that of DPM-Solver, Lu et al., arXiv 2206.00927)
     last      no level between 0 and ``last``: networks that predict clean latents have no velocity
               that tends to a limit there, so that the end of the flow is where one stops
+    pieces    for velocities that jump (guidance): a level at each jump, half of the steps even in
+              the level above the lowest one, half towards ``last`` below it
     shift k   level → k · level / (1 + (k - 1) · level), on top of either: k > 1 spends more steps
               on noisy levels (Esser et al., arXiv 2403.03206, §5.3.2)
 
@@ -61,6 +63,34 @@ def log_snr_levels(steps: int, last: float = 0.0) -> tuple[float, ...]:
     reach = math.log(min(steps / EDGE, 1 / last if last else math.inf) - 1)
     inner = (1 / (1 + math.exp(reach * (2 * i / steps - 1))) for i in range(1, steps))
     return (1.0, *inner, 0.0)
+
+
+def piecewise_levels(steps: int, jumps: Sequence[float], last: float = 0.0) -> tuple[float, ...]:
+    """A level at each of ``jumps``, in falling order; as ``log_snr`` where there is no room.
+
+    Below the lowest jump, logarithms of levels follow the 0.7th power of the step: of 0.5 to 1.4
+    the best for the shipped video model.
+    """
+    _require_steps(steps)
+    ends, final = (1.0, *jumps), max(last, EDGE / steps)
+    above, below = steps // 2, steps - steps // 2
+    if not jumps or above < len(jumps) or below < 2 or final >= ends[-1]:
+        return log_snr_levels(steps, last)
+    shares = (final / ends[-1], (below - 1) ** 0.7)
+    lower = (ends[-1] * shares[0] ** (k**0.7 / shares[1]) for k in range(below))
+    return (*_evenly(ends, above), *lower, 0.0)
+
+
+def _evenly(ends: Sequence[float], steps: int) -> tuple[float, ...]:
+    """``steps`` levels from the first of ``ends`` to the last, without that: each at least once."""
+    span, levels, left = ends[0] - ends[-1], [], steps
+    for number, (high, low) in enumerate(pairwise(ends)):
+        others = len(ends) - 2 - number
+        count = min(max(round(steps * (high - low) / span), 1), left - others)
+        count = left if not others else count
+        levels += [high + (low - high) * i / count for i in range(count)]
+        left -= count
+    return tuple(levels)
 
 
 def shift_levels(levels: Sequence[float], shift: float) -> tuple[float, ...]:

@@ -5,11 +5,31 @@ Axes: ``b`` batch, ``*d`` everything else.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from torch import Tensor
 
 VelocityFn = Callable[[Tensor, float], Tensor]
 """(noisy state, level) to velocity in the same shape; casts its input as its network needs."""
+
+
+@runtime_checkable
+class JumpingVelocity(Protocol):
+    """A velocity that is not continuous in the level everywhere."""
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Levels at which it jumps."""
+
+    @property
+    def strong(self) -> bool:
+        """Whether last changes may mislead at few steps: strong guidance."""
+
+    def __call__(self, state: Tensor, level: float) -> Tensor:
+        """The velocity; at a jump, that of the side which guides."""
+
+    def sides(self, state: Tensor, level: float) -> tuple[Tensor, Tensor]:
+        """At a jump: just above the level, and just below it, for one evaluation."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

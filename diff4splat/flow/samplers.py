@@ -5,10 +5,9 @@ With a = level, b = next level, h = b - a < 0, v = velocity and clean = state - 
     euler       state += h v(state, a)
     midpoint    state += h v(state + h/2 v, a + h/2)
     heun        state += h/2 (v(state, a) + v(state + h v, b)); into level 0 an Euler step
-    multistep2  exact integral of d state / d level = (state - clean(level)) / level for a ``clean``
-                that is linear in the level (exponential Adams, predictor and corrector):
-                state = b/a state + (1 - b/a) clean + slope (b ln(a/b) - a + b)
-    dpmpp2m, unipc   the same in the log signal-to-noise ratio (``log_snr_samplers``)
+    multistep2  exact for a clean prediction that is linear in the level (``multistep``)
+    piecewise2  the same where the velocity jumps at some levels (``multistep``)
+    dpmpp2m, unipc   multistep in the log signal-to-noise ratio (``log_snr_samplers``)
 
 The exact flow of thin data is stiff near level 0, with a rate of 1 / level. Euler and multistep2
 integrate that part exactly; a Runge-Kutta stage close to level 0 amplifies its own error by
@@ -23,16 +22,14 @@ steps vanish (2 % error at 200 steps, 13 % at 1000).
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.checked_velocity import checked, solver_state
 from diff4splat.flow.levels import require_levels
-from diff4splat.flow.linear_clean import follow
 from diff4splat.flow.log_snr_samplers import dpmpp2m_step, unipc_step
-from diff4splat.flow.path import clean_from_velocity
+from diff4splat.flow.multistep import multistep2_step, piecewise2_step
 from diff4splat.flow.sampler_types import Memory, Sampler, VelocityFn
 
 __all__ = ["SAMPLERS", "Memory", "Sampler", "VelocityFn", "find_sampler", "integrate"]
@@ -101,31 +98,19 @@ def _heun(
     return state + 0.5 * step * (slope + velocity(state + step * slope, next_level)), memory
 
 
-def _multistep2(
-    velocity: VelocityFn, state: Tensor, pair: tuple[float, float], memory: Memory | None
-) -> tuple[Tensor, Memory | None]:
-    level, next_level = pair
-    clean = clean_from_velocity(state, velocity(state, level), level)
-    slope = torch.zeros_like(clean)
-    if memory is not None:
-        last_step = level - memory.level
-        change = clean - memory.clean
-        # Corrector: repeat the last step now that the clean prediction at its end is known.
-        state = follow(memory.state, (memory.level, level), memory.clean, change / last_step)
-        # Predictor: extrapolating further than the last change diverges where steps grow.
-        slope = change / min(last_step, next_level - level)
-    memory = Memory(state=state, level=level, clean=clean)
-    return follow(state, pair, clean, slope), memory
-
-
 SAMPLERS = {
     sampler.name: sampler
     for sampler in (
         Sampler(name="euler", order=1, calls_per_step=1, calls_into_zero=1, step=_euler),
         Sampler(name="midpoint", order=2, calls_per_step=2, calls_into_zero=2, step=_midpoint),
         Sampler(name="heun", order=2, calls_per_step=2, calls_into_zero=1, step=_heun),
-        Sampler(name="multistep2", order=2, calls_per_step=1, calls_into_zero=1, step=_multistep2),
+        Sampler(
+            name="multistep2", order=2, calls_per_step=1, calls_into_zero=1, step=multistep2_step
+        ),
         Sampler(name="dpmpp2m", order=2, calls_per_step=1, calls_into_zero=1, step=dpmpp2m_step),
         Sampler(name="unipc", order=2, calls_per_step=1, calls_into_zero=1, step=unipc_step),
+        Sampler(
+            name="piecewise2", order=2, calls_per_step=1, calls_into_zero=1, step=piecewise2_step
+        ),
     )
 }

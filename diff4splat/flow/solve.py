@@ -1,37 +1,51 @@
-"""A named solver: fixed levels, or an adaptive step size under the name ``adaptive``."""
+"""A named solver: fixed levels, the step size ``adaptive``, or weights ``fitted`` to a network."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.adaptive import StepControl, integrate_adaptively
+from diff4splat.flow.fitted import FittedSteps, integrate_fitted
 from diff4splat.flow.sampler_types import VelocityFn
 from diff4splat.flow.samplers import SAMPLERS, find_sampler, integrate
 
-ADAPTIVE = "adaptive"
-SOLVERS = (*SAMPLERS, ADAPTIVE)
+ADAPTIVE, FITTED = "adaptive", "fitted"
+SOLVERS = (*SAMPLERS, ADAPTIVE, FITTED)
 FIXED_DEFAULT = "multistep2"
-"""Of what an adaptive step size has nothing to decide about."""
+"""Where an adaptive step size has nothing to decide about, and where nothing is fitted."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolverPath:
+    """What each kind of solver is told; it reads its own."""
+
+    levels: Sequence[float]
+    control: StepControl
+    fitted: FittedSteps | None = None
 
 
 def solve(
     name: str,
     velocity: VelocityFn,
     start: Tensor,
-    path: tuple[Sequence[float], StepControl],
+    path: SolverPath,
     advance: Callable[[], None] | None = None,
 ) -> Tensor:
-    """Carry noise to data by the solver ``name``; ``path`` holds the levels and the tolerance.
+    """Carry noise to data by the solver ``name``.
 
     Raises:
-        ConfigError: no such solver, or levels that do not decrease.
+        ConfigError: no such solver, levels that do not decrease, or nothing fitted.
         ShapeError: as ``integrate``.
     """
-    levels, control = path
     if name == ADAPTIVE:
-        return integrate_adaptively(velocity, start, control, advance).state
-    return integrate(find_sampler(name), velocity, start, levels, advance)
+        return integrate_adaptively(velocity, start, path.control, advance).state
+    if name == FITTED:
+        if path.fitted is None:
+            raise ConfigError("sampler fitted: expected fitted steps, got none")
+        return integrate_fitted(velocity, start, path.fitted, advance)
+    return integrate(find_sampler(name), velocity, start, path.levels, advance)
 
 
 def require_solver(name: str) -> str:

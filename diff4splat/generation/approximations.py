@@ -7,7 +7,7 @@ from diff4splat.flow.adaptive import StepControl
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, Guidance
 from diff4splat.flow.levels import Schedule
 from diff4splat.flow.samplers import find_sampler
-from diff4splat.flow.solve import ADAPTIVE
+from diff4splat.flow.solve import ADAPTIVE, FITTED
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 
 DEFAULTS = GenerationSettings()
@@ -35,7 +35,8 @@ class Sampling:
         """Calls of the network, or the tolerance."""
         if self.tolerance is not None:
             return f"tol {self.tolerance:g}"
-        return str(self.steps * find_sampler(self.sampler).calls_per_step)
+        per_step = 1 if self.sampler == FITTED else find_sampler(self.sampler).calls_per_step
+        return str(self.steps * per_step)
 
     def apply(self, settings: GenerationSettings) -> GenerationSettings:
         """The same generation with this sampler."""
@@ -45,12 +46,19 @@ class Sampling:
         return replace(settings, **chosen)
 
 
+REFERENCE = Sampling(sampler="piecewise2", steps=160)
+"""80 steps are among the values, so that the report shows how converged it is."""
 SAMPLINGS = (
-    *(Sampling(sampler="euler", steps=n, schedule="uniform") for n in (8, 16, 50)),
-    *(Sampling(sampler="midpoint", steps=n) for n in (4, 8)),
-    *(Sampling(sampler="heun", steps=n) for n in (4, 8)),
-    *(Sampling(sampler=name, steps=n) for name in ("dpmpp2m", "unipc") for n in (8, 10, 12, 16)),
-    *(Sampling(steps=n) for n in (4, 8, 12, 16)),
+    *(Sampling(sampler="euler", steps=n, schedule="uniform") for n in (8, 50)),
+    *(Sampling(sampler=name, steps=4) for name in ("midpoint", "heun")),
+    Sampling(sampler="dpmpp2m", steps=12),
+    *(
+        Sampling(sampler=name, steps=n)
+        for name in ("unipc", "multistep2", "piecewise2")
+        for n in (8, 12, 16)
+    ),
+    Sampling(sampler="piecewise2", steps=80),
+    *(Sampling(sampler=FITTED, steps=n) for n in (8, 12)),
     *(Sampling(sampler=ADAPTIVE, tolerance=tolerance) for tolerance in (0.3, 0.1)),
 )
 
@@ -68,7 +76,7 @@ APPROXIMATIONS = (
         ),
         values=SAMPLINGS,
         default=Sampling(),
-        reference=Sampling(sampler="unipc", steps=256),
+        reference=REFERENCE,
         apply=lambda settings, value: value.apply(settings),
         series=lambda value: value.sampler,
         label=lambda value: value.label,
@@ -81,7 +89,7 @@ APPROXIMATIONS = (
         fields=("GenerationSettings.shift",),
         values=(0.5, 0.7, 1.0, 2.0, 3.0, 5.0),
         default=1.0,
-        reference=Sampling(sampler="unipc", steps=256),
+        reference=REFERENCE,
         apply=lambda settings, value: (
             value.apply(settings) if isinstance(value, Sampling) else replace(settings, shift=value)
         ),

@@ -17,7 +17,7 @@ from torch import Tensor
 from diff4splat.flow.guidance import UNGUIDED, CallCount, guided
 from diff4splat.flow.path import velocity_from_clean
 from diff4splat.flow.samplers import VelocityFn
-from diff4splat.flow.solve import ADAPTIVE, FIXED_DEFAULT, solve
+from diff4splat.flow.solve import ADAPTIVE, FITTED, FIXED_DEFAULT, SolverPath, solve
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
 from diff4splat.generation.settings import GenerationSettings
@@ -87,13 +87,15 @@ def sample_motion(
     generator = torch.Generator().manual_seed(request.seed)
     noise = torch.randn(1, 3, frames - 1, *grid, generator=generator).to(rgb)
     settings = request.settings
-    fixed = settings.sampler == ADAPTIVE and settings.motion.steps == 1
+    fixed = settings.sampler == FITTED
+    fixed = fixed or (settings.sampler == ADAPTIVE and settings.motion.steps == 1)
     field = solve(
-        # One step is the mean of all samples, which no tolerance is asked about.
+        # One step is the mean of all samples, which no tolerance is asked about; steps are fitted
+        # to the video model.
         FIXED_DEFAULT if fixed else settings.sampler,
         _velocity(network, rgb, request, calls),
         noise,
-        (settings.motion.levels, settings.step_control),
+        SolverPath(levels=settings.motion.levels, control=settings.step_control),
         advance,
     )
     # Which pixels move is not sampled: image and text decide.

@@ -4,9 +4,17 @@ from dataclasses import dataclass
 
 from diff4splat.errors import ConfigError
 from diff4splat.flow.adaptive import StepControl
+from diff4splat.flow.fitted import FittedSteps
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, UNGUIDED, Guidance
-from diff4splat.flow.levels import Schedule, make_levels, require_levels
-from diff4splat.flow.solve import ADAPTIVE, require_solver
+from diff4splat.flow.levels import (
+    Schedule,
+    make_levels,
+    piecewise_levels,
+    require_levels,
+    shift_levels,
+)
+from diff4splat.flow.solve import ADAPTIVE, FITTED, SolverPath, require_solver
+from diff4splat.generation.fitted_steps import find_steps
 from diff4splat.models.config.model import Fill
 from diff4splat.scene.edit import MIN_OPACITY
 
@@ -15,6 +23,8 @@ LAST_LEVEL = 0.02
 """Where eight steps end that are even in log signal-to-noise ratio (docs/results/samplers.md)."""
 ADAPTIVE_STEPS = 16
 """Typical number at the default tolerance."""
+PIECEWISE = "piecewise2"
+"""The sampler whose levels follow the guidance interval."""
 ENOUGH_STEPS = 6
 """With fewer, evenly spaced in log signal-to-noise ratio throws guided samples off their course."""
 
@@ -104,13 +114,29 @@ class GenerationSettings:
     @property
     def levels(self) -> tuple[float, ...]:
         """Noise levels that the sampler visits."""
-        measured: Schedule = "log_snr" if self.steps >= ENOUGH_STEPS else "uniform"
+        if self.fitted is not None:
+            return (*self.fitted.levels, 0.0)
+        enough = self.steps >= ENOUGH_STEPS
+        if self.sampler == PIECEWISE and self.schedule is None and enough:
+            jumps = self.guidance.jumps
+            return shift_levels(piecewise_levels(self.steps, jumps, self.last_level), self.shift)
+        measured: Schedule = "log_snr" if enough else "uniform"
         return make_levels(self.schedule or measured, self.steps, self.shift, self.last_level)
+
+    @property
+    def fitted(self) -> FittedSteps | None:
+        """Weights of the sampler ``fitted``."""
+        return find_steps(self.steps) if self.sampler == FITTED else None
 
     @property
     def expected_steps(self) -> int:
         """Of the video model, for progress; an adaptive step size decides while it runs."""
         return ADAPTIVE_STEPS if self.sampler == ADAPTIVE else self.steps
+
+    @property
+    def solver_path(self) -> SolverPath:
+        """Of the video model's solver."""
+        return SolverPath(levels=self.levels, control=self.step_control, fitted=self.fitted)
 
     @property
     def step_control(self) -> StepControl:

@@ -1,5 +1,8 @@
 """Eight fixed inputs: four photographs of scikit-image, and four drawn worlds.
 
+Ten more, from number 8 on, are for what is fitted to the shipped networks: nothing is measured on
+inputs that it was fitted to.
+
 Nothing is downloaded: the photographs come with scikit-image, the worlds are of the split that no
 model was trained on. Each has a camera path and a prompt that asks for motion.
 """
@@ -22,11 +25,14 @@ from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.io.pixels import unit_rgb
 
 Inputs = tuple[int, ...]
-"""Which of the eight."""
+"""Which of them."""
 
 PHOTOGRAPHS = ("astronaut", "chelsea", "coffee", "rocket")
 WORLDS = (3, 5, 8, 11)
 """Indices of drawn worlds in each of which something moves."""
+OTHER_PHOTOGRAPHS = ("camera", "coins", "moon", "brick")
+OTHER_WORLDS = (13, 17, 21, 29, 33, 37)
+MEASURED = len(PHOTOGRAPHS) + len(WORLDS)
 WORLD_SEED = 7
 SIDE_PX = 128
 """Of the images; networks see a copy of 64 pixels."""
@@ -48,15 +54,18 @@ class ImageInput:
 
 @cache
 def image_input(index: int) -> ImageInput:
-    """One of the eight: photographs, then worlds.
+    """One of the eight: photographs, then worlds; from 8 on one of the ten others, likewise.
 
     Raises:
         MissingExtraError: scikit-image is not installed.
     """
-    if index >= len(PHOTOGRAPHS):
-        return _world(WORLDS[index - len(PHOTOGRAPHS)])
+    names, worlds = PHOTOGRAPHS, WORLDS
+    if index >= MEASURED:
+        index, names, worlds = index - MEASURED, OTHER_PHOTOGRAPHS, OTHER_WORLDS
+    if index >= len(names):
+        return _world(worlds[index - len(names)])
     require_photographs()
-    return _photograph(PHOTOGRAPHS[index])
+    return _photograph(names[index])
 
 
 def require_photographs() -> None:
@@ -90,7 +99,8 @@ def world_clip(index: int, frames: int = 5, views: int = 1, side_px: int = SIDE_
 def _photograph(name: str) -> ImageInput:
     from skimage import data
 
-    pixels = torch.from_numpy(getattr(data, name)().copy())[..., :3]
+    pixels = torch.from_numpy(getattr(data, name)().copy())
+    pixels = pixels[..., None].expand(-1, -1, 3) if pixels.ndim == 2 else pixels[..., :3]
     camera = pinhole(FOCAL * SIDE_PX, (SIDE_PX,) * 2)
     return ImageInput(name=name, image=_image(_square(unit_rgb(pixels)), camera), prompt=PROMPT)
 

@@ -1,10 +1,12 @@
 """The shipped networks with rounded weights, at other sizes, and in chunks."""
 
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from diff4splat.error_time.subjects import scenes
 from diff4splat.error_time.subjects.inputs import Inputs
@@ -18,15 +20,20 @@ from diff4splat.progress.run_log import RunLog
 
 FILL_PARTS = ("dit", "vae", "ldrm")
 """Networks that run only where the video model fills."""
+MULTIPLYING = (nn.Linear, nn.Conv2d, nn.Conv3d)
 
 
 @torch.no_grad()
 def scenes_in_precision(part: str, precision: str, inputs: Inputs) -> scenes.Scenes:
-    """Scenes with the weights of one network rounded."""
+    """Scenes with one network's weights rounded, or with its products in that precision."""
     model = shipped_model()
     network = deepcopy(getattr(model.networks, part))
-    for weight in network.parameters():
-        weight.copy_(rounded(weight, precision))
+    name, _, computed = precision.partition(" ")
+    if computed:
+        compute_in(network, name)
+    else:
+        for weight in network.parameters():
+            weight.copy_(rounded(weight, name))
     changed = replace(model, networks=replace(model.networks, **{part: network}))
     fill = "video" if part in FILL_PARTS else None
     return scenes.generate(changed, GenerationSettings(fill=fill), inputs)
@@ -42,6 +49,42 @@ def rounded(weight: Tensor, precision: str) -> Tensor:
             -1, *[1] * (weight.ndim - 1)
         )
     return weight.to(getattr(torch, precision)).float()
+
+
+def compute_in(network: nn.Module, precision: str) -> None:
+    """Let the layers of ``network`` that multiply matrices do it in ``precision``."""
+    for layer in [one for one in network.modules() if type(one) in MULTIPLYING]:
+        if precision == "int8":
+            if type(layer) is nn.Linear:
+                layer.forward = _int8_linear(layer)
+            continue
+        layer.to(getattr(torch, precision))
+        layer.forward = partial(_cast, layer.forward, getattr(torch, precision))
+
+
+def _cast(forward: Callable[[Tensor], Tensor], dtype: torch.dtype, values: Tensor) -> Tensor:
+    return forward(values.to(dtype)).to(values.dtype)
+
+
+def _int8_linear(layer: nn.Linear) -> Callable[[Tensor], Tensor]:
+    """Products of whole numbers from -127 to 127, one scale per token and per output.
+
+    Float32 holds the products and nearly all sums exactly: the error is that of int8, the time not.
+    """
+    weight, weight_scale = _whole(layer.weight)
+
+    def forward(values: Tensor) -> Tensor:
+        whole, scale = _whole(values)
+        product = torch.nn.functional.linear(whole, weight) * scale * weight_scale[:, 0]
+        return product if layer.bias is None else product + layer.bias
+
+    return forward
+
+
+def _whole(values: Tensor) -> tuple[Tensor, Tensor]:
+    """Whole numbers, and the scale of each row of the last axis."""
+    scale = values.abs().amax(-1, keepdim=True).clamp_min(1e-30) / 127
+    return (values / scale).round(), scale
 
 
 def scenes_at_factor(factor: int, inputs: Inputs) -> scenes.Scenes:

@@ -7,7 +7,8 @@ and counts in no error.
     image     PSNR between both decoded videos, dB
 """
 
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, lru_cache
 
 import torch
 from jaxtyping import Float
@@ -16,22 +17,58 @@ from torch import Tensor
 from diff4splat.error_time.subjects.errors import mean_psnr_db
 from diff4splat.error_time.subjects.inputs import Inputs
 from diff4splat.error_time.subjects.model import request, shipped_model
+from diff4splat.flow.guidance import CallCount, Guidance
+from diff4splat.flow.sampler_types import VelocityFn
+from diff4splat.flow.solve import ADAPTIVE, solve
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.priors import image_depth
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.render_condition import encode_condition, render_layered_image
-from diff4splat.generation.video.video_sampling import Conditions, sample_video
+from diff4splat.generation.video.video_sampling import Conditions, initial_noise, video_velocity
 from diff4splat.geometry.rays import plucker_map, relative_to_first
+from diff4splat.models.video_dit.conditions import RenderCondition
 
 Latents = Float[Tensor, "b c t h w"]
 
 
 @torch.no_grad()
 def run(settings: GenerationSettings, inputs: Inputs) -> Latents:
-    """Latents of the inputs, one after the other, as a generation does it."""
-    dit = shipped_model().networks.dit
-    every = map(conditions, inputs)
-    return torch.cat([sample_video(dit, one, settings, seed=0).latent for one in every])
+    """Latents of the inputs, each from its own noise of seed 0, as one batch.
+
+    An adaptive step size is each input's own, so there it is one after the other.
+    """
+    every = [(conditions(index), 0) for index in inputs]
+    if settings.sampler == ADAPTIVE:
+        return torch.cat([sampled([one], settings) for one in every])
+    return sampled(every, settings)
+
+
+def sampled(every: Sequence[tuple[Conditions, int]], settings: GenerationSettings) -> Latents:
+    """Latents of conditions and seeds, as one batch."""
+    velocity, noise = batch(every, settings.guidance)
+    return solve(settings.sampler, velocity, noise, settings.solver_path)
+
+
+def batch(
+    every: Sequence[tuple[Conditions, int]], guidance: Guidance
+) -> tuple[VelocityFn, Latents]:
+    """Velocity and noise of conditions and seeds; prompts are padded, and masked there."""
+    parts = [one for one, _ in every]
+    text = torch.nn.utils.rnn.pad_sequence([one.text[0] for one in parts], batch_first=True)
+    lengths = torch.tensor([one.text.shape[1] for one in parts])
+    render = RenderCondition(
+        latent=torch.cat([one.render.latent for one in parts]),
+        validity=torch.cat([one.render.validity for one in parts]),
+    )
+    joined = Conditions(
+        image_latent=torch.cat([one.image_latent for one in parts]),
+        plucker=torch.cat([one.plucker for one in parts]),
+        text=text,
+        text_mask=torch.arange(text.shape[1]) < lengths[:, None],
+        render=render,
+    )
+    noise = torch.cat([initial_noise(one, seed) for one, seed in every])
+    return video_velocity(shipped_model().networks.dit, joined, guidance, CallCount()), noise
 
 
 def error(latents: Latents, reference: Latents) -> float:
@@ -44,10 +81,17 @@ def error(latents: Latents, reference: Latents) -> float:
 @torch.no_grad()
 def more_errors(latents: Latents, reference: Latents) -> dict[str, float]:
     """The same latents decoded."""
-    vae = shipped_model().networks.vae
-    return {
-        "image [dB]": mean_psnr_db(*(vae.decode(one) / 2 + 0.5 for one in (latents, reference)))
-    }
+    return {"image [dB]": mean_psnr_db(_decoded(latents), _decoded_reference(reference))}
+
+
+def _decoded(latents: Latents) -> Tensor:
+    return shipped_model().networks.vae.decode(latents) / 2 + 0.5
+
+
+@lru_cache(maxsize=1)
+def _decoded_reference(reference: Latents) -> Tensor:
+    """Every setting is compared with the same one."""
+    return _decoded(reference)
 
 
 @cache

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
@@ -33,6 +33,8 @@ class Conditions:
     plucker: Float[Tensor, "b 6 f height width"]
     text: Float[Tensor, "b s d"] | None
     """None without a prompt: then neither the text encoder nor the guidance pass exists."""
+    text_mask: Bool[Tensor, "b s"] | None = None
+    """True where a token is real; None when all are."""
     render: RenderCondition | None = None
     """For a model that takes one."""
     negative_text: Float[Tensor, "b s2 d"] | None = None
@@ -71,7 +73,7 @@ def sample_video(
         settings.sampler,
         video_velocity(dit, conditions, settings.guidance, calls),
         initial_noise(conditions, seed),
-        (settings.levels, settings.step_control),
+        settings.solver_path,
         advance,
     )
     return VideoSample(latent=latent, calls=calls)
@@ -92,7 +94,7 @@ def video_velocity(
 ) -> VelocityFn:
     """The velocity that the solver follows, with guidance; ``calls`` counts network evaluations."""
     # Cameras and text are embedded once: they are the same at every level.
-    embedded = _prepare(dit, conditions, conditions.text)
+    embedded = _prepare(dit, conditions, conditions.text, conditions.text_mask)
     without = replace(embedded, text=None, text_mask=None, pooled_text=None)
     if conditions.negative_text is not None:
         negative = _prepare(dit, conditions, conditions.negative_text)
@@ -110,9 +112,11 @@ def video_velocity(
     return guided(_branch(dit, embedded, first_is_given), unconditional, guidance, calls)
 
 
-def _prepare(dit: VideoVelocity, conditions: Conditions, text: Tensor | None) -> DitConditions:
+def _prepare(
+    dit: VideoVelocity, conditions: Conditions, text: Tensor | None, mask: Tensor | None = None
+) -> DitConditions:
     image = {} if conditions.image is None else {"image": conditions.image}
-    return dit.prepare(conditions.plucker, text, condition=conditions.render, **image)
+    return dit.prepare(conditions.plucker, text, mask, conditions.render, **image)
 
 
 def _branch(dit: VideoVelocity, embedded: DitConditions, first_is_given: bool) -> VelocityFn:
