@@ -93,12 +93,13 @@ def promise(command: "Generate") -> tuple["Generate", Promise]:
     if not limits.given:
         return command, plain
     frames, full_px = frame_count(command), _side(command)[0]
+    detail = photo_detail(command)
     choice = costing.choose(
         NAME,
         lambda values: _setting_work(command, values, full_px, frames),
         lambda values: agrees(values, fixed(command)) and _keeps_shape(command, values, full_px),
         limits,
-        photo_detail(command),
+        lambda _: detail,
     )
     return with_setting(command, choice.values, full_px), plain.with_choice(choice)
 

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
 
 NAME = "render"
+USUAL_DETAIL = 1e-3
+"""Of a frame, where it is not measured: with a budget alone, only the order of errors counts."""
+FEW_FRAMES = 4
+"""For fewer, looking at one costs more than smaller ones save."""
 DEFAULT_CUTOFF = 1 / 255
 CUTOFFS = (1 / 4096, 1 / 1024, DEFAULT_CUTOFF, 1 / 64, 1 / 16)
 SIDE_SHARES = (1.0, 0.75, 0.5)
@@ -49,40 +53,75 @@ def reach(cutoff: float) -> float:
 
 def request_work(command: "Render", values: SettingValues | None = None) -> dict[str, float | int]:
     """The same from the options alone and the scene's header."""
-    from diff4splat.cli.options.camera import PRESET_FRAMES
     from diff4splat.cli.scenes.render import longer_side
 
     header = read_scene_header(command.scene)
     share, cutoff = (1.0, DEFAULT_CUTOFF) if values is None else _parts(values)
     size_px = header.size_px
-    if command.resolution is not None:
+    if command.resolution is not None and max(size_px) > 0:
         size_px = longer_side(size_px, command.resolution)
     size_px = tuple(round(side * share) for side in size_px)
-    frames = command.options.frames or (header.frames if command.camera is None else PRESET_FRAMES)
+    return work(header, frame_count(command), size_px, cutoff)
+
+
+def frame_count(command: "Render") -> int:
+    """Frames that are written."""
+    from diff4splat.cli.options.camera import PRESET_FRAMES
+
     if command.out.suffix.lower() == ".png" and "%" not in command.out.name:
-        frames = 1
-    return work(header, frames, size_px, cutoff)
+        return 1
+    own = read_scene_header(command.scene).frames if command.camera is None else PRESET_FRAMES
+    return command.options.frames or own
 
 
 def promise(command: "Render") -> Promise:
     """What the command is expected to need, with the settings that its limits ask for.
 
+    With a tolerance, a frame in the middle is rendered to see how much detail smaller ones lose.
+
     Raises:
         ConfigError: no setting holds; says what is possible.
+        InputError, FileFormatError: the scene cannot be read.
     """
     limits, costing = command.limits.limits, Costing.of(command.limits.calibration)
     plain = costing.promise(NAME, limits, request_work(command))
     if not limits.given:
         return plain
-    fixed = {} if command.resolution is None else {"side_share": 1.0}
+    looked = limits.tolerance_db is not None and frame_count(command) >= FEW_FRAMES
+    fixed = {"side_share": 1.0} if command.resolution is not None else {}
+    if limits.tolerance_db is not None and not looked:
+        fixed = {"side_share": 1.0}
+    detail = frame_detail(command) if looked and not fixed else USUAL_DETAIL
     return plain.with_choice(
         costing.choose(
             NAME,
             lambda values: request_work(command, values),
             lambda values: agrees(values, fixed),
             limits,
+            lambda values: error_unit(values, detail),
         )
     )
+
+
+def error_unit(values: SettingValues, detail: float) -> float:
+    """What errors of the table are shares of: the frame's detail where frames are smaller."""
+    return 1.0 if values["side_share"] == 1.0 else detail
+
+
+def frame_detail(command: "Render") -> float:
+    """Mean square of what the frame in the middle of the path loses at half of its size."""
+    from diff4splat.cli.common.precompile import precompile_renderer
+    from diff4splat.generation.inputs.image_detail import image_detail
+    from diff4splat.io.checkpoints.import_scene import import_scene
+    from diff4splat.progress.phases import Phases
+    from diff4splat.render.api import render
+
+    scene = import_scene(command.scene).scene
+    precompile_renderer(scene.gaussians, Phases())
+    path = command.chosen_path(scene)
+    middle = len(path) // 2
+    frame = render(scene, path.cameras[middle], float(path.times_s[middle])).rgb
+    return image_detail(frame.clamp(0, 1))
 
 
 def apply(promised: Promise, path: "CameraPath") -> tuple["CameraPath", "RenderSettings"]:

@@ -16,6 +16,8 @@ Work = Mapping[str, float | int]
 PARALLEL = frozenset({"matched_gaussians", "filmed_gaussians", "filmed_pixels", "fitted_pixels"})
 """Work that runs on all cores; the rest runs on one."""
 WORTH_SAYING_S = 5.0
+KNOWN_BYTES = frozenset({"cached_bytes"})
+"""Amounts that are bytes already: nothing is to be measured of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,15 +44,23 @@ class Forecast:
         )
 
 
+def unknown_work(rates: CostRates, work: Work) -> tuple[str, ...]:
+    """Amounts that no measured run had, so that nobody knows what they cost."""
+    measured = rates.seconds.keys() | rates.memory_bytes.keys() | KNOWN_BYTES
+    return tuple(name for name, amount in work.items() if amount > 0 and name not in measured)
+
+
 def forecast(rates: CostRates, work: Work, speed: float, cores: float) -> Forecast:
     """The cost of ``work``; ``speed`` is how many times as slow as the calibration's machine."""
     parts = {name: speed * rate * work.get(name, 0.0) for name, rate in rates.seconds.items()}
     parallel = sum(value for name, value in parts.items() if name in PARALLEL)
     serial = sum(parts.values()) - parallel
+    known = sum(work.get(name, 0.0) for name in KNOWN_BYTES)
+    counted = sum(rate * work.get(name, 0.0) for name, rate in rates.memory_bytes.items())
     return Forecast(
         seconds=serial / min(cores, 1.0) + parallel / cores,
         cpu_seconds=serial + parallel,
-        memory_bytes=sum(rate * work.get(name, 0.0) for name, rate in rates.memory_bytes.items()),
+        memory_bytes=known + counted,
     )
 
 
