@@ -110,6 +110,7 @@ class Calibrate:
         """Rows of every command, from the photos and the scenes that the runs wrote."""
         from diff4splat.cli.calibration import calibration_errors as errors
         from diff4splat.cli.calibration import calibration_runs as runs
+        from diff4splat.cli.calibration.scene_errors import scene_errors
         from diff4splat.io.scene_files.scene_file import load_scene
 
         files = [runs.scene_file(record.folder, "scene", n) for n in (runs.STATIC, runs.PROMPTED)]
@@ -123,7 +124,7 @@ class Calibrate:
                 advance()
             found = []
             for file, scene in zip(files, scenes, strict=True):
-                measure = lambda scene=scene: errors.scene_errors(scene)  # noqa: E731
+                measure = lambda scene=scene: scene_errors(scene)  # noqa: E731
                 found.append(record.once(f"errors of {file.parent.name}", measure))
                 advance()
         return errors.all_rows(photo_errors, scenes, found)

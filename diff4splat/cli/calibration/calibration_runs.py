@@ -13,7 +13,7 @@ from diff4splat.cli.calibration.calibration_inputs import CAPTURE, PROMPT
 from diff4splat.cli.calibration.calibration_record import CalibrationRecord
 from diff4splat.cli.calibration.measured_process import measure_process
 from diff4splat.cli.limits.command_work import command_work
-from diff4splat.outputs.budgets.costs import KNOWN_BYTES, CostRates, other_load
+from diff4splat.outputs.budgets.costs import KNOWN_BYTES, CostRates, Work, other_load
 from diff4splat.outputs.budgets.rates_fit import fit_rates
 from diff4splat.outputs.budgets.speed import measure_speed_s
 
@@ -22,27 +22,26 @@ GENERATE = (
     ("128", "3"),
     ("128", "49", "--skip-depth"),
     ("256", "5", "--infill", "none"),
-    ("256", "33"),
+    ("256", "25"),
     ("256", "5", "--prompt", PROMPT),
     ("320", "3", "--color-matching-steps", "20"),
-    ("448", "9"),
+    ("384", "5"),
     ("512", "3", "--infill", "none", "--skip-depth"),
-    ("256", "3", "--fill", "video", "--steps", "2"),
-    ("256", "3", "--fill", "video"),
+    ("192", "3", "--fill", "video", "--steps", "2"),
+    ("192", "3", "--fill", "video"),
 )
 STATIC, PROMPTED, LARGE = 3, 4, 6
 """Places among ``GENERATE`` of scenes that other runs read."""
 FITS = (
     ("hexplane", "1500", "100", "100", ()),
-    ("hexplane", "6000", "100", "250", ()),
-    ("hexplane", "6000", "100", "250", ("--set", "stillness.min_score=0")),
-    ("spacetime", "1500", "100", "100", ()),
-    ("spacetime", "6000", "100", "250", ("--set", "stillness.min_score=0")),
+    ("hexplane", "6000", "100", "200", ("--set", "stillness.min_score=0")),
+    ("spacetime", "1500", "50", "60", ()),
+    ("spacetime", "6000", "100", "200", ("--set", "stillness.min_score=0")),
     ("static", "1500", "50", "50", ()),
-    ("static", "12000", "100", "150", ()),
+    ("static", "12000", "50", "150", ()),
 )
-"""(motion, budget, coarse steps, fine steps, options)"""
-FIELD, NATIVE = 1, 4
+"""(motion, budget, coarse steps, fine steps, options); without a smallest score all may move."""
+FIELD, NATIVE = 1, 3
 ONNX = (("--shapes-only",), ())
 TRAIN_STAGES = (("test", "vae"), ("test", "static-low"), ("test", "video_diffusion"))
 TRAIN_STEPS = ("4", "16")
@@ -82,10 +81,10 @@ def scene_runs(folder: Path, wide: Path) -> list[Run]:
     runs = [["render", str(large), "--out", str(folder / "view.png")]]
     for n, scene in enumerate((static, moving, wide, native)):
         runs.append(["render", str(scene), "--out", str(folder / f"view-{n}.webm")])
+    for n, scene in enumerate((static, moving, wide)):
         runs.append(["export", "html", str(scene), "--out", str(folder / f"page-{n}.html")])
     longer = ("--camera", "orbit:0.05", "--frames", "40", "--resolution", "320")
     runs.append(["render", str(field), *longer, "--out", str(folder / "long.webm")])
-    runs.append(["render", str(static), *longer, "--out", str(folder / "long-static.webm")])
     baked = ((field, "0.1"), (wide, "1"), (wide, "0.1"), (moving, "0.1"), (native, "0.1"))
     for n, (scene, px) in enumerate(baked):
         out = str(folder / f"baked-{n}.safetensors")
@@ -154,7 +153,7 @@ def measure_costs(
         seen.append(record.once(" ".join(arguments), lambda run=arguments: _measure(run)))
         advance()
     speed_s = statistics.median(one["speed_s"] for one in seen)
-    by_name: dict[str, list[tuple[dict[str, float], float, float]]] = {}
+    by_name: dict[str, list[tuple[Work, float, float]]] = {}
     for arguments, one in zip(runs, seen, strict=True):
         name, work = command_work(arguments)
         seconds = one["cpu_seconds"] * speed_s / one["speed_s"]
@@ -177,7 +176,7 @@ def _measure(arguments: Run) -> dict[str, float]:
     }
 
 
-def rates(measured: list[tuple[dict[str, float], float, float]]) -> CostRates:
+def rates(measured: Sequence[tuple[Work, float, float]]) -> CostRates:
     """Rates of time and memory from (work, processor seconds, bytes) of several runs."""
     work = [one for one, _, _ in measured]
     timed = [{name: one[name] for name in one.keys() - KNOWN_BYTES} for one in work]

@@ -45,7 +45,7 @@ def request_work(command: "Bake", values: SettingValues | None = None) -> dict[s
     }
 
 
-def expected_keys(header: SceneHeader, tolerance_px: float) -> float:
+def expected_keys(header: SceneHeader, tolerance_px: float | int) -> float | int:
     """Key frames that a tolerance needs.
 
     Key frames need their own, and native 4D Gaussians move along lines. Between the nodes of planes
@@ -59,7 +59,7 @@ def expected_keys(header: SceneHeader, tolerance_px: float) -> float:
     return max(header.time_nodes * min(per_node, MOST_KEYS_PER_NODE), 2)
 
 
-def probe_count(header: SceneHeader, keys: float) -> float:
+def probe_count(header: SceneHeader, keys: float | int) -> float | int:
     """Times at which key frames are held against the motion: over the range, then in each gap."""
     rounds = ROUNDS if header.motion == "hexplane" else 1
     return rounds * (PROBES_OF_ALL + header.time_nodes) + PROBES_PER_GAP * max(keys - 1, 0)

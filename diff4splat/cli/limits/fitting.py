@@ -26,13 +26,13 @@ RGB_BYTES, DEPTH_BYTES = 12, 4
 class Growth:
     """Gaussians of a stage."""
 
-    summed: float
+    summed: float | int
     """Over the steps."""
-    last: float
+    last: float | int
 
 
 def work(
-    settings: "FitSettings", capture: "Capture", first_gaussians: float, coarse_steps: int
+    settings: "FitSettings", capture: "Capture", first_gaussians: float | int, coarse_steps: int
 ) -> dict[str, float | int]:
     """Counted work of a fit that starts with ``first_gaussians``."""
     static = settings.motion == "static"
@@ -57,7 +57,7 @@ def work(
     }
 
 
-def grow(first: float, steps: int, density: "DensitySettings") -> Growth:
+def grow(first: float | int, steps: int, density: "DensitySettings") -> Growth:
     """Gaussians at each step, if every splitting step splits as many as it may."""
     from diff4splat.fitting.stage_loop import FIRST_SPLIT_STEP
 
@@ -83,7 +83,7 @@ def first_gaussians(settings: "FitSettings", capture: "Capture") -> int:
     return inner + shell
 
 
-def cached_bytes(settings: "FitSettings", capture: "Capture") -> float:
+def cached_bytes(settings: "FitSettings", capture: "Capture") -> float | int:
     """Images that a fit keeps."""
     height, width = capture.cameras.size_px
     per_pixel = RGB_BYTES + DEPTH_BYTES * settings.use_depth
