@@ -44,7 +44,7 @@ class ExportOnnx:
 
         require_exporter()
         promised, watch = promise(self), Stopwatch.of_process()
-        for line in promised.lines():
+        for line in promised.lines() if promised else ():
             note(line)
         settings = ExportSettings(
             precision=self.precision,
@@ -57,7 +57,7 @@ class ExportOnnx:
             rows = export_model(model, self.out, settings, advance)
         for row in rows:
             note(f"{row.graph}: relative error {max(row.errors.values()):.1e}")
-        for line in promised.after(watch.read()):
+        for line in promised.after(watch.read()) if promised else ():
             note(line)
         use = f"diff4splat generate PHOTO --model {self.out} runs it"
         note(

@@ -124,7 +124,7 @@ class Fit:
         if self.renderer in ("auto", "raster"):
             precompile_renderer(single_gaussian("cpu"), log.phases)
         promised, watch = promise(self, settings, capture), Stopwatch.of_process()
-        if self.restart or not (self.out / CHECKPOINT_FILE).is_file():
+        if promised and (self.restart or not (self.out / CHECKPOINT_FILE).is_file()):
             for line in promised.lines():
                 note(line)
         renderer = FrameRenderer(capture=capture, backend=self.renderer, settings=settings.camera)
@@ -148,7 +148,7 @@ class Fit:
             capture=capture,
             settings=settings,
             inputs=self.inputs(),
-            forecast=lambda: promised.record(watch.read()),
+            forecast=(lambda: promised.record(watch.read())) if promised else None,
         )
         scene, scene_file = write_results(report, self.out, log, self.compression)
         for line in result.skipped_work:

@@ -5,7 +5,7 @@ run beside others counts like one alone.
 """
 
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,15 +43,16 @@ FITS = (
 """(motion, budget, coarse steps, fine steps, options); without a smallest score all may move."""
 FIELD, NATIVE = 1, 3
 ONNX = (("--shapes-only",), ())
+SCENE_COMMANDS = frozenset({"render", "bake", "export html"})
 TRAIN_STAGES = (("test", "vae"), ("test", "static-low"), ("test", "video_diffusion"))
 TRAIN_STEPS = ("4", "16")
 MEMORY_AMOUNTS = frozenset(
     (
         *("start", "gaussians", "packed_gaussians", "depth_pixels", "prompted", "video_fill"),
-        *("held_gaussians", "held_keys", "captured_pixels", "stored_weights"),
+        *("held_gaussians", "held_keys", "moved_gaussians", "stored_weights"),
     )
 )
-"""What is held at once; frames are written as they come, and steps leave nothing behind."""
+"""What is held at once; other frames are written as they come, and steps leave nothing behind."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +160,7 @@ def measure_costs(
         seconds = one["cpu_seconds"] * speed_s / one["speed_s"]
         by_name.setdefault(name, []).append((work, seconds, one["memory_bytes"]))
     return Costs(
-        rates={name: rates(measured) for name, measured in by_name.items()},
+        rates=rates_together(by_name),
         speed_s=speed_s,
         load=statistics.fmean(one["load"] for one in seen),
     )
@@ -174,6 +175,29 @@ def _measure(arguments: Run) -> dict[str, float]:
         "speed_s": (before_s * measure_speed_s()) ** 0.5,
         "load": load,
     }
+
+
+def rates_together(
+    measured: Mapping[str, Sequence[tuple[Work, float, float]]],
+) -> dict[str, CostRates]:
+    """Rates of several commands; the start of those that read a scene is one and the same."""
+    apart = {name: rates(runs) for name, runs in measured.items() if name not in SCENE_COMMANDS}
+    joint = [
+        ({_own(name, amount): value for amount, value in work.items()}, seconds, memory)
+        for name in SCENE_COMMANDS
+        for work, seconds, memory in measured.get(name, ())
+    ]
+    seconds = rates(joint).seconds if joint else {}
+    for name in SCENE_COMMANDS & measured.keys():
+        amounts = {amount for work, _, _ in measured[name] for amount in work}
+        owned = {amount: seconds.get(_own(name, amount)) for amount in amounts}
+        kept = {amount: rate for amount, rate in owned.items() if rate is not None}
+        apart[name] = CostRates(seconds=kept, memory_bytes=rates(measured[name]).memory_bytes)
+    return {name: apart[name] for name in measured}
+
+
+def _own(command: str, amount: str) -> str:
+    return amount if amount == "start" else f"{command}: {amount}"
 
 
 def rates(measured: Sequence[tuple[Work, float, float]]) -> CostRates:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import read_scene_header
-from diff4splat.outputs.budgets.limits import Limits
 
 if TYPE_CHECKING:
     from diff4splat.cli.fit import Fit
@@ -45,13 +44,12 @@ def work(
     pixels, share = height * width, 1.0 if settings.stillness.min_score <= 0 else MOVING_SHARE
     return {
         "start": 1,
-        f"stage {settings.motion}": 1,
+        f"stage {settings.motion}": 0 if static else 1,
         "fit_steps static": steps - fine_steps,
         f"fit_steps {settings.motion}": settings.fine_steps,
         "fitted_gaussians": views * (coarse.summed + fine.summed),
         f"moved_gaussians {settings.motion}": 0 if static else share * fine.summed,
         "fitted_pixels": pixels * views * steps,
-        "captured_pixels": pixels * len(capture),
         "held_gaussians": fine.last,
         "cached_bytes": cached_bytes(settings, capture),
     }
@@ -104,9 +102,9 @@ def capture_work(
     return work(settings, capture, first_gaussians(settings, capture), settings.coarse_steps)
 
 
-def promise(command: "Fit", settings: "FitSettings", capture: "Capture") -> Promise:
-    """What a fit from its start is expected to need."""
-    return Costing.of().promise(NAME, Limits(), capture_work(command, settings, capture))
+def promise(command: "Fit", settings: "FitSettings", capture: "Capture") -> Promise | None:
+    """What a fit from its start is expected to need; None for a motion that was not measured."""
+    return Costing.of().plain_promise(NAME, capture_work(command, settings, capture))
 
 
 def _depth_points(capture: "Capture") -> int:

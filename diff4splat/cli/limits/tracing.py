@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 from diff4splat.cli.limits.costing import Costing, Promise
-from diff4splat.outputs.budgets.limits import Limits
 
 if TYPE_CHECKING:
     from torch import nn
@@ -43,6 +42,6 @@ def weight_count(module: "nn.Module") -> int:
     return sum(one.numel() for one in module.parameters())
 
 
-def promise(command: "ExportOnnx") -> Promise:
-    """What the export is expected to need."""
-    return Costing.of().promise(NAME, Limits(), request_work(command))
+def promise(command: "ExportOnnx") -> Promise | None:
+    """What the export is expected to need; None where no export was measured."""
+    return Costing.of().plain_promise(NAME, request_work(command))

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 from diff4splat.cli.limits.costing import Costing, Promise
-from diff4splat.outputs.budgets.limits import Limits
 
 if TYPE_CHECKING:
     from diff4splat.cli.train import Train
@@ -22,5 +21,4 @@ def request_work(command: "Train") -> dict[str, float | int]:
 
 def promise(command: "Train") -> Promise | None:
     """What the call is expected to need; None for stages that were not measured."""
-    costing, work = Costing.of(), request_work(command)
-    return costing.promise(NAME, Limits(), work) if costing.knows(NAME, work) else None
+    return Costing.of().plain_promise(NAME, request_work(command))
