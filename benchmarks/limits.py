@@ -33,7 +33,7 @@ from diff4splat.cli.calibration.measured_process import measure_process
 from diff4splat.cli.common.parser import parse
 from diff4splat.cli.limits import baking, exporting, generation, rendering
 from diff4splat.cli.limits.costing import Costing, Promise
-from diff4splat.errors import ConfigError
+from diff4splat.errors import Diff4SplatError
 from diff4splat.io.scene_files.scene_file import load_scene
 from diff4splat.outputs.budgets.costs import FREE_CORES
 from diff4splat.outputs.budgets.limits import loss_from_error
@@ -209,7 +209,7 @@ def request(number: int, sources: dict[str, list[Path]], seed: int) -> Held:
             else:
                 held = within_tolerance(name, source, loss_db, draw)
             return replace(held, refused=tuple(refused))
-        except ConfigError as error:
+        except Diff4SplatError as error:
             refused.append(str(error))
     raise RuntimeError(f"request {number}: expected one that holds, got {refused[-1]}")
 

@@ -107,7 +107,7 @@ class Costing:
         return choose(options, limits)
 
     def plain_promise(self, command: str, work: Work) -> "Promise | None":
-        """The same without limits; None for work that was not measured, of which nothing is said."""
+        """The same without limits; None for work that was not measured: nothing is said of it."""
         return self.promise(command, Limits(), work) if self.knows(command, work) else None
 
     def promise(self, command: str, limits: Limits, work: Work) -> "Promise":

@@ -3,6 +3,7 @@
 Settings are the cut-off of contributions and how many pixels are rendered for one of the output.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.outputs.budgets.choose import agrees
 from diff4splat.outputs.budgets.limits import loss_from_error
-from diff4splat.outputs.budgets.table import SettingValues
+from diff4splat.outputs.budgets.table import SettingRow, SettingValues
 
 if TYPE_CHECKING:
     from diff4splat.cli.scenes.render import Render
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 NAME = "render"
 USUAL_DETAIL = 1e-3
 """Of a frame, where it is not measured: with a budget alone, only the order of errors counts."""
-FEW_FRAMES = 4
-"""For fewer, looking at one costs more than smaller ones save."""
+FEW_FRAMES, LOOKS = 8, (1 / 3, 2 / 3)
+"""With fewer frames, looking at two of them, at these places, costs more than smaller ones save."""
 DEFAULT_CUTOFF = 1 / 255
 CUTOFFS = (1 / 4096, 1 / 1024, DEFAULT_CUTOFF, 1 / 64, 1 / 16)
 SIDE_SHARES = (1.0, 0.75, 0.5)
@@ -77,7 +78,7 @@ def frame_count(command: "Render") -> int:
 def promise(command: "Render") -> Promise:
     """What the command is expected to need, with the settings that its limits ask for.
 
-    With a tolerance, a frame in the middle is rendered to see how much detail smaller ones lose.
+    With a tolerance, two frames are rendered to see how much smaller ones lose of this scene.
 
     Raises:
         ConfigError: no setting holds; says what is possible.
@@ -87,31 +88,39 @@ def promise(command: "Render") -> Promise:
     plain = costing.promise(NAME, limits, request_work(command))
     if not limits.given:
         return plain
-    looked = limits.tolerance_db is not None and frame_count(command) >= FEW_FRAMES
-    fixed = {"side_share": 1.0} if command.resolution is not None else {}
-    if limits.tolerance_db is not None and not looked:
-        fixed = {"side_share": 1.0}
-    detail = frame_detail(command) if looked and not fixed else USUAL_DETAIL
+    full_size = command.resolution is not None or (
+        limits.tolerance_db is not None and frame_count(command) < FEW_FRAMES
+    )
+    units = dict.fromkeys(SIDE_SHARES, USUAL_DETAIL) | {1.0: 1.0}
+    if limits.tolerance_db is not None and not full_size:
+        units |= measured_units(command, costing.table.of(NAME)[1])
+    fixed = {"side_share": 1.0} if full_size else {}
     return plain.with_choice(
         costing.choose(
             NAME,
             lambda values: request_work(command, values),
             lambda values: agrees(values, fixed),
             limits,
-            lambda values: error_unit(values, detail),
+            lambda values: units[values["side_share"]],
         )
     )
 
 
-def error_unit(values: SettingValues, detail: float) -> float:
-    """What errors of the table are shares of: the frame's detail where frames are smaller."""
-    return 1.0 if values["side_share"] == 1.0 else detail
+def measured_units(command: "Render", rows: Sequence[SettingRow]) -> dict[float, float]:
+    """By how much errors of the table at each smaller share count for this scene."""
+    listed = {
+        row.values["side_share"]: row.error
+        for row in rows
+        if row.values["alpha_cutoff"] == DEFAULT_CUTOFF
+    }
+    errors = share_errors(command)
+    return {share: error / max(listed.get(share, 1.0), 1e-9) for share, error in errors.items()}
 
 
-def frame_detail(command: "Render") -> float:
-    """Mean square of what the frame in the middle of the path loses at half of its size."""
+def share_errors(command: "Render") -> dict[float, float]:
+    """Mean square error of smaller frames, the larger of two places on the path."""
     from diff4splat.cli.common.precompile import precompile_renderer
-    from diff4splat.generation.inputs.image_detail import image_detail
+    from diff4splat.cli.limits.measured import frame_error
     from diff4splat.io.checkpoints.import_scene import import_scene
     from diff4splat.progress.phases import Phases
     from diff4splat.render.api import render
@@ -119,9 +128,20 @@ def frame_detail(command: "Render") -> float:
     scene = import_scene(command.scene).scene
     precompile_renderer(scene.gaussians, Phases())
     path = command.chosen_path(scene)
-    middle = len(path) // 2
-    frame = render(scene, path.cameras[middle], float(path.times_s[middle])).rgb
-    return image_detail(frame.clamp(0, 1))
+    errors = dict.fromkeys(SIDE_SHARES[1:], 0.0)
+    for place in LOOKS:
+        index = int(place * (len(path) - 1))
+        time_s = float(path.times_s[index]) if command.time is None else command.time
+        exact = render(scene, path.cameras[index], time_s).rgb
+        for share in errors:
+            frame = render(scene, at_share(path, share).cameras[index], time_s).rgb
+            errors[share] = max(errors[share], frame_error(frame, exact))
+    return errors
+
+
+def error_unit(values: SettingValues, detail: float) -> float:
+    """What errors of the table are shares of: the frame's detail where frames are smaller."""
+    return 1.0 if values["side_share"] == 1.0 else detail
 
 
 def apply(promised: Promise, path: "CameraPath") -> tuple["CameraPath", "RenderSettings"]:
