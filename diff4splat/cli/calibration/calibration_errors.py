@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from diff4splat.generation.pipeline import Diff4SplatPipeline
     from diff4splat.scene.scene import Scene
 
-CAMERA, FRAMES, SEED, SIDE_PX = "arc:0.1", 3, 0, 160
+CAMERA, FRAMES, SEED, SIDE_PX = "arc:0.1", 3, 0, 192
 
 
 def generation_settings() -> list[SettingValues]:

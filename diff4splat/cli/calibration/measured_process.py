@@ -40,6 +40,7 @@ def measure_process(arguments: Sequence[str]) -> MeasuredProcess:
             status, used, peak = _watched(process.pid)
         except BaseException:
             process.kill()  # A command that nobody waits for would go on, and hold its folder.
+            process.wait()
             raise
         process.returncode = os.waitstatus_to_exitcode(status)
         printed.seek(0)

@@ -24,7 +24,13 @@ from diff4splat.outputs.budgets.speed import (
     measure_speed_s,
     require_comparable,
 )
-from diff4splat.outputs.budgets.table import RENEW, CalibrationTable, SettingValues, find_table
+from diff4splat.outputs.budgets.table import (
+    RENEW,
+    CalibrationTable,
+    SettingRow,
+    SettingValues,
+    find_table,
+)
 
 
 @dataclass(frozen=True)
@@ -84,11 +90,11 @@ class Costing:
         work: Callable[[SettingValues], Work],
         allowed: Callable[[SettingValues], bool],
         limits: Limits,
-        scale: Callable[[SettingValues], float] = lambda _: 1.0,
+        error: Callable[[SettingRow], float] = lambda row: row.error,
     ) -> Choice:
         """The setting of ``command`` among the ``allowed`` ones that the limits ask for.
 
-        Errors of the table are multiplied by ``scale``, where they are shares of something.
+        ``error`` is what a row of the table means here, where it is a share of something.
 
         Raises:
             ConfigError: none holds; says what is possible. Or the table's machine is too different.
@@ -99,7 +105,7 @@ class Costing:
             Choice(
                 values=row.values,
                 expected=self.forecast(command, work(row.values)),
-                error=row.error * scale(row.values),
+                error=error(row),
             )
             for row in rows
             if allowed(row.values)

@@ -99,7 +99,7 @@ def promise(command: "Generate") -> tuple["Generate", Promise]:
         lambda values: _setting_work(command, values, full_px, frames),
         lambda values: agrees(values, fixed(command)) and _keeps_shape(command, values, full_px),
         limits,
-        lambda _: detail,
+        lambda row: row.error * detail,
     )
     return with_setting(command, choice.values, full_px), plain.with_choice(choice)
 

@@ -3,7 +3,6 @@
 Settings are the cut-off of contributions and how many pixels are rendered for one of the output.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.outputs.budgets.choose import agrees
 from diff4splat.outputs.budgets.limits import loss_from_error
-from diff4splat.outputs.budgets.table import SettingRow, SettingValues
+from diff4splat.outputs.budgets.table import SettingValues
 
 if TYPE_CHECKING:
     from diff4splat.cli.scenes.render import Render
@@ -22,8 +21,8 @@ if TYPE_CHECKING:
 NAME = "render"
 USUAL_DETAIL = 1e-3
 """Of a frame, where it is not measured: with a budget alone, only the order of errors counts."""
-FEW_FRAMES, LOOKS = 8, (1 / 3, 2 / 3)
-"""With fewer frames, looking at two of them, at these places, costs more than smaller ones save."""
+FEW_FRAMES = 8
+"""For fewer, looking at the one in the middle costs more than a cheaper setting saves."""
 DEFAULT_CUTOFF = 1 / 255
 CUTOFFS = (1 / 4096, 1 / 1024, DEFAULT_CUTOFF, 1 / 64, 1 / 16)
 SIDE_SHARES = (1.0, 0.75, 0.5)
@@ -78,65 +77,38 @@ def frame_count(command: "Render") -> int:
 def promise(command: "Render") -> Promise:
     """What the command is expected to need, with the settings that its limits ask for.
 
-    With a tolerance, two frames are rendered to see how much smaller ones lose of this scene.
+    With a tolerance, the frame in the middle is rendered to see what this scene loses.
 
     Raises:
         ConfigError: no setting holds; says what is possible.
         InputError, FileFormatError: the scene cannot be read.
     """
+    from diff4splat.cli.limits.looking import expected_error, looked_errors
+
     limits, costing = command.limits.limits, Costing.of(command.limits.calibration)
     plain = costing.promise(NAME, limits, request_work(command))
     if not limits.given:
         return plain
-    full_size = command.resolution is not None or (
-        limits.tolerance_db is not None and frame_count(command) < FEW_FRAMES
-    )
-    units = dict.fromkeys(SIDE_SHARES, USUAL_DETAIL) | {1.0: 1.0}
-    if limits.tolerance_db is not None and not full_size:
-        units |= measured_units(command, costing.table.of(NAME)[1])
-    fixed = {"side_share": 1.0} if full_size else {}
+    fixed = {} if command.resolution is None else {"side_share": 1.0}
+    looked: dict[tuple[float, float], float] = {}
+    if limits.tolerance_db is not None and frame_count(command) >= FEW_FRAMES:
+        looked = looked_errors(command)
+    elif limits.tolerance_db is not None:
+        fixed = {"side_share": 1.0}
+    full = {
+        row.values["alpha_cutoff"]: row.error
+        for row in costing.table.of(NAME)[1]
+        if row.values["side_share"] == 1.0
+    }
     return plain.with_choice(
         costing.choose(
             NAME,
             lambda values: request_work(command, values),
             lambda values: agrees(values, fixed),
             limits,
-            lambda values: units[values["side_share"]],
+            lambda row: expected_error(row, full, looked),
         )
     )
-
-
-def measured_units(command: "Render", rows: Sequence[SettingRow]) -> dict[float, float]:
-    """By how much errors of the table at each smaller share count for this scene."""
-    listed = {
-        row.values["side_share"]: row.error
-        for row in rows
-        if row.values["alpha_cutoff"] == DEFAULT_CUTOFF
-    }
-    errors = share_errors(command)
-    return {share: error / max(listed.get(share, 1.0), 1e-9) for share, error in errors.items()}
-
-
-def share_errors(command: "Render") -> dict[float, float]:
-    """Mean square error of smaller frames, the larger of two places on the path."""
-    from diff4splat.cli.common.precompile import precompile_renderer
-    from diff4splat.cli.limits.measured import frame_error
-    from diff4splat.io.checkpoints.import_scene import import_scene
-    from diff4splat.progress.phases import Phases
-    from diff4splat.render.api import render
-
-    scene = import_scene(command.scene).scene
-    precompile_renderer(scene.gaussians, Phases())
-    path = command.chosen_path(scene)
-    errors = dict.fromkeys(SIDE_SHARES[1:], 0.0)
-    for place in LOOKS:
-        index = int(place * (len(path) - 1))
-        time_s = float(path.times_s[index]) if command.time is None else command.time
-        exact = render(scene, path.cameras[index], time_s).rgb
-        for share in errors:
-            frame = render(scene, at_share(path, share).cameras[index], time_s).rgb
-            errors[share] = max(errors[share], frame_error(frame, exact))
-    return errors
 
 
 def error_unit(values: SettingValues, detail: float) -> float:

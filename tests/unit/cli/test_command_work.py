@@ -5,16 +5,17 @@ from pathlib import Path
 
 import coded_scenes
 import pytest
+import torch
 
 from diff4splat.cli.common.parser import parse
-from diff4splat.cli.limits import baking, fitting, rendering, tracing, training
+from diff4splat.cli.limits import baking, fitting, looking, rendering, tracing, training
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.errors import ConfigError
 from diff4splat.fitting.settings import DensitySettings
 from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.outputs.budgets.costs import FREE_CORES, CostRates, Forecast, free_cores
-from diff4splat.outputs.budgets.limits import Limits
+from diff4splat.outputs.budgets.limits import Limits, loss_from_error
 from diff4splat.outputs.budgets.table import find_table
 from diff4splat.scene.motion.hexplane.planes import PLANE_NAMES
 
@@ -128,3 +129,25 @@ def test_cores_can_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv(FREE_CORES, text)
         with pytest.raises(ConfigError, match=f"{FREE_CORES}: expected a number of cores"):
             free_cores()
+
+
+def test_a_tolerance_of_render_looks_at_the_scene(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """What the middle frame loses decides, not the table alone."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("diff4splat.cli.limits.costing.measure_speed_s", lambda: 0.006)
+    scene = coded_scenes.scene("static")
+    cameras = scene.path.cameras[torch.zeros(8, dtype=torch.long)]
+    path = replace(scene.path, cameras=cameras, times_s=torch.linspace(0, 1, 8))
+    save_scene(replace(scene, path=path), tmp_path / "s.safetensors")
+    words = ["render", str(tmp_path / "s.safetensors"), "--out", "x.webm", "--tolerance"]
+    errors = looking.looked_errors(parse([*words, "1dB"]))
+    assert 0 < errors[0.75, 1 / 255] < errors[0.5, 1 / 255]
+    assert errors[1.0, 1 / 64] < errors[1.0, 1 / 16]
+    losses = (loss_from_error(1.3 * (errors[0.75, 1 / 255] + errors[1.0, 1 / 16])), 1e-3)
+    shares = [
+        rendering.promise(parse([*words, f"{loss:.6f}dB"])).choice.values["side_share"]
+        for loss in losses
+    ]
+    assert shares[0] < shares[1] == 1.0
