@@ -126,9 +126,11 @@ def measured_error(
     """What a command chooses, and the error of that against its reference setting."""
     if name == "generate":
         camera = draw.choice(("arc:0.05", "arc:0.15", "orbit:0.02", "left:0.1", "spiral"))
-        promised = generation.promise(parse([name, str(source), "--camera", camera, *limit]))[1]
-        made = calibration_errors.generated_frames(source, promised.choice.values, camera=camera)
-        return promised, scene_errors.mean_error(made, exact_generation(source, camera))
+        command = parse([name, str(source), "--camera", camera, *limit])
+        promised, side_px = generation.promise(command)[1], generation.image_side(command)[0]
+        values = promised.choice.values
+        made = calibration_errors.generated_frames(source, values, side_px=side_px, camera=camera)
+        return promised, scene_errors.mean_error(made, exact_generation(source, side_px, camera))
     if name == "render":
         promised = rendering.promise(parse([name, str(source), "--out", "x.webm", *limit]))
         exact = exact_views(source)
@@ -145,10 +147,10 @@ def measured_error(
 
 
 @cache
-def exact_generation(photo: Path, camera: str) -> list:
+def exact_generation(photo: Path, side_px: int, camera: str) -> list:
     """Frames of the reference setting of ``generate``."""
     reference = {"side_share": 1.0, "color_matching_steps": generation.REFERENCE_STEPS}
-    return calibration_errors.generated_frames(photo, reference, camera=camera)
+    return calibration_errors.generated_frames(photo, reference, side_px=side_px, camera=camera)
 
 
 @cache

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from diff4splat.cli.scenes.render import Render
 
-LOOKED_CUTOFFS = CUTOFFS[3:]
+LOOKED_CUTOFFS = CUTOFFS[1:]
 SPREAD = 1.25
 """How much more other frames lose than the one in the middle."""
 
