@@ -80,7 +80,7 @@ def generated_frames(
 def all_rows(
     photos: Sequence[Sequence[float]],
     scenes: Sequence["Scene"],
-    found: Sequence[Mapping[str, Sequence[float]]],
+    measured: Sequence[Mapping[str, Sequence[float]]],
 ) -> dict[str, tuple[SettingRow, ...]]:
     """Rows of every command, from ``photo_errors`` and ``scene_errors`` of the inputs."""
     moving = [len(scene.motion.moving_index) > 0 for scene in scenes]
@@ -89,9 +89,9 @@ def all_rows(
     ]
     return {
         "generate": worst_rows(generation_settings(), photos),
-        "render": worst_rows(render_settings(), [one["render"] for one in found]),
-        "export html": worst_rows(html_settings(), [one["export html"] for one in found]),
-        "bake": rows_of_kinds(settings, [one["bake"] for one in found]),
+        "render": worst_rows(render_settings(), [one["render"] for one in measured]),
+        "export html": worst_rows(html_settings(), [one["export html"] for one in measured]),
+        "bake": rows_of_kinds(settings, [one["bake"] for one in measured]),
     }
 
 

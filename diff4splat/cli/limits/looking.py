@@ -37,7 +37,8 @@ def expected_error(
     if not looked:
         return row.error * error_unit(row.values, USUAL_DETAIL)
     of_cutoff = looked.get((1.0, cutoff), full.get(cutoff, row.error))
-    return SPREAD * (looked.get((share, DEFAULT_CUTOFF), 0.0) + of_cutoff)
+    of_size = 0.0 if share == 1.0 else looked[share, DEFAULT_CUTOFF]
+    return SPREAD * (of_size + of_cutoff)
 
 
 def looked_errors(command: "Render") -> dict[tuple[float, float], float]:
