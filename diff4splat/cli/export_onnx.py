@@ -32,6 +32,8 @@ class ExportOnnx:
     def run(self) -> None:
         """Export, compare, say where it is."""
         from diff4splat.cli.common.console import ConsolePhases, note
+        from diff4splat.cli.limits.stopwatch import Stopwatch
+        from diff4splat.cli.limits.tracing import promise
         from diff4splat.models.hub.model import load_model
         from diff4splat.models.onnx_export.export import require_exporter
         from diff4splat.models.onnx_export.folder import (
@@ -41,6 +43,9 @@ class ExportOnnx:
         )
 
         require_exporter()
+        promised, watch = promise(self), Stopwatch.of_process()
+        for line in promised.lines() if promised else ():
+            note(line)
         settings = ExportSettings(
             precision=self.precision,
             shapes_only=self.shapes_only,
@@ -52,6 +57,8 @@ class ExportOnnx:
             rows = export_model(model, self.out, settings, advance)
         for row in rows:
             note(f"{row.graph}: relative error {max(row.errors.values()):.1e}")
+        for line in promised.after(watch.read()) if promised else ():
+            note(line)
         use = f"diff4splat generate PHOTO --model {self.out} runs it"
         note(
             f"wrote {self.out}; " + ("shapes alone, which cannot run" if self.shapes_only else use)

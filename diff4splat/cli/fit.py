@@ -109,6 +109,8 @@ class Fit:
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
+        from diff4splat.cli.limits.fitting import promise
+        from diff4splat.cli.limits.stopwatch import Stopwatch
         from diff4splat.fitting.checkpoints.checkpoint import CHECKPOINT_FILE
         from diff4splat.fitting.fit_types import FitRequest
         from diff4splat.fitting.frames.frame_renderer import FrameRenderer
@@ -121,6 +123,10 @@ class Fit:
             note(line)
         if self.renderer in ("auto", "raster"):
             precompile_renderer(single_gaussian("cpu"), log.phases)
+        promised, watch = promise(self, settings, capture), Stopwatch.of_process()
+        if promised and (self.restart or not (self.out / CHECKPOINT_FILE).is_file()):
+            for line in promised.lines():
+                note(line)
         renderer = FrameRenderer(capture=capture, backend=self.renderer, settings=settings.camera)
         if renderer.traced:
             precompile_tracer(log.phases)
@@ -137,7 +143,13 @@ class Fit:
             note=note,
         )
         result = self._fit_in_view(request)
-        report = FitReport(result=result, capture=capture, settings=settings, inputs=self.inputs())
+        report = FitReport(
+            result=result,
+            capture=capture,
+            settings=settings,
+            inputs=self.inputs(),
+            forecast=(lambda: promised.record(watch.read())) if promised else None,
+        )
         scene, scene_file = write_results(report, self.out, log, self.compression)
         for line in result.skipped_work:
             note(f"left out: {line}")

@@ -60,9 +60,14 @@ class Train:
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer, precompile_sources
+        from diff4splat.cli.limits.stopwatch import Stopwatch
+        from diff4splat.cli.limits.training import promise
         from diff4splat.training.train_stage import StageRequest, is_main_process, train_stage
 
         recipe, phases = self.recipe(), ConsolePhases()
+        promised, watch = promise(self), Stopwatch.of_process()
+        for line in promised.lines() if promised else ():
+            note(line)
         precompile_renderer(single_gaussian("cpu"), phases)
         precompile_sources(recipe.stage(self.stage).data.sources, phases)
         request = StageRequest(
@@ -81,6 +86,8 @@ class Train:
         result = train_stage(request)
         if not is_main_process():
             return
+        for line in promised.after(watch.read()) if promised else ():
+            note(line)
         measures = ", ".join(f"{name} {value:.4g}" for name, value in result.measures.items())
         total = recipe.stage(self.stage).steps
         more = "" if result.outcome == "finished" else "; the same command goes on"

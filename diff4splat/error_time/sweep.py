@@ -1,4 +1,4 @@
-"""Measure every setting of a knob: seconds and error, the Pareto front, the best choice in limits.
+"""Measure every setting of a knob: seconds and error, and the Pareto front.
 
 Timings are interleaved (all settings once, then all again), so that a machine that slows down does
 not favour the settings that came first. The fastest of the repeats counts: other programs can only
@@ -56,36 +56,6 @@ class SweepResult:
             if math.isfinite(row.error) and (not front or row.error < front[-1].error):
                 front.append(row)
         return tuple(front)
-
-    def cheapest_within(self, tolerance: float) -> Measurement:
-        """The fastest row with an error of at most ``tolerance``.
-
-        Raises:
-            ConfigError: no setting is that exact.
-        """
-        fitting = [row for row in self.rows if row.error <= tolerance]
-        if not fitting:
-            best = min(self.rows, key=lambda row: row.error)
-            raise ConfigError(
-                f"tolerance: expected at least {best.error:.3g} ({self.knob.error_unit}), "
-                f"reached by {self.knob.name} {best.setting}, got {tolerance:.3g}"
-            )
-        return min(fitting, key=lambda row: row.seconds)
-
-    def best_within(self, budget_s: float) -> Measurement:
-        """The most exact row that takes at most ``budget_s`` seconds.
-
-        Raises:
-            ConfigError: no setting is that fast.
-        """
-        fitting = [row for row in self.rows if row.seconds <= budget_s]
-        if not fitting:
-            fastest = min(self.rows, key=lambda row: row.seconds)
-            raise ConfigError(
-                f"budget: expected at least {fastest.seconds:.3g} s, "
-                f"taken by {self.knob.name} {fastest.setting}, got {budget_s:.3g} s"
-            )
-        return min(fitting, key=lambda row: row.error)
 
 
 def sweep(

@@ -6,7 +6,7 @@ Axes: ``t`` frames, ``h w`` pixels.
 import json
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -50,6 +50,8 @@ class FitReport:
     settings: FitSettings
     inputs: dict[str, object]
     """Command line options, for ``card.json``."""
+    forecast: Callable[[], Mapping[str, object]] | None = None
+    """What the fit was expected to need against what it took, asked when all else is written."""
 
 
 def fitted_scene(report: FitReport) -> Scene:
@@ -147,6 +149,7 @@ def _card(report: FitReport, scene: Scene, log: RunLog, scene_file: SceneFileFac
         "seconds": {name: round(value, 3) for name, value in log.phases.seconds.items()},
         "seconds_fitting": round(result.seconds, 3),
         "peak_memory_bytes": peak_memory_bytes(),
+        "forecast": None if report.forecast is None else report.forecast(),
         "left_out": [*result.skipped_work.to_json(), *log.skipped.to_json()],
         "versions": {name: version(name) for name in LIBRARIES},
         "machine": {

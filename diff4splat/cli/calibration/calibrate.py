@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 from diff4splat.cli.options.constraints import InputPath, OutputFile
 
 if TYPE_CHECKING:
-    from diff4splat.outputs.budgets.costs import CostRates
+    from diff4splat.cli.calibration.calibration_record import CalibrationRecord
+    from diff4splat.cli.calibration.calibration_runs import Costs
     from diff4splat.outputs.budgets.table import CalibrationTable, SettingRow
     from diff4splat.progress.phases import Phases
 
@@ -18,86 +18,124 @@ if TYPE_CHECKING:
 class Calibrate:
     """Measure what commands cost here and what each setting loses; takes minutes.
 
-    `--tolerance`, `--budget` and `diff4splat forecast` then use the table.
+    A call that is stopped goes on where it was. `--tolerance`, `--budget` and `forecast` then use
+    the table.
     """
 
     out: Annotated[Path | None, OutputFile(suffixes=(".json",))] = None
     """Table to write. Default: in the user's cache, where commands find it."""
     images: Annotated[tuple[Path, ...], InputPath(what="a photograph", folder=False)] = ()
-    """Photographs to measure on, beside four drawn worlds."""
+    """Photographs to measure on, beside two drawn worlds."""
     rates_only: bool = False
     """Measure times and memory alone, and keep the errors of the table in use: faster."""
     train: bool = False
-    """Also train stages of the recipe test for a few steps."""
+    """Also train stages of the recipe test for a few steps; else the rates in use are scaled."""
+    onnx: bool = False
+    """Also export the model test as ONNX graphs, which takes a minute; else as above."""
 
     def run(self) -> None:
-        """Measure and write."""
+        """Measure and write; a call that was stopped is gone on with."""
+        from diff4splat.cli.calibration.calibration_record import CalibrationRecord
         from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.common.installation import single_gaussian
-        from diff4splat.cli.common.precompile import precompile_renderer
         from diff4splat.outputs.budgets.table import user_table_file, write_table
 
         file = self.out or user_table_file()
-        phases = ConsolePhases()
-        # Compilation must not count.
-        precompile_renderer(single_gaussian("cpu"), phases)
-        with TemporaryDirectory(prefix="diff4splat-calibration-") as folder:
-            table = self.measure(Path(folder), phases)
+        parts = file.with_name(f"{file.stem}.parts")
+        record = CalibrationRecord(parts, self.inputs())
+        if record.numbers:
+            note(f"going on from an interrupted calibration: {parts}")
+        table = self.measure(record, ConsolePhases())
         write_table(table, file)
+        record.remove()
         note(f"wrote {file}")
 
-    def measure(self, folder: Path, phases: "Phases") -> "CalibrationTable":
+    def inputs(self) -> dict[str, object]:
+        """What the numbers depend on."""
+        from hashlib import sha256
+
+        return {
+            "images": [sha256(image.read_bytes()).hexdigest() for image in self.images],
+            "rates_only": self.rates_only,
+            "train": self.train,
+            "onnx": self.onnx,
+        }
+
+    def measure(self, record: "CalibrationRecord", phases: "Phases") -> "CalibrationTable":
         """All rates, then all errors."""
         from diff4splat import __version__
-        from diff4splat.outputs.budgets.speed import machine_name, measure_speed_s
+        from diff4splat.outputs.budgets.speed import machine_name
         from diff4splat.outputs.budgets.table import CalibrationTable, find_table
 
-        photos, rates = self.measured_rates(folder, phases)
-        settings = find_table().settings if self.rates_only else self.errors(folder, photos, phases)
+        known = find_table()
+        photos, costs = self.costs(record, phases)
+        rows = known.settings if self.rates_only else self.errors(record, photos, phases)
         return CalibrationTable(
             diff4splat=__version__,
             machine=machine_name(),
-            speed_s=measure_speed_s(),
+            speed_s=costs.speed_s,
+            load=round(costs.load, 1),
             inputs=tuple(photo.stem for photo in photos),
-            rates=rates,
-            settings=settings,
+            rates=known.rates_at(costs.speed_s) | costs.rates,
+            settings=rows,
         )
 
-    def measured_rates(
-        self, folder: Path, phases: "Phases"
-    ) -> tuple[list[Path], dict[str, "CostRates"]]:
-        """(photos, rates by command); scenes and fits stay in ``folder``."""
+    def costs(self, record: "CalibrationRecord", phases: "Phases") -> tuple[list[Path], "Costs"]:
+        """(photos, rates of all commands); scenes and fits stay in the folder of the record."""
         from diff4splat.cli.calibration import calibration_inputs as inputs
         from diff4splat.cli.calibration import calibration_runs as runs
-        from diff4splat.cli.calibration.measured_process import measure_process
 
+        folder = record.folder
         with phases.phase("draw inputs", 2) as advance:
-            photos = inputs.draw_photos(folder) + inputs.copy_photos(folder, self.images)
+            record.once("worlds", lambda: [str(file) for file in inputs.draw_photos(folder)])
+            photos = [Path(file) for file in record.numbers["worlds"]]
+            photos += inputs.copy_photos(folder, self.images)
             advance()
-            measure_process(runs.draw_capture(folder))
+            warm_up(photos[0], record)
             advance()
-        every = runs.generation_runs(photos[-1], folder) + runs.fit_runs(folder)
-        every += runs.scene_runs(folder)
-        every += runs.train_runs(folder) if self.train else []
-        with phases.phase("measure costs", len(every)) as advance:
-            return photos, runs.measure_rates(every, advance)
+        first = runs.generation_runs(photos[0], folder) + runs.fit_runs(folder)
+        wide = folder / "wide.safetensors"
+        then = runs.scene_runs(folder, wide)
+        then += runs.train_runs(folder) if self.train else []
+        then += runs.onnx_runs(folder) if self.onnx else []
+        with phases.phase("measure costs", len(first) + len(then)) as advance:
+            runs.measure_costs(first, record, advance)
+            if not wide.exists():
+                inputs.widen_scene(runs.scene_file(folder, "fit", runs.FIELD), wide)
+            runs.measure_costs(then, record, advance)
+        return photos, runs.measure_costs([*first, *then], record, lambda: None)
 
     def errors(
-        self, folder: Path, photos: Sequence[Path], phases: "Phases"
+        self, record: "CalibrationRecord", photos: Sequence[Path], phases: "Phases"
     ) -> dict[str, tuple["SettingRow", ...]]:
-        """Rows of every command, from the scenes that the runs wrote."""
+        """Rows of every command, from the photos and the scenes that the runs wrote."""
         from diff4splat.cli.calibration import calibration_errors as errors
+        from diff4splat.cli.calibration import calibration_runs as runs
+        from diff4splat.cli.calibration.scene_errors import scene_errors
         from diff4splat.io.scene_files.scene_file import load_scene
 
-        names = ("scene-3", "scene-4", "scene-6", "fit-hexplane-1", "fit-spacetime-1")
-        scenes = [load_scene(folder / name / "scene.safetensors") for name in names]
-        moving = [scene for scene in scenes if len(scene.motion.moving_index)]
-        count = len(photos) * len(errors.generation_settings())
-        rows = {}
-        with phases.phase("measure errors", count) as advance:
-            rows["generate"] = errors.generation_rows(photos, advance)
-        with phases.phase("scenes", 2 * len(scenes) + len(moving)) as advance:
-            rows["render"] = errors.render_rows(scenes, advance)
-            rows["export html"] = errors.html_rows(scenes, advance)
-            rows["bake"] = errors.bake_rows(moving, advance)
-        return rows
+        files = [runs.scene_file(record.folder, "scene", n) for n in (runs.STATIC, runs.PROMPTED)]
+        files += [runs.scene_file(record.folder, "fit", n) for n in (runs.FIELD, runs.NATIVE)]
+        scenes = [load_scene(file) for file in files]
+        photo_errors = []
+        with phases.phase("measure errors", len(photos) + len(scenes)) as advance:
+            for photo in photos:
+                measure = lambda photo=photo: errors.photo_errors(photo)  # noqa: E731
+                photo_errors.append(record.once(f"errors of {photo.name}", measure))
+                advance()
+            found = []
+            for file, scene in zip(files, scenes, strict=True):
+                measure = lambda scene=scene: scene_errors(scene)  # noqa: E731
+                found.append(record.once(f"errors of {file.parent.name}", measure))
+                advance()
+        return errors.all_rows(photo_errors, scenes, found)
+
+
+def warm_up(photo: Path, record: "CalibrationRecord") -> None:
+    """Draw the capture, and run each command once in short: kernels compile, files are cached."""
+    from diff4splat.cli.calibration import calibration_runs as runs
+    from diff4splat.cli.calibration.measured_process import measure_process
+
+    capture, folder = record.folder / "capture", record.folder
+    for run in (runs.draw_capture(folder), *runs.warm_up_runs(photo, folder)):
+        if run[0] != "prepare" or not capture.exists():
+            record.once(f"warm up {run[0]} {run[-1]}", lambda run=run: measure_process(run).seconds)

@@ -1,23 +1,27 @@
 """Errors of settings on the inputs of a calibration: frames against those of the reference."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from itertools import product
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from itertools import chain, product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diff4splat.cli.limits import baking, exporting, generation, rendering
-from diff4splat.cli.limits.measured import frame_error
-from diff4splat.io.scene_files.motion_tensors import pack_motion
+from diff4splat.cli.calibration.scene_errors import (
+    bake_settings,
+    html_settings,
+    mean_error,
+    render_settings,
+)
+from diff4splat.cli.limits import generation
 from diff4splat.outputs.budgets.table import SettingRow, SettingValues
 
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from diff4splat.generation.pipeline import Diff4SplatPipeline
     from diff4splat.scene.scene import Scene
 
-CAMERA, FRAMES, SEED = "arc:0.1", 3, 0
-Advance = Callable[[], None]
+CAMERA, FRAMES, SEED, SIDE_PX = "arc:0.1", 3, 0, 192
 
 
 def generation_settings() -> list[SettingValues]:
@@ -33,77 +37,30 @@ def generation_settings() -> list[SettingValues]:
     ]
 
 
-def generation_rows(photos: Sequence[Path], advance: Advance) -> tuple[SettingRow, ...]:
-    """Largest share of the photograph's detail that each setting loses."""
-    settings = generation_settings()
-    errors = [_photo_errors(photo, settings, advance) for photo in photos]
-    return _worst(settings, errors)
+def photo_errors(photo: Path) -> list[float]:
+    """Share of the photograph's detail that each setting of ``generate`` loses."""
+    from diff4splat.generation.inputs.image_detail import image_detail
 
-
-def render_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, ...]:
-    """Largest error of each setting of ``render``."""
-    settings = [
-        {"side_share": share, "alpha_cutoff": cutoff}
-        for share, cutoff in product(rendering.SIDE_SHARES, rendering.CUTOFFS)
+    reference = {"side_share": 1.0, "color_matching_steps": generation.REFERENCE_STEPS}
+    exact = generated_frames(photo, reference)
+    detail = image_detail(exact[0].clamp(0, 1))
+    return [
+        mean_error(generated_frames(photo, values), exact) / detail
+        for values in generation_settings()
     ]
-    errors = []
-    for scene in scenes:
-        errors.append([render_error(scene, values) for values in settings])
-        advance()
-    return _worst(settings, errors)
-
-
-def bake_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, ...]:
-    """Largest error of each tolerance in pixels, for each kind of motion."""
-    rows: list[SettingRow] = []
-    kinds = [pack_motion(scene.motion).settings["kind"] for scene in scenes]
-    for kind in dict.fromkeys(kinds):
-        settings = [{"motion": kind, "tolerance_px": px} for px in baking.TOLERANCES_PX]
-        errors = []
-        for scene in (one for one, own in zip(scenes, kinds, strict=True) if own == kind):
-            errors.append([bake_error(scene, values["tolerance_px"]) for values in settings])
-            advance()
-        rows += _worst(settings, errors)
-    return tuple(rows)
-
-
-def bake_error(scene: "Scene", tolerance_px: float) -> float:
-    """Of frames from key frames within a tolerance."""
-    from diff4splat.cli.scenes.bake import unique_views
-    from diff4splat.scene.motion.bake import bake_within
-
-    views = unique_views(scene.path.cameras)
-    motion, _ = bake_within(scene.gaussians, scene.motion, views, tolerance_px)
-    return baking.frames_error(scene, replace(scene, motion=motion))
-
-
-def html_rows(scenes: Sequence["Scene"], advance: Advance) -> tuple[SettingRow, ...]:
-    """Largest error of what a page leaves out."""
-    settings = [
-        {"min_opacity": opacity, "degree": degree}
-        for opacity, degree in product(exporting.MIN_OPACITIES, exporting.DEGREES)
-    ]
-    errors = []
-    for scene in scenes:
-        errors.append(
-            [baking.frames_error(scene, exporting.reduced(scene, values)) for values in settings]
-        )
-        advance()
-    return _worst(settings, errors)
 
 
 def generated_frames(
     photo: Path,
     values: SettingValues,
     model: str = "small",
-    side_px: int = 256,
+    side_px: int = SIDE_PX,
     camera: str = CAMERA,
 ) -> list["Tensor"]:
     """Frames of a generation with a setting, at its own size."""
     from diff4splat.generation.inputs.image_size import find_image_size
     from diff4splat.generation.inputs.input_cameras import path_frame
     from diff4splat.generation.inputs.input_image import load_image
-    from diff4splat.generation.pipeline import Diff4SplatPipeline
     from diff4splat.generation.settings import GenerationSettings
     from diff4splat.paths.build import build_path
     from diff4splat.paths.settings import PathSettings
@@ -116,49 +73,37 @@ def generated_frames(
         color_matching_steps=values["color_matching_steps"],
         subpixel_infill=values.get("infill") != "none",
     )
-    pipeline = Diff4SplatPipeline.from_pretrained(model)
-    scene = pipeline(image, path, seed=SEED, settings=settings)
+    scene = _pipeline(model)(image, path, seed=SEED, settings=settings)
     return [frame.rgb for frame in render_video(scene, scene.path)]
 
 
-def _photo_errors(photo: Path, settings: Sequence[SettingValues], advance: Advance) -> list[float]:
-    from diff4splat.generation.inputs.image_detail import image_detail
-
-    reference = {"side_share": 1.0, "color_matching_steps": generation.REFERENCE_STEPS}
-    exact = generated_frames(photo, reference)
-    detail = image_detail(exact[0].clamp(0, 1))
-    errors = []
-    for values in settings:
-        frames = generated_frames(photo, values)
-        errors.append(mean_error(frames, exact) / detail)
-        advance()
-    return errors
-
-
-def render_error(scene: "Scene", values: SettingValues) -> float:
-    """Of three frames of the scene's path at a setting of ``render``."""
-    from diff4splat.render.api import DEFAULTS, render
-
-    settings = replace(DEFAULTS, alpha_cutoff=values["alpha_cutoff"])
-    exact_settings = replace(DEFAULTS, alpha_cutoff=min(rendering.CUTOFFS))
-    path = scene.path
-    smaller = rendering.at_share(path, values["side_share"])
-    indices = sorted({len(path) // 4, len(path) // 2, 3 * len(path) // 4})
-    frames, exact = [], []
-    for k in indices:
-        time_s = float(path.times_s[k])
-        frames.append(render(scene, smaller.cameras[k], time_s, settings=settings).rgb)
-        exact.append(render(scene, path.cameras[k], time_s, settings=exact_settings).rgb)
-    return mean_error(frames, exact)
+def all_rows(
+    photos: Sequence[Sequence[float]],
+    scenes: Sequence["Scene"],
+    measured: Sequence[Mapping[str, Sequence[float]]],
+) -> dict[str, tuple[SettingRow, ...]]:
+    """Rows of every command, from ``photo_errors`` and ``scene_errors`` of the inputs."""
+    moving = [len(scene.motion.moving_index) > 0 for scene in scenes]
+    settings = [
+        bake_settings(scene) if moves else [] for scene, moves in zip(scenes, moving, strict=True)
+    ]
+    return {
+        "generate": worst_rows(generation_settings(), photos),
+        "render": worst_rows(render_settings(), [one["render"] for one in measured]),
+        "export html": worst_rows(html_settings(), [one["export html"] for one in measured]),
+        "bake": rows_of_kinds(settings, [one["bake"] for one in measured]),
+    }
 
 
-def mean_error(frames: Sequence["Tensor"], exact: Sequence["Tensor"]) -> float:
-    """Mean square difference over all frames."""
-    pairs = list(zip(frames, exact, strict=True))
-    return sum(frame_error(frame, one) for frame, one in pairs) / len(pairs)
+@cache
+def _pipeline(model: str) -> "Diff4SplatPipeline":
+    """Weights are read once for all settings."""
+    from diff4splat.generation.pipeline import Diff4SplatPipeline
+
+    return Diff4SplatPipeline.from_pretrained(model)
 
 
-def _worst(
+def worst_rows(
     settings: Sequence[SettingValues], errors: Iterable[Sequence[float]]
 ) -> tuple[SettingRow, ...]:
     """The largest error over the inputs."""
@@ -167,3 +112,14 @@ def _worst(
         SettingRow(values=values, error=error)
         for values, error in zip(settings, largest, strict=True)
     )
+
+
+def rows_of_kinds(
+    settings: Sequence[Sequence[SettingValues]], errors: Sequence[Sequence[float]]
+) -> tuple[SettingRow, ...]:
+    """The same where inputs have settings of their own: the largest over those that share them."""
+    largest: dict[tuple[tuple[str, object], ...], float] = {}
+    for values, error in zip(chain(*settings), chain(*errors), strict=True):
+        key = tuple(values.items())
+        largest[key] = max(largest.get(key, 0.0), error)
+    return tuple(SettingRow(values=dict(key), error=error) for key, error in largest.items())

@@ -21,7 +21,7 @@ class MeasuredProcess:
 
     seconds: float
     cpu_seconds: float
-    memory_bytes: float
+    memory_bytes: float | int
     text: str
     """What it printed."""
 
@@ -36,7 +36,12 @@ def measure_process(arguments: Sequence[str]) -> MeasuredProcess:
     with tempfile.TemporaryFile() as printed:
         command = [sys.executable, "-m", "diff4splat.cli.main", *arguments]
         process = subprocess.Popen(command, stdout=printed, stderr=printed)
-        status, used, peak = _watched(process.pid)
+        try:
+            status, used, peak = _watched(process.pid)
+        except BaseException:
+            process.kill()  # A command that nobody waits for would go on, and hold its folder.
+            process.wait()
+            raise
         process.returncode = os.waitstatus_to_exitcode(status)
         printed.seek(0)
         text = printed.read().decode(errors="replace")

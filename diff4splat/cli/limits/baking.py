@@ -6,12 +6,14 @@ The error is that of frames rendered from the key frames, against the exact moti
 from typing import TYPE_CHECKING
 
 from diff4splat.cli.limits.costing import Costing, Promise
-from diff4splat.cli.limits.scene_header import read_scene_header
+from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.outputs.budgets.choose import agrees
 from diff4splat.outputs.budgets.limits import loss_from_error
 from diff4splat.outputs.budgets.table import SettingValues
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from diff4splat.cli.scenes.bake import Bake
     from diff4splat.scene.scene import Scene
 
@@ -20,19 +22,47 @@ DEFAULT_PX = 0.1
 TOLERANCES_PX = (0.02, 0.05, DEFAULT_PX, 0.2, 0.5, 1.0, 2.0)
 PROBES = 5
 """Times at which the loss is measured: between the keys and at them."""
+PROBES_PER_GAP, PROBES_OF_ALL = 5, 32
+"""Times at which a bake looks, as in ``scene/motion/bake_sampling.py``."""
+ROUNDS, MOST_KEYS_PER_NODE = 3, 3
+"""How often gaps of a field are split, usually, and how far."""
 
 
 def request_work(command: "Bake", values: SettingValues | None = None) -> dict[str, float | int]:
-    """Counted from the scene's header; key frames grow as one over the root of the tolerance."""
+    """Counted from the scene's header: at how many times which Gaussians are compared."""
     header = read_scene_header(command.scene)
     px = DEFAULT_PX if values is None else float(values["tolerance_px"])
-    px = command.tolerance_px or px
-    keys = px**-0.5 if command.keys is None else command.keys
+    keys = command.keys or expected_keys(header, command.tolerance_px or px)
+    probes = probe_count(header, keys)
     return {
         "start": 1,
         "gaussians": header.gaussians * (1 + header.bases / 4),
-        "baked_gaussians": header.moving * keys,
+        f"states {header.motion}": probes,
+        f"moved_gaussians {header.motion}": probes * header.moving,
+        "compared_views": probes * header.views,
+        "compared_gaussians": probes * header.views * header.moving,
+        "held_keys": keys * header.moving,
     }
+
+
+def expected_keys(header: SceneHeader, tolerance_px: float | int) -> float | int:
+    """Key frames that a tolerance needs.
+
+    Key frames need their own, and native 4D Gaussians move along lines. Between the nodes of planes
+    a motion is smooth: there the error of a line is the square of the distance of its keys.
+    """
+    if header.motion == "keyframes":
+        return max(header.time_nodes, 2)
+    if header.motion != "hexplane":
+        return 2
+    per_node = (DEFAULT_PX / tolerance_px) ** 0.5
+    return max(header.time_nodes * min(per_node, MOST_KEYS_PER_NODE), 2)
+
+
+def probe_count(header: SceneHeader, keys: float | int) -> float | int:
+    """Times at which key frames are held against the motion: over the range, then in each gap."""
+    rounds = ROUNDS if header.motion == "hexplane" else 1
+    return rounds * (PROBES_OF_ALL + header.time_nodes) + PROBES_PER_GAP * max(keys - 1, 0)
 
 
 def promise(command: "Bake") -> Promise:
@@ -68,13 +98,18 @@ def measured_loss_db(exact: "Scene", baked: "Scene") -> float:
 
 def frames_error(exact: "Scene", other: "Scene") -> float:
     """Mean square difference of ``PROBES`` frames along the path."""
+    from diff4splat.cli.limits.measured import frame_error
+
+    pairs = list(zip(path_frames(other), path_frames(exact), strict=True))
+    return sum(frame_error(frame, one) for frame, one in pairs) / len(pairs)
+
+
+def path_frames(scene: "Scene") -> list["Tensor"]:
+    """``PROBES`` frames inside the path; fewer where it has fewer."""
     import torch
 
     from diff4splat.render.api import render
 
-    path, errors = exact.path, []
-    for index in torch.linspace(0, len(path) - 1, PROBES + 2).round().long().tolist()[1:-1]:
-        camera, time_s = path.cameras[index], float(path.times_s[index])
-        frames = [render(scene, camera, time_s).rgb.clamp(0, 1) for scene in (exact, other)]
-        errors.append((frames[0] - frames[1]).square().mean())
-    return float(torch.stack(errors).mean())
+    path = scene.path
+    indices = torch.linspace(0, len(path) - 1, PROBES + 2).round().long()[1:-1].unique()
+    return [render(scene, path.cameras[k], float(path.times_s[k])).rgb for k in indices.tolist()]

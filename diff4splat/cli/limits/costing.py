@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+from diff4splat.errors import ConfigError
 from diff4splat.outputs.budgets.choose import Choice, broken, choose
 from diff4splat.outputs.budgets.costs import (
     WORTH_SAYING_S,
@@ -14,10 +15,22 @@ from diff4splat.outputs.budgets.costs import (
     forecast,
     free_cores,
     gigabytes,
+    unknown_work,
 )
 from diff4splat.outputs.budgets.limits import Limits
-from diff4splat.outputs.budgets.speed import machine_name, measure_speed_s, require_comparable
-from diff4splat.outputs.budgets.table import CalibrationTable, SettingValues, find_table
+from diff4splat.outputs.budgets.speed import (
+    is_comparable,
+    machine_name,
+    measure_speed_s,
+    require_comparable,
+)
+from diff4splat.outputs.budgets.table import (
+    RENEW,
+    CalibrationTable,
+    SettingRow,
+    SettingValues,
+    find_table,
+)
 
 
 @dataclass(frozen=True)
@@ -38,12 +51,30 @@ class Costing:
     @cached_property
     def speed(self) -> float:
         """How many times as slow this machine is as that of the table."""
-        return require_comparable(measure_speed_s() / self.table.speed_s, self.table.machine)
+        return measure_speed_s() / self.table.speed_s
 
     @cached_property
     def cores(self) -> float:
         """Cores that are free at the moment."""
         return free_cores()
+
+    def knows(self, command: str, work: Work) -> bool:
+        """Whether the table has costs of all of ``work``."""
+        return command in self.table.rates and not unknown_work(self.table.rates[command], work)
+
+    def require_known(self, command: str, work: Work) -> None:
+        """Refuse work whose costs nobody has measured.
+
+        Raises:
+            ConfigError: the table does not know the command, or a part of its work, or is that of
+                a machine too different from this one.
+        """
+        require_comparable(self.speed, self.table.machine)
+        if unknown := unknown_work(self.table.of(command)[0], work):
+            known = ", ".join(sorted(self.table.rates[command].seconds))
+            raise ConfigError(
+                f"forecast: expected work that was measured ({known}), got {unknown[0]}; {RENEW}"
+            )
 
     def forecast(self, command: str, work: Work) -> Forecast:
         """What ``work`` costs.
@@ -59,24 +90,31 @@ class Costing:
         work: Callable[[SettingValues], Work],
         allowed: Callable[[SettingValues], bool],
         limits: Limits,
-        detail: float = 1.0,
+        error: Callable[[SettingRow], float] = lambda row: row.error,
     ) -> Choice:
         """The setting of ``command`` among the ``allowed`` ones that the limits ask for.
 
+        ``error`` is what a row of the table means here, where it is a share of something.
+
         Raises:
-            ConfigError: none holds; says what is possible.
+            ConfigError: none holds; says what is possible. Or the table's machine is too different.
         """
+        require_comparable(self.speed, self.table.machine)
         _, rows = self.table.of(command)
         options = [
             Choice(
                 values=row.values,
                 expected=self.forecast(command, work(row.values)),
-                error=row.error * detail,
+                error=error(row),
             )
             for row in rows
             if allowed(row.values)
         ]
         return choose(options, limits)
+
+    def plain_promise(self, command: str, work: Work) -> "Promise | None":
+        """The same without limits; None for work that was not measured: nothing is said of it."""
+        return self.promise(command, Limits(), work) if self.knows(command, work) else None
 
     def promise(self, command: str, limits: Limits, work: Work) -> "Promise":
         """What ``work`` is expected to need, before any setting is chosen."""
@@ -107,7 +145,7 @@ class Promise:
             scaled = f"measured on {self.machine}, times scaled by {self.speed:.2g}"
             other = [f"calibration {scaled}"] if self.machine else []
             return [f"within {self.limits}: {self.choice}", *other]
-        if self.expected.seconds < WORTH_SAYING_S:
+        if self.expected.seconds < WORTH_SAYING_S or not is_comparable(self.speed):
             return []
         return [f"forecast: {self.expected}"]
 
@@ -128,7 +166,7 @@ class Promise:
 
     def after(self, measured: dict[str, float | int]) -> list[str]:
         """What to say after the work of a command without a card: the comparison."""
-        if not self.limits.given:
+        if not self.limits.given and self.expected.seconds < WORTH_SAYING_S:
             return []
         loss = f", {measured['loss_db']:.2g} dB lost" if "loss_db" in measured else ""
         line = (

@@ -3,8 +3,9 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from diff4splat.cli.limits.baking import expected_keys, probe_count
 from diff4splat.cli.limits.costing import Costing, Promise
-from diff4splat.cli.limits.scene_header import read_scene_header
+from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.outputs.budgets.limits import loss_from_error
 from diff4splat.outputs.budgets.table import SettingValues
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
 
 HTML = "export html"
+PAGE_PX = 0.1
+"""Tolerance of a page's key frames, as in ``viewer/keyframed.py``."""
 MIN_OPACITIES = (0.0, 0.005, 0.02, 0.05, 0.2)
 DEGREES = (3, 2, 1, 0)
 
@@ -30,7 +33,16 @@ def html_work(source: "Path", values: SettingValues | None = None) -> dict[str, 
         "gaussians": header.gaussians * (1 + header.bases / 4),
         "packed_gaussians": header.gaussians * (1 + bases / 4),
         "moved_gaussians": header.moving * max(header.frames, 1),
+        **baked_work(header),
     }
+
+
+def baked_work(header: SceneHeader) -> dict[str, float | int]:
+    """A page plays key frames; any other motion is baked first."""
+    if header.motion in ("static", "keyframes"):
+        return {}
+    probes = probe_count(header, expected_keys(header, PAGE_PX))
+    return {f"baked_gaussians {header.motion}": probes * header.moving * header.frames}
 
 
 def html_promise(source: "Path", options: "LimitOptions") -> Promise:

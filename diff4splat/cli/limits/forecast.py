@@ -17,7 +17,7 @@ class Forecasts:
     """
 
     command: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """generate, render, bake, export html, fit or train, with its options."""
+    """generate, render, bake, export html, export onnx, fit or train, with its options."""
     calibration: Annotated[Path | None, InputPath(what="a calibration table", folder=False)] = None
     """Table of measured costs. Default: that of this machine, else the one that ships."""
 
@@ -28,6 +28,7 @@ class Forecasts:
 
         name, work = command_work(self.command)
         costing = Costing.of(self.calibration)
+        costing.require_known(name, work)
         print(f"{name}: {costing.forecast(name, work)}")
         print(
             f"with {costing.cores:.2g} free cores; this machine takes {costing.speed:.2g} times "

@@ -62,7 +62,7 @@ def work(command: "Generate", frames: int, size_px: tuple[int, int]) -> dict[str
 
 def request_work(command: "Generate") -> dict[str, float | int]:
     """The same from the options alone, and the header of the photo."""
-    side_px, multiple_px = _side(command)
+    side_px, multiple_px = image_side(command)
     return work(command, frame_count(command), _size(command, side_px, multiple_px))
 
 
@@ -92,13 +92,14 @@ def promise(command: "Generate") -> tuple["Generate", Promise]:
     plain = costing.promise(NAME, limits, request_work(command))
     if not limits.given:
         return command, plain
-    frames, full_px = frame_count(command), _side(command)[0]
+    frames, full_px = frame_count(command), image_side(command)[0]
+    detail = photo_detail(command)
     choice = costing.choose(
         NAME,
         lambda values: _setting_work(command, values, full_px, frames),
         lambda values: agrees(values, fixed(command)) and _keeps_shape(command, values, full_px),
         limits,
-        photo_detail(command),
+        lambda row: row.error * detail,
     )
     return with_setting(command, choice.values, full_px), plain.with_choice(choice)
 
@@ -138,7 +139,7 @@ def with_setting(command: "Generate", values: Mapping[str, object], full_px: int
 def _keeps_shape(command: "Generate", values: SettingValues, full_px: int) -> bool:
     """Sides are whole tokens; a smaller image must not be cropped to another shape for that."""
     full, small = (
-        _size(one, *_side(one)) for one in (command, with_setting(command, values, full_px))
+        _size(one, *image_side(one)) for one in (command, with_setting(command, values, full_px))
     )
     return full[0] * small[1] == full[1] * small[0]
 
@@ -154,11 +155,12 @@ def _setting_work(
     command: "Generate", values: SettingValues, full_px: int, frames: int
 ) -> dict[str, float | int]:
     chosen = with_setting(command, values, full_px)
-    side_px, multiple_px = _side(chosen)
+    side_px, multiple_px = image_side(chosen)
     return work(chosen, frames, _size(command, side_px, multiple_px))
 
 
-def _side(command: "Generate") -> tuple[int, int]:
+def image_side(command: "Generate") -> tuple[int, int]:
+    """(side, multiple) of the image in pixels, from the options and the photo's header."""
     from diff4splat.generation.inputs.image_size import find_image_size
     from diff4splat.io.photos.images import photo_size
 

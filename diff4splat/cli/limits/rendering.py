@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
 
 NAME = "render"
+USUAL_DETAIL = 1e-3
+"""Of a frame, where it is not measured: with a budget alone, only the order of errors counts."""
+FEW_FRAMES = 8
+"""For fewer, looking at the one in the middle costs more than a cheaper setting saves."""
 DEFAULT_CUTOFF = 1 / 255
 CUTOFFS = (1 / 4096, 1 / 1024, DEFAULT_CUTOFF, 1 / 64, 1 / 16)
 SIDE_SHARES = (1.0, 0.75, 0.5)
@@ -49,40 +53,67 @@ def reach(cutoff: float) -> float:
 
 def request_work(command: "Render", values: SettingValues | None = None) -> dict[str, float | int]:
     """The same from the options alone and the scene's header."""
-    from diff4splat.cli.options.camera import PRESET_FRAMES
     from diff4splat.cli.scenes.render import longer_side
 
     header = read_scene_header(command.scene)
     share, cutoff = (1.0, DEFAULT_CUTOFF) if values is None else _parts(values)
     size_px = header.size_px
-    if command.resolution is not None:
+    if command.resolution is not None and max(size_px) > 0:
         size_px = longer_side(size_px, command.resolution)
     size_px = tuple(round(side * share) for side in size_px)
-    frames = command.options.frames or (header.frames if command.camera is None else PRESET_FRAMES)
+    return work(header, frame_count(command), size_px, cutoff)
+
+
+def frame_count(command: "Render") -> int:
+    """Frames that are written."""
+    from diff4splat.cli.options.camera import PRESET_FRAMES
+
     if command.out.suffix.lower() == ".png" and "%" not in command.out.name:
-        frames = 1
-    return work(header, frames, size_px, cutoff)
+        return 1
+    own = read_scene_header(command.scene).frames if command.camera is None else PRESET_FRAMES
+    return command.options.frames or own
 
 
 def promise(command: "Render") -> Promise:
     """What the command is expected to need, with the settings that its limits ask for.
 
+    With a tolerance, the frame in the middle is rendered to see what this scene loses.
+
     Raises:
         ConfigError: no setting holds; says what is possible.
+        InputError, FileFormatError: the scene cannot be read.
     """
+    from diff4splat.cli.limits.looking import expected_error, looked_errors
+
     limits, costing = command.limits.limits, Costing.of(command.limits.calibration)
     plain = costing.promise(NAME, limits, request_work(command))
     if not limits.given:
         return plain
     fixed = {} if command.resolution is None else {"side_share": 1.0}
+    looked: dict[tuple[float, float], float] = {}
+    if limits.tolerance_db is not None and frame_count(command) >= FEW_FRAMES:
+        looked = looked_errors(command)
+    elif limits.tolerance_db is not None:
+        fixed = {"side_share": 1.0}
+    full = {
+        row.values["alpha_cutoff"]: row.error
+        for row in costing.table.of(NAME)[1]
+        if row.values["side_share"] == 1.0
+    }
     return plain.with_choice(
         costing.choose(
             NAME,
             lambda values: request_work(command, values),
             lambda values: agrees(values, fixed),
             limits,
+            lambda row: expected_error(row, full, looked),
         )
     )
+
+
+def error_unit(values: SettingValues, detail: float) -> float:
+    """What errors of the table are shares of: the frame's detail where frames are smaller."""
+    return 1.0 if values["side_share"] == 1.0 else detail
 
 
 def apply(promised: Promise, path: "CameraPath") -> tuple["CameraPath", "RenderSettings"]:

@@ -1,6 +1,6 @@
 """Items of a generation: networks that are not run, the guidance pass, and the path as a whole."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from diff4splat.evaluation.skipped.scene_items import (
     film,
     film_singly,
     padded,
+    tensor_bytes,
     zero_motion,
 )
 from diff4splat.flow.guidance import Guidance
@@ -25,14 +26,13 @@ from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import FILL_PARTS
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
-from diff4splat.models.hub.model import load_model, parameter_counts
+from diff4splat.models.hub.model import load_model
 from diff4splat.paths.build import build_path
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.paths.settings import PathSettings
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 
-BYTES = 4
 PROMPT = "a rounded block slides to the left"
 NO_TEXT = "nothing moves"
 FORCED = Guidance(weight=1 + 1e-9)
@@ -63,35 +63,39 @@ class Source:
         return pipeline(self.image, self.path, prompt, settings=GenerationSettings(**settings))
 
     def weights_bytes(self, *parts: str) -> float:
-        """Of the networks of the model."""
-        counts = parameter_counts(load_model(self.model, parts=()))
-        return BYTES * sum(counts[part] for part in parts)
+        """Of networks of the model, as they are loaded."""
+        networks = load_model(self.model, parts=parts).networks
+        return sum(tensor_bytes(network) for _, network in networks.parts())
 
 
 def generation_items(source: Source) -> Iterator[Item]:
     """Everything that can be left out while this photograph becomes a scene."""
+
+    def lean() -> Frames:
+        return film(source.scene(source.prompt))
+
     if source.prompt is None:
-        yield from unprompted_items(source)
+        yield from unprompted_items(source, lean)
     else:
         yield guidance_item(source)
-    yield fill_item(source)
+    yield fill_item(source, lean)
 
 
-def unprompted_items(source: Source) -> Iterator[Item]:
+def unprompted_items(source: Source, lean: Callable[[], Frames]) -> Iterator[Item]:
     """Without a prompt: no text, no motion prior; and all of it together."""
     yield Item(
         name="text encoder",
         full=lambda: _with_text(source),
-        lean=lambda: film(source.scene()),
+        lean=lean,
         saved_bytes=source.weights_bytes("text_encoder"),
     )
     yield Item(
         name="motion prior",
         full=lambda: _with_motion(source),
-        lean=lambda: film(source.scene()),
+        lean=lean,
         saved_bytes=source.weights_bytes("motion_unet", "text_encoder"),
     )
-    yield all_items(source)
+    yield all_items(source, lean)
 
 
 def guidance_item(source: Source) -> Item:
@@ -105,22 +109,22 @@ def guidance_item(source: Source) -> Item:
     )
 
 
-def fill_item(source: Source) -> Item:
+def fill_item(source: Source, lean: Callable[[], Frames]) -> Item:
     """The video model, LDRM and the deformation network; they change hidden regions."""
     return Item(
         name="video model, LDRM, deformation network",
         full=lambda: film(source.scene(source.prompt, fill="video")),
-        lean=lambda: film(source.scene(source.prompt)),
+        lean=lean,
         saved_bytes=source.weights_bytes(*FILL_PARTS),
     )
 
 
-def all_items(source: Source) -> Item:
+def all_items(source: Source, lean: Callable[[], Frames]) -> Item:
     """Everything done that a static scene without a prompt does not need, against nothing of it."""
     return Item(
         name="all together, static and without a prompt",
         full=lambda: full_path(source),
-        lean=lambda: film(source.scene()),
+        lean=lean,
         saved_bytes=source.weights_bytes("text_encoder", "motion_unet", *FILL_PARTS),
         compared=lambda: film_singly(keyed(source.scene()), ("rgb", "depth")),
     )

@@ -3,8 +3,8 @@
 Axes: ``n`` Gaussians, ``k`` key times.
 """
 
-from collections.abc import Collection, Iterator
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float
@@ -23,73 +23,98 @@ TRANSPARENT = 1 / 255
 REACH_SIGMAS = 4.0
 """How far a Gaussian reaches beyond its mean: at 1/255 it is 3.33 deviations."""
 KEYS = 5
-BYTES = 4
 
 
 def scene_items(scene: Scene) -> Iterator[Item]:
     """Everything that can be left out while this scene is rendered."""
-    gaussians, count = scene.gaussians, len(scene.gaussians)
-    lean = lambda: film(scene)  # noqa: E731
-    moving, still = len(scene.motion.moving_index), StaticMotion()
-    if not moving:
-        keyed = replace(scene, motion=zero_motion(scene))
-        per_key = 10 * BYTES * KEYS
+    gaussians = scene.gaussians
+
+    def lean() -> Frames:
+        return film(scene)
+
+    for name, wider in wider_scenes(scene):
         yield Item(
-            name="deformation and key times of a static scene",
-            full=lambda: film(keyed),
+            name=name,
+            full=lambda wider=wider: film(wider),
             lean=lean,
-            saved_bytes=count * per_key,
+            saved_bytes=scene_bytes(wider) - scene_bytes(scene),
         )
-    elif isinstance(scene.motion, KeyframeMotion):
-        keyed = replace(scene, motion=all_keyed(scene))
-        tracks = 10 * BYTES * len(scene.motion.key_times_s)
-        yield Item(
-            name="key times of static Gaussians",
-            full=lambda: film(keyed),
-            lean=lean,
-            saved_bytes=(count - moving) * tracks,
-        )
-    if gaussians.degree == 0:
-        wide = replace(scene, gaussians=replace(gaussians, sh=padded(gaussians.sh)))
-        added = count * 3 * BYTES * (BAND_SIZES[3] - 1)
-        yield Item(name="harmonics", full=lambda: film(wide), lean=lean, saved_bytes=added)
-    pixels = scene.path.cameras.size_px[0] * scene.path.cameras.size_px[1]
     yield Item(
         name="depth",
         full=lambda: film(scene, ("rgb", "depth")),
-        lean=lambda: film(scene, ("rgb",)),
-        saved_bytes=pixels * len(scene.path) * BYTES,
+        lean=lean,
+        saved_bytes=depth_bytes(scene),
     )
-    size = sum(tensor.nbytes for tensor in _tensors(scene))
     for name, kept in (
         ("transparent Gaussians", gaussians.opacities >= TRANSPARENT),
         ("invisible Gaussians", in_view(scene)),
     ):
         fewer = scene.select(kept)
-        dropped = size * (1 - len(fewer.gaussians) / max(count, 1))
-        yield Item(name=name, full=lean, lean=lambda fewer=fewer: film(fewer), saved_bytes=dropped)
-    yield from repeated_items(scene, still)
+        yield Item(
+            name=name,
+            full=lean,
+            lean=lambda fewer=fewer: film(fewer),
+            saved_bytes=scene_bytes(scene) - scene_bytes(fewer),
+        )
+    yield from repeated_items(scene)
 
 
-def repeated_items(scene: Scene, still: StaticMotion) -> Iterator[Item]:
+def wider_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """(what is left out, the scene with it): the same frames from more numbers."""
+    if not len(scene.motion.moving_index):
+        keyed = replace(scene, motion=zero_motion(scene))
+        yield "deformation and key times of a static scene", keyed
+    elif isinstance(scene.motion, KeyframeMotion):
+        yield "key times of static Gaussians", replace(scene, motion=all_keyed(scene))
+    if scene.gaussians.degree == 0:
+        sh = padded(scene.gaussians.sh)
+        yield "harmonics", replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+
+
+def repeated_items(scene: Scene) -> Iterator[Item]:
     """Frames and states that repeat: after the end of the motion, or almost at the same time."""
     view, (start_s, stop_s) = scene.path.cameras[0], scene.motion.time_range_s
     after_s = [stop_s + step for step in (0.0, 0.5, 1.0, 1.5)]
+    first = render(scene, view, stop_s).rgb
     yield Item(
         name="frames out of range",
         full=lambda: [render(scene, view, time_s).rgb for time_s in after_s],
         lean=lambda: [render(scene, view, stop_s).rgb] * len(after_s),
-        saved_bytes=0.0,
+        saved_bytes=first.nbytes * (len(after_s) - 1),
     )
     near_s = [start_s + step * 1e-3 for step in range(4)]
-    first = scene.state_at(start_s)
-    frozen = replace(scene, gaussians=first, motion=still)
+    state = scene.state_at(start_s)
+    frozen = replace(scene, gaussians=state, motion=StaticMotion())
     yield Item(
         name="near-duplicate states",
         full=lambda: [render(scene, view, time_s).rgb for time_s in near_s],
         lean=lambda: [render(frozen, view).rgb] * len(near_s),
-        saved_bytes=sum(tensor.nbytes for tensor in _tensors(scene)) * (len(near_s) - 1),
+        saved_bytes=tensor_bytes(state) * (len(near_s) - 1),
     )
+
+
+def scene_bytes(scene: Scene) -> int:
+    """Of all tensors of the Gaussians and their motion."""
+    return tensor_bytes(scene.gaussians) + tensor_bytes(scene.motion)
+
+
+def tensor_bytes(holder: object) -> int:
+    """Of all tensors in a dataclass, a module or a list of them."""
+    if isinstance(holder, Tensor):
+        return holder.nbytes
+    if isinstance(holder, torch.nn.Module):
+        return sum(tensor.nbytes for tensor in holder.state_dict().values())
+    if is_dataclass(holder):
+        return sum(tensor_bytes(getattr(holder, entry.name)) for entry in fields(holder))
+    if isinstance(holder, Mapping):
+        return sum(map(tensor_bytes, holder.values()))
+    return sum(map(tensor_bytes, holder)) if isinstance(holder, (list, tuple)) else 0
+
+
+def depth_bytes(scene: Scene) -> int:
+    """Of the depth of all frames."""
+    frames = render_video(scene, scene.path, outputs=("depth",))
+    return sum(frame.depth.nbytes for frame in frames)
 
 
 def film(scene: Scene, outputs: Collection[str] = ("rgb",)) -> Frames:
@@ -156,8 +181,3 @@ def in_view(scene: Scene) -> Bool[Tensor, " n"]:
 
 def _identity(keys: int, count: int) -> Float[Tensor, "k n 4"]:
     return torch.tensor([1.0, 0.0, 0.0, 0.0]).expand(keys, count, 4).clone()
-
-
-def _tensors(scene: Scene) -> list[Tensor]:
-    gaussians = scene.gaussians
-    return [getattr(gaussians, name) for name in ("means", "quats", "scales", "opacities", "sh")]

@@ -69,15 +69,16 @@ def save_skipped_plot(rows: Sequence[Measured], file: Path) -> None:
         full, lean = (
             _median(found, lambda row, k=k: getattr(row, k)) for k in ("full_s", "lean_s")
         )
-        for value, shift, color in ((full, -0.19, COLORS[1]), (lean, 0.19, COLORS[0])):
-            axes.barh(place + shift, value, 0.36, color=color)
+        for value, shift, color, label in (
+            (full, -0.19, COLORS[1], "with"),
+            (lean, 0.19, COLORS[0], "left out"),
+        ):
+            axes.barh(place + shift, value, 0.36, color=color, label="" if place else label)
         worst = max(row.error for row in found)
         note = "same bits" if worst == 0 else f"differs by {worst:.0e}"
         change = f"  {lean / full - 1:+.0%}, {note}"
         axes.text(max(full, lean), place, change, va="center", fontsize=8)
         longest = max(longest, full, lean)
-    axes.barh([], [], color=COLORS[1], label="with")
-    axes.barh([], [], color=COLORS[0], label="left out")
     axes.set_yticks(range(len(items)), list(items), fontsize=8)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.35 * longest)

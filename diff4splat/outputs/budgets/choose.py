@@ -39,15 +39,6 @@ def agrees(values: SettingValues, fixed: SettingValues) -> bool:
     return all(values.get(name, value) == value for name, value in fixed.items())
 
 
-def front(options: Sequence[Choice]) -> tuple[Choice, ...]:
-    """Those that no other beats in both processor time and error, cheapest first."""
-    found: list[Choice] = []
-    for option in sorted(options, key=lambda one: (one.expected.cpu_seconds, one.error)):
-        if not found or option.error < found[-1].error:
-            found.append(option)
-    return tuple(found)
-
-
 def choose(options: Sequence[Choice], limits: Limits) -> Choice:
     """The cheapest within a tolerance, else the most exact within the budget.
 

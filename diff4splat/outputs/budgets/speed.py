@@ -34,13 +34,18 @@ def machine_name() -> str:
     return f"{platform.system()} {platform.machine()}, {os.cpu_count() or 1} cores"
 
 
+def is_comparable(speed: float) -> bool:
+    """Whether times can be scaled to a machine that is ``speed`` times as slow."""
+    return 1 / MOST_APART <= speed <= MOST_APART
+
+
 def require_comparable(speed: float, machine: str) -> float:
     """``speed``, how many times as slow this machine is as ``machine``, if times can be scaled.
 
     Raises:
         ConfigError: the machines are too different.
     """
-    if not 1 / MOST_APART <= speed <= MOST_APART:
+    if not is_comparable(speed):
         raise ConfigError(
             f"calibration: expected a machine at most {MOST_APART:g} times as fast or slow as "
             f"{machine}, got one that takes {speed:.2g} times as long; diff4splat report calibrate "

@@ -8,7 +8,7 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from diff4splat.io.require_file import read_text
 from diff4splat.outputs.budgets.costs import CostRates
 from diff4splat.paths.formats.json_text import decode_object
 
-FORMAT = "diff4splat calibration 1"
+FORMAT = "diff4splat calibration 2"
 SHIPPED = "calibration.json"
 RENEW = "diff4splat report calibrate writes a new one"
 MAX_ROWS = 10_000
@@ -44,6 +44,8 @@ class CalibrationTable:
     machine: str
     speed_s: float
     """Seconds of ``measure_speed_s`` on that machine."""
+    load: float
+    """Other threads that ran meanwhile, the mean over the runs."""
     inputs: tuple[str, ...]
     rates: Mapping[str, CostRates]
     settings: Mapping[str, tuple[SettingRow, ...]]
@@ -60,6 +62,14 @@ class CalibrationTable:
                 f"calibration: expected rates of {command}, got those of {known}; {RENEW}"
             )
         return self.rates[command], self.settings.get(command, ())
+
+    def rates_at(self, speed_s: float) -> dict[str, CostRates]:
+        """The rates on a machine that takes ``speed_s`` for what this one took ``self.speed_s``."""
+        times = speed_s / self.speed_s
+        return {
+            name: replace(one, seconds={key: times * rate for key, rate in one.seconds.items()})
+            for name, one in self.rates.items()
+        }
 
 
 def user_table_file() -> Path:
@@ -81,8 +91,8 @@ def find_table(file: Path | None = None) -> CalibrationTable:
     if own.is_file():
         try:
             return read_table(own)
-        except ConfigError:
-            pass  # Of an older version: the one that ships fits this one.
+        except (ConfigError, FileFormatError):
+            pass  # Damaged or of an older version: the one that ships fits this one.
     return parse_table(
         resources.files("diff4splat.outputs.budgets").joinpath(SHIPPED).read_text(), SHIPPED
     )
@@ -138,6 +148,7 @@ def _table(source: Mapping[str, object]) -> CalibrationTable:
         diff4splat=_text(source["diff4splat"]),
         machine=_text(source["machine"]),
         speed_s=_number(source["speed_s"], least=1e-9),
+        load=_number(source["load"]),
         inputs=tuple(map(_text, source["inputs"])),
         rates={name: _rates(one) for name, one in _object(source["rates"]).items()},
         settings={name: _rows(rows) for name, rows in _object(source["settings"]).items()},

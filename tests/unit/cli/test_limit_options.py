@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import coded_scenes
 import pytest
 
 from diff4splat.cli.common.parser import parse
@@ -9,7 +10,8 @@ from diff4splat.cli.limits.command_work import command_work
 from diff4splat.cli.limits.rendering import reach
 from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.cli.main import run_command
-from diff4splat.errors import Diff4SplatError
+from diff4splat.errors import ConfigError, Diff4SplatError
+from diff4splat.io.scene_files.scene_file import save_scene
 
 
 @pytest.mark.parametrize(
@@ -33,6 +35,34 @@ def test_refusals(command: str, options: tuple[str, ...], message: str, tmp_path
     assert sorted(tmp_path.iterdir()) == [scene]
 
 
+@pytest.mark.parametrize("command", ["render", "bake", "export html"])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--budget", "1ms"), r"--budget: expected at least [\d.]+ s and [\d.]+ [GM]B, which are"),
+        (("--budget", "1MB"), r"--budget: expected at least .* possible, got 0.001 GB"),
+    ],
+)
+def test_a_budget_that_nothing_fits_says_what_is_possible(
+    command: str, options: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    scene, out = tmp_path / "scene.safetensors", tmp_path / "out.safetensors"
+    save_scene(coded_scenes.scene("keyframes"), scene, "standard")
+    if command != "bake":
+        out = out.with_suffix(".html" if command.startswith("export") else ".webm")
+    with pytest.raises(ConfigError, match=message):
+        run_command([*command.split(), str(scene), "--out", str(out), *options])
+    assert sorted(tmp_path.iterdir()) == [scene]
+
+
+def test_a_tolerance_that_nothing_reaches_says_what_is_possible(tmp_path: Path) -> None:
+    scene, out = tmp_path / "scene.safetensors", tmp_path / "out.safetensors"
+    save_scene(coded_scenes.scene("spacetime"), scene, "standard")
+    with pytest.raises(ConfigError, match=r"--tolerance: expected at least [\d.e-]+ dB, which is"):
+        run_command(["bake", str(scene), "--out", str(out), "--tolerance", "0.0000001dB"])
+    assert sorted(tmp_path.iterdir()) == [scene]
+
+
 def test_a_forecast_takes_the_options_of_another_command() -> None:
     parsed = parse(["forecast", "generate", "x.jpg", "--resolution", "64"])
     assert parsed.command == ("generate", "x.jpg", "--resolution", "64")
@@ -40,7 +70,7 @@ def test_a_forecast_takes_the_options_of_another_command() -> None:
     assert (named.calibration, named.command) == (Path("t.json"), ("bake", "x"))
 
 
-@pytest.mark.parametrize("arguments", [[], ["eval"], ["rendered"], ["export", "onnx"]])
+@pytest.mark.parametrize("arguments", [[], ["eval"], ["rendered"], ["export", "ply"]])
 def test_commands_without_a_forecast(arguments: list[str]) -> None:
     with pytest.raises(Diff4SplatError, match="forecast: expected one of generate"):
         command_work(arguments)

@@ -1,5 +1,5 @@
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 import torch
@@ -70,7 +70,6 @@ def test_a_result_with_nan_is_as_wrong_as_can_be() -> None:
     measured = sweep(knob(run, (1.0, math.nan, math.inf), reference=0.0), 1)
     assert [r.error for r in measured.rows] == [1.0, math.inf, math.inf]
     assert [r.setting for r in measured.pareto()] == [1.0]
-    assert measured.cheapest_within(2.0).setting == 1.0
 
 
 def test_labels_and_series_come_from_the_knob() -> None:
@@ -122,35 +121,3 @@ def test_the_front_is_exactly_what_nothing_dominates(points: list[tuple[float, f
     front = result(rows).pareto()
     assert {r.setting for r in front} == want
     assert list(front) == sorted(front, key=lambda r: r.seconds)
-
-
-@settings(max_examples=50, deadline=None)
-@given(points=costs, limit=st.sampled_from([0.0, 0.1, 0.15, 1.0]))
-def test_choices_respect_their_limit_and_are_the_best(points: list, limit: float) -> None:
-    measured = result([row(*point) for point in points])
-    fitting = [r for r in measured.rows if r.error <= limit]
-    if fitting:
-        chosen = measured.cheapest_within(limit)
-        assert chosen in fitting
-        assert chosen.seconds == min(r.seconds for r in fitting)
-    slowest = measured.best_within(5.0)
-    assert slowest.error == min(r.error for r in measured.rows)
-
-
-@pytest.fixture
-def three() -> Iterator[SweepResult]:
-    yield result([row(1.0, 0.5, "fast"), row(2.0, 0.1, "middle"), row(4.0, 0.01, "fine")])
-
-
-def test_picks_the_cheapest_that_holds_and_the_best_that_fits(three: SweepResult) -> None:
-    assert three.cheapest_within(0.2).setting == "middle"
-    assert three.cheapest_within(0.01).setting == "fine"
-    assert three.best_within(3.0).setting == "middle"
-    assert three.best_within(1.0).setting == "fast"
-
-
-def test_impossible_limits_say_what_is_possible(three: SweepResult) -> None:
-    with pytest.raises(ConfigError, match=r"tolerance: expected at least 0.01 \(distance\)"):
-        three.cheapest_within(0.001)
-    with pytest.raises(ConfigError, match=r"budget: expected at least 1 s, taken by toy fast, got"):
-        three.best_within(0.5)

@@ -31,8 +31,9 @@ def plan_tensors(scene: Scene, tolerances: Tolerances) -> dict[str, Plan]:
     pixel = units_per_pixel(scene)
     plans = _gaussian_plans(scene, tolerances, pixel)
     motion = scene.motion
-    if len(motion.moving_index):
-        plans["moving_index"] = Plan(steps=np.ones((1, 1)), columns=1)
+    if not len(motion.moving_index):
+        return plans  # A motion that moves nothing is stored as static.
+    plans["moving_index"] = Plan(steps=np.ones((1, 1)), columns=1)
     if isinstance(motion, KeyframeMotion):
         plans |= _keyframe_plans(scene, motion, tolerances, pixel)
     if isinstance(motion, SpacetimeMotion):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from diff4splat.evaluation.skipped.measurement import Item, Measured, measure
+from diff4splat.evaluation.skipped.measurement import Bench, Item, Measured
 from diff4splat.evaluation.skipped.scene_items import in_view, scene_items
 from diff4splat.evaluation.skipped.skipped_report import to_markdown
 from diff4splat.geometry.camera import pinhole, stack_cameras
@@ -36,7 +36,7 @@ def scene() -> Scene:
 
 
 def test_everything_left_out_of_a_static_scene_changes_nothing(scene: Scene) -> None:
-    rows = [measure(item, "cloud", repeats=1) for item in scene_items(scene)]
+    rows = [Bench("cloud", repeats=1).measure(item) for item in scene_items(scene)]
     assert {row.item for row in rows} >= {"harmonics", "depth", "transparent Gaussians"}
     assert max(row.error for row in rows) < 2e-6
     assert all(f"| {row.item} |" in to_markdown(rows) for row in rows)
@@ -53,7 +53,7 @@ def test_gaussians_behind_and_beside_the_camera_are_not_seen(scene: Scene) -> No
 def test_a_wrong_result_is_reported_as_one() -> None:
     one, other = [torch.zeros(4, 4, 3)], [torch.full((4, 4, 3), 0.1)]
     item = Item(name="x", full=lambda: one, lean=lambda: other, saved_bytes=0.0)
-    row = measure(item, "x", repeats=1)
+    row = Bench("x", repeats=1).measure(item)
     assert isinstance(row, Measured)
     assert row.error == pytest.approx(0.1)
     assert row.psnr_db == pytest.approx(20)

@@ -105,9 +105,10 @@ def test_the_committed_file_keeps_loading_with_its_values(tmp_path: Path) -> Non
     assert (tmp_path / "again.safetensors").read_bytes() == GOLDEN.read_bytes()
 
 
-def test_motion_of_nobody_is_stored_as_static(tmp_path: Path) -> None:
+@pytest.mark.parametrize("compression", ["lossless", "standard"])
+def test_motion_of_nobody_is_stored_as_static(compression: str, tmp_path: Path) -> None:
     scene = file_scene().select(torch.tensor([True, False, True, False]))
-    save_scene(scene, tmp_path / "s.safetensors")
+    save_scene(scene, tmp_path / "s.safetensors", compression)
     assert load_scene(tmp_path / "s.safetensors").motion == StaticMotion(time_range_s=(0.0, 2.0))
 
 

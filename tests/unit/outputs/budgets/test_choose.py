@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diff4splat.errors import ConfigError
-from diff4splat.outputs.budgets.choose import Choice, agrees, broken, choose, front
+from diff4splat.outputs.budgets.choose import Choice, agrees, broken, choose
 from diff4splat.outputs.budgets.costs import Forecast
 from diff4splat.outputs.budgets.limits import Limits, error_from_loss
 
@@ -41,18 +41,6 @@ def test_messages_say_what_is_possible() -> None:
         choose(OPTIONS, Limits(seconds=0.1))
     with pytest.raises(ConfigError, match="leave one of them out"):
         choose((), Limits(seconds=1.0))
-
-
-@given(st.lists(st.tuples(st.floats(0.1, 9), st.floats(1e-6, 1e-2)), min_size=1, max_size=20))
-def test_nothing_beats_the_front(pairs: list[tuple[float, float]]) -> None:
-    options = [choice(*pair) for pair in pairs]
-    best = front(options)
-    for option in options:
-        assert any(
-            one.error <= option.error and one.expected.cpu_seconds <= option.expected.cpu_seconds
-            for one in best
-        )
-    assert [one.error for one in best] == sorted((one.error for one in best), reverse=True)
 
 
 @given(st.floats(0.05, 20))
