@@ -1,13 +1,10 @@
-"""Which weights of the video model learn: all, the added layers alone, or these and LoRA."""
-
-from typing import Literal
+"""Marks the weights of a network that learn."""
 
 from torch import nn
 
 from diff4splat.models.adapters.lora import add_lora
+from diff4splat.models.config.tuning import Tuning
 
-Tuning = Literal["full", "adapters", "lora"]
-TUNINGS = ("full", "adapters", "lora")
 ADDED = ("camera_adapter.", "condition_embedding.")
 """What we add to a public video model."""
 

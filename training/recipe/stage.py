@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.adapters.tuning import TUNINGS, Tuning
+from diff4splat.models.config.tuning import TUNINGS, Tuning
 from diff4splat.training.recipe.checks import require
 from diff4splat.training.recipe.data import DataSettings
 from diff4splat.training.recipe.kinds import StageKind

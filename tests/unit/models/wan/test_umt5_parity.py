@@ -69,6 +69,7 @@ def test_an_encoder_without_vocabulary_says_so(encoder: Umt5Encoder) -> None:
 
 
 def test_a_damaged_vocabulary_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("tokenizers")
     (tmp_path / "tokenizer.json").write_text('{"model": 3}')
     with pytest.raises(FileFormatError, match="damaged"):
         Tokenizer(tmp_path / "tokenizer.json", 512)

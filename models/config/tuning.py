@@ -1,0 +1,6 @@
+"""Which weights of the video model learn: all, the added layers alone, or these and LoRA."""
+
+from typing import Literal
+
+Tuning = Literal["full", "adapters", "lora"]
+TUNINGS = ("full", "adapters", "lora")
