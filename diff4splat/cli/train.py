@@ -122,7 +122,6 @@ class Train:
         from diff4splat.configs.public_backbone import BACKBONE, backbone_recipe
         from diff4splat.configs.recipes import find_recipe
         from diff4splat.errors import ConfigError
-        from diff4splat.models.hub.folders import find_config
 
         if self.config != BACKBONE:
             return find_recipe(self.config)
@@ -131,6 +130,8 @@ class Train:
                 "--config backbone: expected --from-model with an imported model, got none; "
                 "make one with diff4splat models import"
             )
+        from diff4splat.models.hub.folders import find_config
+
         return backbone_recipe(find_config(self.from_model))
 
     def _folders(self) -> list[tuple[Path, float]]:
