@@ -27,7 +27,9 @@ def recipe_by_name(name: str) -> Recipe:
         ConfigError: there is none.
     """
     if name not in RECIPES:
-        raise ConfigError(f"--config: expected one of {', '.join(RECIPES)}, got {name!r}")
+        raise ConfigError(
+            f"--config: expected one of {', '.join(RECIPES)} or backbone, got {name!r}"
+        )
     return RECIPES[name]()
 
 

@@ -5,7 +5,6 @@ photograph ─ load_image ───┐
 --prompt ── require_prompt ┘
 """
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -25,6 +24,7 @@ from diff4splat.cli.options.depth import (
 from diff4splat.cli.options.device import render_device, require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.models import ModelName, require_prompt_for, require_runtime
+from diff4splat.io.file_digest import file_sha256
 
 if TYPE_CHECKING:
     from diff4splat.cli.limits.generation import Outcome
@@ -397,9 +397,3 @@ class Generate:
         return {
             name: str(value) if isinstance(value, Path) else value for name, value in given.items()
         }
-
-
-def file_sha256(file: Path) -> str:
-    """Which photograph it was."""
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()

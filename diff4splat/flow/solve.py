@@ -19,7 +19,7 @@ FIXED_DEFAULT = "multistep2"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SolverPath:
-    """What each kind of solver is told; it reads its own."""
+    """Settings of every kind of solver; each reads its own."""
 
     levels: Sequence[float]
     control: StepControl

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.errors import FileFormatError
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.models.depth_priors.contracts import DepthContract, recognise
 from diff4splat.models.depth_priors.graph_facts import read_graph_facts
 from diff4splat.models.depth_priors.graph_safety import require_safe
@@ -70,12 +71,10 @@ class OnnxDepthPrior:
         """Digest of the graph, and of its external weights after it."""
         digest = hashlib.sha256()
         for file in (self.file, *(self.file.parent / name for name in self.external)):
-            with file.open("rb") as opened:
-                digest.update(hashlib.file_digest(opened, "sha256").digest())
+            digest.update(bytes.fromhex(file_sha256(file)))
         if self.external:
             return digest.hexdigest()
-        with self.file.open("rb") as opened:
-            return hashlib.file_digest(opened, "sha256").hexdigest()
+        return file_sha256(self.file)
 
     def _depth(self, found: dict[str, np.ndarray], focal_px: tuple[float, float]) -> np.ndarray:
         contract, values = self.contract, found[self.contract.output]

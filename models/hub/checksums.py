@@ -5,13 +5,13 @@ holds the configuration, the provenance and the weights. The model card is not i
 be corrected without new weights.
 """
 
-import hashlib
 import re
 from collections.abc import Collection
 from pathlib import Path
 
 from diff4splat.errors import FileFormatError
 from diff4splat.io.atomic import write_text
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.require_file import read_text
 from diff4splat.models.hub.provenance import PROVENANCE_FILE
 from diff4splat.models.hub.weight_files import CONFIG_FILE, part_file
@@ -58,12 +58,6 @@ def require_complete(folder: Path, advice: str, names: Collection[str] | None = 
                 f"{folder / name}: expected SHA-256 {sums[name][:16]}…, got {got[:16]}; "
                 f"the file is damaged, {advice}"
             )
-
-
-def file_sha256(file: Path) -> str:
-    """Digest of one file, in hexadecimal."""
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def _read_sums(file: Path, advice: str) -> dict[str, str]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.require_file import is_file, read_text
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.hub.legacy import legacy_file
@@ -27,9 +28,7 @@ def weights_sha256(folder: Path, parts: Iterable[str] = PARTS) -> str:
     digest = hashlib.sha256()
     for path in sorted({weight_file(folder, part) for part in parts}):
         if path.is_file():
-            with path.open("rb") as file:
-                sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-            digest.update(f"{path.stem}:{sha256}\n".encode())
+            digest.update(f"{path.stem}:{file_sha256(path)}\n".encode())
     return digest.hexdigest()
 
 

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from diff4splat.errors import Diff4SplatError, FileFormatError
 from diff4splat.io.atomic import write_text
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.require_file import is_file, read_text
 from diff4splat.models.onnx.shapes import Axis, parse_axis
 from diff4splat.paths.formats.json_text import decode_json
@@ -148,9 +149,7 @@ def require_files(folder: Path, entries: Collection[FileEntry]) -> None:
 
 def file_entry(path: Path) -> FileEntry:
     """Name, digest and size of a file."""
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return FileEntry(name=path.name, sha256=digest, bytes=path.stat().st_size)
+    return FileEntry(name=path.name, sha256=file_sha256(path), bytes=path.stat().st_size)
 
 
 def _parse(record: Mapping[str, Any]) -> Manifest:

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.require_file import is_file, read_text
-from diff4splat.models.hub.checksums import file_sha256
 from diff4splat.paths.formats.json_text import decode_json
 
 SUMS_FILE = "SHA256SUMS"

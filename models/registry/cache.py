@@ -6,7 +6,6 @@
 ``DIFF4SPLAT_MIRROR`` replaces the addresses: a folder or a web address with NAME/FILE below it.
 """
 
-import hashlib
 import os
 import re
 from collections.abc import Mapping
@@ -75,9 +74,3 @@ def record_hashes(folder: Path, hashes: Mapping[str, str]) -> None:
     """Write the list whole or not at all; ``sha256sum -c`` reads it too."""
     lines = (f"{digest}  {name}\n" for name, digest in sorted(hashes.items()))
     write_text(folder / SUMS_FILE, "".join(lines))
-
-
-def file_hash(file: Path) -> str:
-    """SHA-256 of a file."""
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()

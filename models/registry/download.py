@@ -16,7 +16,7 @@ from typing import BinaryIO
 from urllib.parse import urlsplit
 
 from diff4splat.errors import InputError, OutputError
-from diff4splat.models.registry.cache import file_hash
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.models.registry.response import Response, parse_response
 from diff4splat.progress.phases import Phases
 
@@ -52,7 +52,7 @@ def download(wanted: Download, phases: Phases) -> str:
         _copy(Path(wanted.address), part, wanted)
     else:
         _receive_all(wanted, part, phases)
-    digest = file_hash(part)
+    digest = file_sha256(part)
     if wanted.sha256 is not None and digest != wanted.sha256:
         _forget(part)
         raise InputError(

@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from diff4splat.errors import ConfigError
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.locks import sole_writer
 from diff4splat.io.require_file import is_file
 from diff4splat.models.registry.cache import (
     address_of,
-    file_hash,
     model_folder,
     record_hashes,
     recorded_hashes,
@@ -56,7 +56,7 @@ def get_model(model: PublicModel, phases: Phases, note: Note) -> Path:
 
 def _get_file(model: PublicModel, file: ModelFile, phases: Phases) -> str:
     target = model_folder(model) / file.name
-    if file.sha256 is not None and is_file(target) and file_hash(target) == file.sha256:
+    if file.sha256 is not None and is_file(target) and file_sha256(target) == file.sha256:
         return file.sha256
     address = address_of(model, file)
     wanted = Download(address=address, target=target, bytes=file.bytes, sha256=file.sha256)

@@ -9,7 +9,6 @@ release. Chronological order is (window, step): the
 window number grows with every roll-back. Nothing here is pickle.
 """
 
-import hashlib
 import json
 import os
 import re
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from diff4splat.errors import FileFormatError
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.require_file import is_file, read_text, require_file
 from diff4splat.paths.formats.json_text import decode_object
 from diff4splat.training.recipe.legacy import upgraded_stage
@@ -141,5 +141,4 @@ def _read_state(folder: Path) -> dict[str, Any]:
 
 def _sha256(file: Path) -> str:
     require_file(file, "tensors of a checkpoint")
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return file_sha256(file)

@@ -161,7 +161,7 @@ def test_single_precision_may_stand_beside_one_half(folder: Path) -> None:
 
 
 def test_links_of_a_download_cache_are_followed_and_checked(folder: Path, tmp_path: Path) -> None:
-    from diff4splat.models.hub.checksums import file_sha256
+    from diff4splat.io.file_digest import file_sha256
 
     cache = tmp_path / "models--Wan-AI--tiny"
     snapshot = shutil.copytree(folder, cache / "snapshots" / "0123abcd")
