@@ -14,8 +14,9 @@ from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage, downsample
-from diff4splat.generation.layered_image.build import FineDepth, ImageMaps
+from diff4splat.generation.layered_image.build import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
+from diff4splat.generation.motion_maps import depth_at, with_displacement
 from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import why_unguided
 from diff4splat.models.hub.model import Model
@@ -37,42 +38,48 @@ def image_maps(
     model: Model, images: Copies, frames: int, request: MotionRequest, log: RunLog
 ) -> ImageMaps:
     """Depth, and displacement over ``frames`` latent frames, by the priors that are loaded."""
-    image = images.small
     with log.phases.phase("predict depth"):
         depth, fine = _depths(model, images, log)
+    maps = ImageMaps(depth=depth, displacement=None, fine=fine)
     if model.networks.motion_unet is None or frames < 2:
-        return ImageMaps(depth=depth, displacement=None, fine=fine)
+        return maps
+    image = larger_copy(images, model.config.motion_unet.photo_scale)
     motion = _sample_motion(model, image, frames, request, log)
     mask = motion.mask(request.settings.motion.threshold)
     mean = motion.field if request.settings.motion.steps == 1 else motion.mean_field
+    depth = depth_at(maps, images.small, image)
     displacement = rigid_component_offsets(motion.field, mask, depth, mean)
-    moved = displacement if displacement.any() else None
-    return ImageMaps(depth=depth, displacement=moved, fine=fine)
+    return with_displacement(maps, image, depth, displacement) if displacement.any() else maps
+
+
+def larger_copy(images: Copies, scale: int) -> InputImage:
+    """The copy with ``scale`` times the small side, where the photograph is reduced so far."""
+    reduction = images.small.reduction
+    if scale == 1 or reduction % scale:
+        return images.small
+    return downsample(images.image, reduction // scale)
 
 
 def _depths(
     model: Model, images: Copies, log: RunLog
-) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
+) -> tuple[Float[Tensor, "h w"], FineMaps | None]:
     """Depth of the copy; where the prior sees a larger one, its own and that one reduced."""
     if images.depth is not None:
         return _given_depths(images, log)
     log.depth["source"] = "plane" if model.networks.monocular_depth is None else "model"
-    scale = model.config.monocular_depth.photo_scale
-    reduction = images.small.reduction
-    if model.networks.monocular_depth is None or scale == 1 or reduction % scale:
+    larger = larger_copy(images, model.config.monocular_depth.photo_scale)
+    if model.networks.monocular_depth is None or larger is images.small:
         return image_depth(model, images.small), None
-    larger = downsample(images.image, reduction // scale)
-    fine = FineDepth(rgb=larger.rgb, depth=image_depth(model, larger))
-    inverse = torch.nn.functional.avg_pool2d(1 / fine.depth[None, None], scale)[0, 0]
-    return 1 / inverse, fine
+    fine = FineMaps(rgb=larger.rgb, depth=image_depth(model, larger))
+    return reduced_depth(fine.depth, images.small.camera.size_px), fine
 
 
-def _given_depths(images: Copies, log: RunLog) -> tuple[Float[Tensor, "h w"], FineDepth | None]:
+def _given_depths(images: Copies, log: RunLog) -> tuple[Float[Tensor, "h w"], FineMaps | None]:
     """Given depth at the size of the image, and reduced."""
     depth = given_depth(images.depth, images.image, log)
     if images.small.camera.size_px == images.image.camera.size_px:
         return depth, None
-    fine = FineDepth(rgb=images.image.rgb, depth=depth, smooth=False)
+    fine = FineMaps(rgb=images.image.rgb, depth=depth, smooth=False)
     return reduced_depth(depth, images.small.camera.size_px), fine
 
 

@@ -45,8 +45,8 @@ class DataSettings:
     crop_px: tuple[int, int] = (0, 0)
     """Random crop (height, width) of images of ``size_px``; 0 takes the whole image."""
     view_sides_px: tuple[int, ...] = ()
-    """Stage ``monocular_depth``: random views (window, zoom, roll, noise) of every image instead of
-    whole ones; height and width are drawn from these at each step."""
+    """Sides, drawn from at each step. Stage ``monocular_depth``: random views (window, zoom, roll,
+    noise) of every image. Stage ``motion_diffusion``: widths to which images are reduced."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4

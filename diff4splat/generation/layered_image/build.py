@@ -31,13 +31,15 @@ PIXEL_FOOTPRINT_PX = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FineDepth:
-    """Depth of a copy of an image that is larger than the one other networks see."""
+class FineMaps:
+    """Maps of a copy of an image that is larger than the one other networks see."""
 
     rgb: Float[Tensor, "h w 3"]
     depth: Float[Tensor, "h w"]
     smooth: bool = True
     """Whether cells of a prediction have to be smoothed away; not of depth that was given."""
+    displacement: Float[Tensor, "t h w 3"] | None = None
+    """None takes that of the smaller copy."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +50,8 @@ class ImageMaps:
     """z in scene units."""
     displacement: Float[Tensor, "t h w 3"] | None
     """From the first frame, in scene units, at the times of the latent frames; None is static."""
-    fine: FineDepth | None = None
-    """The same depth of a larger copy, for the image's own pixels."""
+    fine: FineMaps | None = None
+    """The same of a larger copy, for the image's own pixels."""
 
 
 def build_layered_image(
@@ -107,8 +109,9 @@ def _pixel_maps(
     fine = maps.fine
     if fine is None or small.shape == full.shape:
         return upsample_maps(maps.depth, maps.displacement, (small, full))
-    depth, displacement = upsample_maps(maps.depth, maps.displacement, (small, fine.rgb))
-    if displacement is not None:
+    displacement = fine.displacement
+    if displacement is None and maps.displacement is not None:
+        depth, displacement = upsample_maps(maps.depth, maps.displacement, (small, fine.rgb))
         displacement = displacement * (fine.depth / depth)[..., None]
     return upsample_maps(fine.depth, displacement, (fine.rgb, full))
 

@@ -92,6 +92,24 @@ def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     assert image_maps(replace(model, config=config), whole, 2, request, RunLog()).fine is None
 
 
+@torch.no_grad()
+def test_the_motion_prior_can_see_a_larger_copy_of_a_photograph() -> None:
+    model = moves_right(model_of("motion_unet"), 0.25)
+    priors = replace(model.config.motion_unet, photo_scale=2)
+    model = replace(model, config=replace(model.config, motion_unet=priors))
+    photo = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
+    request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
+    copies = Copies(image=photo, small=downsample(photo, 4))
+    maps = image_maps(model, copies, 2, request, RunLog())
+    assert maps.fine.displacement.shape == (2, 2 * SIDE_PX, 2 * SIDE_PX, 3)
+    assert maps.displacement.shape == (2, SIDE_PX, SIDE_PX, 3)
+    for found in (maps.displacement, maps.fine.displacement):
+        expected = torch.full_like(found[1, ..., 0], 0.25 * PLANE_DEPTH)
+        torch.testing.assert_close(found[1, ..., 0], expected)
+    whole = Copies(image=copies.small, small=replace(copies.small, reduction=1))
+    assert image_maps(model, whole, 2, request, RunLog()).fine is None
+
+
 def test_displacement_is_a_share_of_depth_from_zero_on() -> None:
     maps = maps_of(moves_right(model_of("motion_unet"), 0.25), frames=3)
     assert maps.displacement.shape == (3, SIDE_PX, SIDE_PX, 3)

@@ -18,6 +18,7 @@ from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.random_flip import flip_samples
+from diff4splat.training.batches.reduced_size import reduced
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.timestep_sampling import (
     LevelDistribution,
@@ -64,7 +65,7 @@ class MotionDiffusionStage(ModelStage):
 
     def forward(self, batch: ClipBatch) -> Terms:
         """The terms ``flow`` and ``motion_mask``."""
-        batch, losses = self.randomly_flipped(batch), self.plan.recipe.losses
+        batch, losses = self._augmented(batch), self.plan.recipe.losses
         uniform = self.random.uniform(batch, "level")
         level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
         noisy = self._noisy(batch, level.to(batch.field), "noise")
@@ -85,6 +86,14 @@ class MotionDiffusionStage(ModelStage):
                 ),
             ]
         )
+
+    def _augmented(self, batch: ClipBatch) -> ClipBatch:
+        """Half of the samples mirrored, at one of the recipe's sides if it names any."""
+        batch, sides = self.randomly_flipped(batch), self.plan.recipe.data.view_sides_px
+        if not sides:
+            return batch
+        generator = self.random.per_step(batch, "view size")
+        return reduced(batch, sides[int(torch.randint(len(sides), (), generator=generator))])
 
     def randomly_flipped(self, batch: ClipBatch) -> ClipBatch:
         """Half of the samples mirrored."""

@@ -8,7 +8,7 @@ from torch import Tensor
 from diff4splat.generation.inputs.input_image import downsample
 from diff4splat.generation.layered_image.build import (
     PIXEL_FOOTPRINT_PX,
-    FineDepth,
+    FineMaps,
     ImageMaps,
     build_layered_image,
     pixel_layer,
@@ -66,7 +66,7 @@ def test_pixels_take_the_depth_of_the_larger_copy() -> None:
     size_px = small.camera.size_px
     displacement = torch.zeros(2, *size_px, 3)
     displacement[1, ..., 0] = 0.5
-    fine = FineDepth(rgb=larger.rgb, depth=torch.full(larger.camera.size_px, 7.0))
+    fine = FineMaps(rgb=larger.rgb, depth=torch.full(larger.camera.size_px, 7.0))
     maps = ImageMaps(depth=torch.full(size_px, 4.0), displacement=displacement, fine=fine)
     pixels = pixel_layer(small, image, maps)
     torch.testing.assert_close(pixels.depth, torch.full_like(pixels.depth, 7.0))

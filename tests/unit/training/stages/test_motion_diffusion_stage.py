@@ -51,6 +51,19 @@ def test_terms_and_gradients_are_finite_and_only_the_motion_network_learns() -> 
     assert all(bool(gradient.isfinite().all()) for gradient in gradients.values())
 
 
+def test_images_are_reduced_to_sides_that_the_recipe_names() -> None:
+    recipe = motion_recipe()
+    sides = (16, recipe.data.size_px[1])
+    recipe = replace(recipe, data=replace(recipe.data, view_sides_px=sides))
+    stage = make_stage(recipe, model=MODEL)
+    seen = set()
+    for step in range(8):
+        batch = moving_batch(recipe, (2 * step, 2 * step + 1))
+        seen.add(stage._augmented(batch).video.shape[3])
+    assert seen == set(sides)
+    assert bool(stage(moving_batch(recipe))[TOTAL].isfinite().all())
+
+
 def test_a_flip_changes_images_motion_and_captions_together() -> None:
     recipe = motion_recipe()
     stage = make_stage(recipe, model=MODEL)
