@@ -1,0 +1,90 @@
+"""Command line of the sheet."""
+
+import argparse
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load
+from diff4splat.generation.inputs.image_size import find_image_size
+from diff4splat.generation.inputs.input_cameras import path_frame
+from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
+from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.paths.build import build_path
+from diff4splat.paths.settings import PathSettings
+from diff4splat.render.api import render
+
+SIDE_PX = 256
+ORBITS = ("orbit:0.0417", "orbit:-0.0417")
+"""15 of 360 degrees to each side."""
+CELL_PX = (180, 240)
+"""Height and width of a picture of the sheet."""
+COLUMNS = 2
+QUALITY = 90
+
+
+def main() -> None:
+    """Every photograph, two views beside it, and its depth."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--model", default="small")
+    parser.add_argument("--out", type=Path, required=True)
+    arguments = parser.parse_args()
+    pipeline = Diff4SplatPipeline.from_pretrained(arguments.model)
+    rows = []
+    for photograph in PHOTOGRAPHS:
+        rows.append(row(pipeline, prepared(photograph, arguments.model)))
+        print(photograph.name, flush=True)
+    half = -(-len(rows) // COLUMNS)
+    sheet = np.hstack(
+        [np.vstack(rows[start : start + half]) for start in range(0, len(rows), half)]
+    )
+    cv2.imwrite(str(arguments.out), sheet[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+
+
+def prepared(photograph: Photograph, model: str) -> InputImage:
+    """The photograph as ``generate --size 256`` takes it."""
+    pixels = load(photograph)
+    focal = choose_focal(pixels.shape[:2], photograph.fov_deg, None)
+    rgb = torch.from_numpy(pixels).float() / 255
+    return prepare_image(rgb, focal, *find_image_size(model, SIDE_PX))
+
+
+@torch.no_grad()
+def row(pipeline: Diff4SplatPipeline, picture: InputImage) -> UInt8[np.ndarray, "h w 3"]:
+    """The photograph, 15 degrees to one side and to the other, depth."""
+    scene = pipeline(picture, "static")
+    images = [picture.rgb]
+    for orbit in ORBITS:
+        settings = PathSettings(frames=2, fps=1)
+        camera = build_path(orbit, path_frame(picture.camera), settings).cameras[1]
+        images.append(render(scene, camera).rgb.clamp(0, 1))
+    depth = render(scene, picture.camera, outputs=("rgb", "depth")).depth
+    cells = [(255 * image).round().byte().numpy() for image in images]
+    return np.hstack([in_cell(cell) for cell in (*cells, depth_colors(depth))])
+
+
+def depth_colors(depth: Float[Tensor, "h w"]) -> UInt8[np.ndarray, "h w 3"]:
+    """Near is red; the range of a picture is at least a factor of e^0.3."""
+    nearness = -depth.clamp_min(1e-3).log().numpy()
+    low, high = np.percentile(nearness, [2, 98])
+    share = ((nearness - low) / max(high - low, 0.3)).clip(0, 1)
+    return cv2.applyColorMap((255 * share).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1]
+
+
+def in_cell(image: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "y x 3"]:
+    """Scaled to fit, on white."""
+    scale = min(CELL_PX[0] / image.shape[0], CELL_PX[1] / image.shape[1])
+    size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    cell = np.full((*CELL_PX, 3), 255, np.uint8)
+    top, left = (CELL_PX[0] - size[1]) // 2, (CELL_PX[1] - size[0]) // 2
+    cell[top : top + size[1], left : left + size[0]] = small
+    return cell
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""Where the photographs come from: files of installed packages, and views cut from panoramas.
+
+Axes: ``h w`` pixels.
+"""
+
+import importlib.resources
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from diff4splat.errors import InputError
+
+Image = UInt8[np.ndarray, "h w 3"]
+VIEW_PX, VIEW_FOV_DEG = (288, 384), 70.0
+"""Height and width of a view of a panorama, and its horizontal field of view."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Photograph:
+    """A file of an installed package; a panorama if it says where to look."""
+
+    name: str
+    package: str
+    file: str
+    yaw_deg: float | None = None
+    """To the right of the middle of a panorama."""
+    pitch_deg: float = 0.0
+    """Upward."""
+
+    @property
+    def fov_deg(self) -> float | None:
+        """Known for views of panoramas alone."""
+        return None if self.yaw_deg is None else VIEW_FOV_DEG
+
+
+def _panorama(name: str, yaw_deg: float, pitch_deg: float = -5.0) -> Photograph:
+    return Photograph(
+        name=name.replace("_1k", "").replace("_", " "),
+        package="viser",
+        file=f"_assets/hdri/{name}.jpg",
+        yaw_deg=yaw_deg,
+        pitch_deg=pitch_deg,
+    )
+
+
+PHOTOGRAPHS = (
+    *(
+        Photograph(name=name, package="skimage", file=f"data/{name}.{kind}")
+        for name, kind in (
+            ("astronaut", "png"), ("coffee", "png"), ("chelsea", "png"), ("rocket", "jpg"),
+            ("camera", "png"), ("motorcycle_left", "png"),
+        )
+    ),
+    Photograph(name="grace hopper", package="matplotlib",
+               file="mpl-data/sample_data/grace_hopper.jpg"),
+    _panorama("empty_warehouse_01_1k", -50.0),
+    _panorama("forest_slope_1k", -95.0),
+    _panorama("potsdamer_platz_1k", 20.0),
+    _panorama("st_fagans_interior_1k", -15.0, -10.0),
+    _panorama("venice_sunset_1k", 150.0),
+)  # fmt: skip
+"""Portraits, close-ups, animals, machines, interiors, streets, woods."""
+
+
+def load(photograph: Photograph) -> Image:
+    """Its pixels, red first.
+
+    Raises:
+        InputError: the package that has the file is not installed.
+    """
+    try:
+        file = importlib.resources.files(photograph.package).joinpath(photograph.file)
+        pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
+    except (ModuleNotFoundError, FileNotFoundError) as error:
+        raise InputError(
+            f"{photograph.name}: expected {photograph.file} of the package {photograph.package}, "
+            f"got none; install {photograph.package}"
+        ) from error
+    rgb = np.ascontiguousarray(pixels[..., ::-1])
+    if photograph.yaw_deg is None:
+        return rgb
+    return panorama_view(rgb, photograph.yaw_deg, photograph.pitch_deg)
+
+
+def panorama_view(panorama: Image, yaw_deg: float, pitch_deg: float) -> Image:
+    """A pinhole view of an equirectangular panorama."""
+    (height, width), sides = VIEW_PX, panorama.shape[:2]
+    focal_px = width / 2 / math.tan(math.radians(VIEW_FOV_DEG) / 2)
+    x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
+    pitch = math.radians(pitch_deg)
+    down = y * math.cos(pitch) - focal_px * math.sin(pitch)
+    forward = y * math.sin(pitch) + focal_px * math.cos(pitch)
+    yaw = np.arctan2(x, forward) + math.radians(yaw_deg)
+    elevation = np.arctan2(down, np.hypot(x, forward))
+    columns = (yaw / (2 * math.pi) + 0.5) * sides[1] - 0.5
+    rows = (elevation / math.pi + 0.5) * sides[0] - 0.5
+    maps = (columns.astype(np.float32), rows.astype(np.float32))
+    return cv2.remap(panorama, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
