@@ -58,5 +58,7 @@ def paper_recipe() -> Recipe:
         seed=0,
         model=model,
         stages=(vae, low, high, dynamic, video, joint),
-        trainer=TrainerSettings(precision="bfloat16", parallel="fsdp2"),
+        trainer=TrainerSettings(
+            precision="bfloat16", parallel="fsdp2", recompute=True, defer_renders=True
+        ),
     )

@@ -19,6 +19,11 @@ from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
 from diff4splat.models.networks import PARTS, Networks, model_parts
+from diff4splat.models.placement.initial_weights import (
+    InitialWeights,
+    RecordedCalls,
+    initial_weights,
+)
 from diff4splat.models.text_encoder.encoder import TextEncoder
 from diff4splat.models.video_dit.dit import VideoDiT
 from diff4splat.models.video_vae.vae import VideoVae
@@ -42,6 +47,18 @@ def create_networks(
     builders = _builders(config)
     wanted = [part for part in model_parts(config) if parts is None or part in parts]
     return Networks(**{part: _build(part, builders[part], target, seed) for part in wanted})
+
+
+def plan_networks(
+    config: ModelConfig, parts: Collection[str], *, seed: int = 0
+) -> tuple[Networks, Mapping[str, InitialWeights]]:
+    """Networks on the meta device, and how to draw the weights of ``create_networks`` singly."""
+    builders, made, weights = _builders(config), {}, {}
+    for part in (part for part in model_parts(config) if part in parts):
+        with torch.device("meta"), RecordedCalls() as recorded:
+            made[part] = builders[part]()
+        weights[part] = initial_weights(made[part], recorded.calls, _stream(part, seed))
+    return Networks(**made), MappingProxyType(weights)
 
 
 def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
@@ -79,8 +96,13 @@ def _build(part: str, make: Callable[[], nn.Module], target: torch.device, seed:
         with target, _NoInitialValues():
             return make()
     with torch.random.fork_rng(devices=[]), torch.device("cpu"):
-        torch.manual_seed(seed * len(PARTS) + PARTS.index(part))
+        torch.manual_seed(_stream(part, seed))
         return make().to(target)
+
+
+def _stream(part: str, seed: int) -> int:
+    """Seed of a part's own random stream."""
+    return seed * len(PARTS) + PARTS.index(part)
 
 
 class _NoInitialValues(TorchFunctionMode):

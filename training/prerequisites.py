@@ -16,16 +16,18 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.errors import CheckpointError, ConfigError, FileFormatError
 from diff4splat.models.adapters.lora import merged
-from diff4splat.models.factory import create_networks
+from diff4splat.models.factory import create_networks, plan_networks
 from diff4splat.models.hub.mapped_weights import mapped_parts
-from diff4splat.models.hub.model import Model
+from diff4splat.models.hub.model import Model, with_parts
+from diff4splat.models.hub.weight_files import is_version_1, part_file
 from diff4splat.models.networks import PARTS, Networks
 from diff4splat.training.latent_statistics import has_statistics, read_statistics
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stages.factory import STAGES
+from diff4splat.training.starting_weights import StartingWeights
 from diff4splat.training.trainer.checkpoints.export import load_parts
 from diff4splat.training.trainer.checkpoints.files import read_checkpoint
 from diff4splat.training.trainer.distributed.processes import Processes
@@ -87,12 +89,60 @@ def starting_networks(
         CheckpointError, FileFormatError: a checkpoint is missing, damaged or of other networks.
     """
     needed = STAGES[stage.kind].needed(recipe.model)
-    frozen = kept_parts(recipe, folder, start).intersection(needed) - set(stage.trained)
-    made = set(needed) - frozen
+    return _started(recipe, stage, folder, start, frozenset(needed))
+
+
+def sharded_networks(
+    recipe: Recipe, stage: StageRecipe, folder: Path, start: Model | None = None
+) -> tuple[Networks, StartingWeights]:
+    """The same with trained parts on the meta device, and where their weights come from.
+
+    Raises:
+        CheckpointError, FileFormatError, ConfigError: as ``starting_networks``, or weights that
+            cannot be shared out.
+    """
+    needed = frozenset(STAGES[stage.kind].needed(recipe.model))
+    trained = needed.intersection(stage.trained)
+    frozen = _started(recipe, stage, folder, start, needed - trained)
+    planned, initial = plan_networks(recipe.model, trained, seed=recipe.seed)
+    before = stages_before(recipe, stage, folder, start)
+    earlier = {part: folder / before[part].name for part in trained if part in before}
+    weights = StartingWeights(
+        seed=recipe.seed,
+        initial=initial,
+        files=_weight_files(start, trained),
+        checkpoints={part: last_checkpoint(place) for part, place in earlier.items()},
+        vae_statistics=earlier.get("vae"),
+    )
+    return replace(frozen, **dict(planned.parts())), weights
+
+
+def _started(
+    recipe: Recipe, stage: StageRecipe, folder: Path, start: Model | None, parts: frozenset[str]
+) -> Networks:
+    """Some of the parts that the stage runs, whole; those with public weights stay mapped."""
+    mapped = kept_parts(recipe, folder, start).intersection(parts) - set(stage.trained)
+    made = parts - mapped
     networks = create_networks(recipe.model, seed=recipe.seed, parts=made)
     _take(networks, start, made)
-    networks = _filled(networks, stages_before(recipe, stage, folder, start), folder)
-    return replace(networks, **{part: getattr(start.networks, part) for part in frozen})
+    before = stages_before(recipe, stage, folder, start)
+    networks = _filled(networks, {part: before[part] for part in before if part in made}, folder)
+    if not mapped:
+        return networks
+    loaded = with_parts(start, mapped).networks
+    return replace(networks, **{part: getattr(loaded, part) for part in mapped})
+
+
+def _weight_files(start: Model | None, parts: Collection[str]) -> dict[str, Path]:
+    if start is None or start.folder is None:
+        return {}
+    ready = start.trained.intersection(parts)
+    if ready and is_version_1(start.folder):
+        raise ConfigError(
+            f"{start.folder}: expected a model folder of this release for sharded weights, got an "
+            "older one; write it anew with diff4splat pack"
+        )
+    return {part: part_file(start.folder, part) for part in ready}
 
 
 def trained_networks(
@@ -130,6 +180,7 @@ def _take(networks: Networks, start: Model | None, parts: Collection[str]) -> No
     """What ``start`` has trained of these parts."""
     if start is None:
         return
+    start = with_parts(start, start.trained.intersection(parts))
     for part, network in networks.parts():
         if part in start.trained and part in parts:
             stored = getattr(start.networks, part).state_dict()

@@ -5,14 +5,15 @@ prerequisites ─ networks ─ stage + samples ─ trainer ─ statistics of lat
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from diff4splat.io.atomic import write_text
 from diff4splat.metrics.features.load import load_features
+from diff4splat.models.adapters.adapter_file import write_adapter
 from diff4splat.models.hub.model import Model, save_model
 from diff4splat.models.hub.weight_files import part_file
-from diff4splat.models.networks import model_parts
+from diff4splat.models.networks import Networks, model_parts
 from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
 from diff4splat.progress.phases import Phases
 from diff4splat.training.batches.samples import ClipSamples
@@ -25,6 +26,7 @@ from diff4splat.training.prerequisites import (
     kept_parts,
     last_checkpoint,
     require_prerequisites,
+    sharded_networks,
     stages_before,
     starting_networks,
     trained_networks,
@@ -33,6 +35,7 @@ from diff4splat.training.recipe.fingerprint import fingerprint
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.recipe_json import recipe_to_json
 from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.stage import Stage
 from diff4splat.training.stages.factory import create_stage
 from diff4splat.training.stages.model_stage import StagePlan
 from diff4splat.training.trainer.checkpoints.export import load_parts
@@ -40,7 +43,7 @@ from diff4splat.training.trainer.gates import read_result
 from diff4splat.training.trainer.loop.fit import fit_stage
 from diff4splat.training.trainer.settings import RunSettings, StageResult, silent
 
-MODEL_FOLDER, RECIPE_FILE = "model", "recipe.json"
+MODEL_FOLDER, RECIPE_FILE, ADAPTER_FOLDER = "model", "recipe.json", "adapter"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,20 +81,37 @@ def train_stage(request: StageRequest) -> StageResult:
         removed = ", ".join(recipe.removed_stages)
         request.note(f"stages {removed} are left out: their kinds no longer exist")
     samples = open_samples(stage_recipe, recipe.seed)
-    networks = starting_networks(recipe, stage_recipe, request.folder, request.start)
+    networks, fill = _networks(request, stage_recipe)
     plan = StagePlan(
         model=recipe.model,
         recipe=stage_recipe,
         seed=recipe.seed,
         features=load_features(request.features),
+        defer_renders=recipe.trainer.defer_renders,
     )
-    if "vae" in stage_recipe.trained and networks.vae.pca_shortcut is not None:
+    if _starts_from_components(recipe, stage_recipe):
         init_from_principal_components(networks.vae, samples, request.phases)
     stage = create_stage(networks, plan)
-    result = fit_stage(stage, samples, stage_recipe, _settings(request, plan))
+    settings = replace(_settings(request, plan), fill=fill)
+    result = fit_stage(stage, samples, stage_recipe, settings)
     if is_main_process():
         _hand_over(request, stage_recipe, samples)
     return result
+
+
+def _networks(
+    request: StageRequest, stage: StageRecipe
+) -> tuple[Networks, Callable[[Stage], None] | None]:
+    """Networks to begin with; where weights are sharded, without values until they are."""
+    recipe = request.recipe
+    if recipe.trainer.parallel != "fsdp2" or _starts_from_components(recipe, stage):
+        return starting_networks(recipe, stage, request.folder, request.start), None
+    networks, weights = sharded_networks(recipe, stage, request.folder, request.start)
+    return networks, weights.fill
+
+
+def _starts_from_components(recipe: Recipe, stage: StageRecipe) -> bool:
+    return "vae" in stage.trained and recipe.model.vae.pca_shortcut
 
 
 def _settings(request: StageRequest, plan: StagePlan) -> RunSettings:
@@ -133,9 +153,18 @@ def _hand_over(
     networks, trained = trained_networks(request.recipe, request.folder, request.start)
     model = Model(config=request.recipe.model, networks=networks, trained=trained)
     save_model(model, request.folder / MODEL_FOLDER, _kept_files(request))
+    if stage.tuning != "full" and "dit" in stage.trained:
+        _write_adapter(request, stage)
     missing = ", ".join(part for part in model_parts(request.recipe.model) if part not in trained)
     state = f"not trained to the end: {missing}" if missing else "every part is trained"
     request.note(f"wrote {request.folder / MODEL_FOLDER}; {state}")
+
+
+def _write_adapter(request: StageRequest, stage: StageRecipe) -> None:
+    """What the video model learnt beside its own weights, averaged, for ``generate --lora``."""
+    folder = request.folder / stage.name
+    file = write_adapter(load_parts(last_checkpoint(folder))["dit"], folder / ADAPTER_FOLDER)
+    request.note(f"wrote {file}")
 
 
 def _kept_files(request: StageRequest) -> dict[str, Path]:

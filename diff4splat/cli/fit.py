@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
+from diff4splat.cli.options.device import render_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.errors import ConfigError, MissingExtraError
 
@@ -68,6 +69,9 @@ class Fit:
     """Ignore depth in the data."""
     renderer: Literal["auto", "trace", "raster", "reference", "gsplat"] = "auto"
     """Renderer; auto traces rays if cameras differ from pinholes, and rasterises otherwise."""
+    device: str = "cpu"
+    """Where frames are rasterised: cpu, cuda (by gsplat), or auto, which is cuda where there is
+    one. Rays are traced on the CPU, and everything is fitted in float32."""
     learn: tuple[Literal["lens", "focus", "aperture", "readout", "focal"], ...] = ()
     """Camera parameters to optimise together with the scene, from an initial guess in the data:
     lens coefficients, focus distance, aperture radius, read-out time, focal length."""
@@ -117,7 +121,7 @@ class Fit:
         from diff4splat.fitting.results import FitReport, write_results
         from diff4splat.progress.run_log import RunLog
 
-        log = RunLog(phases=ConsolePhases())
+        log, device = RunLog(phases=ConsolePhases()), render_device(self.device)
         capture, initial = self.capture(), self.initial_scene()
         for line in capture.notes:
             note(line)
@@ -127,7 +131,9 @@ class Fit:
         if promised and (self.restart or not (self.out / CHECKPOINT_FILE).is_file()):
             for line in promised.lines():
                 note(line)
-        renderer = FrameRenderer(capture=capture, backend=self.renderer, settings=settings.camera)
+        renderer = FrameRenderer(
+            capture=capture, backend=self.renderer, settings=settings.camera, device=device
+        )
         if renderer.traced:
             precompile_tracer(log.phases)
         if self.restart:
@@ -138,6 +144,7 @@ class Fit:
             folder=self.out,
             init=initial,
             backend=self.renderer,
+            device=device,
             stop_after_s=None if self.minutes is None else 60 * self.minutes,
             phases=log.phases,
             note=note,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from diff4splat.cli.limits.options import LimitOptions
+from diff4splat.cli.options.adapter import AdapterFolder, require_video_model
 from diff4splat.cli.options.camera import CameraOptions, choose_path, require_camera
 from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.depth import (
@@ -62,6 +63,9 @@ class Generate:
     """Random seed. The same seed gives the same scene, bit for bit, on one machine."""
     model: Annotated[str, ModelName()] = "small"
     """Model folder, or a size: test or small. A size loads its bundled weights, or random ones."""
+    lora: Annotated[Path | None, AdapterFolder()] = None
+    """Folder with low-rank corrections of the video model that a stage trained, such as
+    run/video_diffusion/adapter; needs --fill video."""
     runtime: Literal["torch", "onnx"] | None = None
     """What runs the networks: PyTorch, or ONNX Runtime on graphs that `diff4splat export onnx`
     wrote. Default: what the model folder holds."""
@@ -147,6 +151,7 @@ class Generate:
         if self.prompt is not None:
             require_prompt_for(self.model, self.prompt)
         require_runtime(self.model, self.runtime, self.device)
+        require_video_model(self.lora, self.model, self.fill)
         require_depth_kind(self.depth, self.depth_kind)
         if photo_files(self.images) == list(self.images[:1]):
             self.check_photo()
@@ -159,7 +164,7 @@ class Generate:
         from diff4splat.outputs.file_names import OUTPUT_FILES
 
         outputs = [self.out / name for name in OUTPUT_FILES]
-        inputs = (self.image, Path(self.camera), *filter(None, (self.depth,)))
+        inputs = (self.image, Path(self.camera), *filter(None, (self.depth, self.lora)))
         require_inputs_not_overwritten(inputs, outputs)
         with open_photo(self.image, self.convert):
             pass
@@ -222,7 +227,8 @@ class Generate:
         for line in outcome.promised.lines():
             note(line)
         with atomic_folder(self.out, OUTPUT_FILES) as folder:
-            pipeline = Diff4SplatPipeline.from_pretrained(self.model).to(device, self.dtype)
+            pipeline = Diff4SplatPipeline.from_pretrained(self.model, self.lora)
+            pipeline.to(device, self.dtype)
             scene = pipeline(
                 input_image,
                 path,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -46,8 +46,10 @@ class Train:
     minutes: Annotated[float | None, Number(above=0)] = None
     """Save and stop after this many minutes of this call."""
     device: str | None = None
-    """Device, such as cpu; auto, the default, is a GPU if available. The recipe has the precision:
-    --set trainer.precision=bfloat16."""
+    """Where networks are trained: cpu, cuda, or auto, the default, which is the GPU of each process
+    if there is one. Images are then rendered by gsplat."""
+    dtype: Literal["float32", "bfloat16"] | None = None
+    """What networks compute in; weights stay float32. Default: the recipe's trainer.precision."""
     ignore_gates: bool = False
     """Start even if earlier stages are unfinished or below their quality thresholds."""
 
@@ -108,7 +110,10 @@ class Train:
         )
         from diff4splat.training.recipe.overrides import override
 
-        recipe = override(self._base_recipe(), [one for given in self.set for one in given])
+        changes = [one for given in self.set for one in given]
+        if self.dtype is not None:
+            changes.append(f"trainer.precision={self.dtype}")
+        recipe = override(self._base_recipe(), changes)
         if self.clips:
             recipe = with_mixture(recipe, self._folders())
         if self.commercial_only:
@@ -143,9 +148,9 @@ class Train:
         return folders
 
     def starting_model(self) -> "Model | None":
-        """The model that stands in for stages that were not run."""
+        """The model that stands in for stages that were not run; weights are read where needed."""
         from diff4splat.models.hub.model import load_model
 
         if self.from_model is None:
             return None
-        return load_model(self.from_model)
+        return load_model(self.from_model, parts=())

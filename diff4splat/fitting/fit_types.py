@@ -33,6 +33,8 @@ class FitRequest:
     """Initial scene; replaces the coarse stage."""
     backend: str = "auto"
     """Renderer of the frames."""
+    device: str = "cpu"
+    """Where frames are rasterised."""
     stop_after_s: float | None = None
     """Time limit of this call."""
     phases: Phases = field(default_factory=Phases)

@@ -39,7 +39,10 @@ class FitSession:
         self.split = report_split(self.capture)
         request.note(f"{self.capture.name} ({self.capture.source}): {self.split}")
         self.renderer = FrameRenderer(
-            capture=self.capture, backend=request.backend, settings=self.settings.camera
+            capture=self.capture,
+            backend=request.backend,
+            settings=self.settings.camera,
+            device=request.device,
         )
         self.optics = LearnedOptics(self.capture, self.settings.camera.learn)
         self.store = FrameStore(self.capture, self.settings.picture_memory_mb << 20)

@@ -36,7 +36,8 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
 from diff4splat.generation.video.video_fill import FillRequest, TextStates, fill_hidden
 from diff4splat.generation.visible_fill import without_visible
-from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
+from diff4splat.models.hub.model import Model, load_model, save_model, with_adapter, with_parts
+from diff4splat.models.placement.resident import keep_blocks
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
@@ -54,8 +55,12 @@ class Diff4SplatPipeline:
         self.dtype = torch.float32
 
     @classmethod
-    def from_pretrained(cls, name_or_folder: str | Path) -> "Diff4SplatPipeline":
+    def from_pretrained(
+        cls, name_or_folder: str | Path, lora: Path | str | None = None
+    ) -> "Diff4SplatPipeline":
         """A model folder, or the name of a size: its bundled weights, else random ones.
+
+        ``lora`` is a folder with what a stage taught the video model beside its own weights.
 
         Weights are read when a generation needs them. Scenes are marked untrained if a network
         that ran is not trained.
@@ -64,7 +69,8 @@ class Diff4SplatPipeline:
             ConfigError: no such size.
             CheckpointError, FileFormatError: the folder's configuration cannot be used.
         """
-        return cls(load_model(name_or_folder, parts=()))
+        model = load_model(name_or_folder, parts=())
+        return cls(model if lora is None else with_adapter(model, Path(lora)))
 
     def to(self, device: torch.device | str, dtype: Dtype = "float32") -> "Diff4SplatPipeline":
         """Run networks there and in that precision; scenes come back to the CPU in float32."""
@@ -117,6 +123,8 @@ class Diff4SplatPipeline:
         with log.phases.phase("load networks"):
             self.model = with_parts(self.model, request.plan.parts)
             self.model.networks.to(self.device)
+            if self.model.runtime == "torch":
+                keep_blocks((part for _, part in self.model.networks.parts()), self.device)
         return self.generate(request, log)
 
     @torch.no_grad()

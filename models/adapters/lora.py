@@ -6,7 +6,9 @@ The weights of the layer stay frozen. ``merged`` folds the product into W, and t
 one without such layers.
 """
 
-from collections.abc import Mapping
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
 
 import torch
 from jaxtyping import Float
@@ -35,8 +37,11 @@ class LoraLinear(nn.Module):
         return self.base(tokens) + self.lora_scale * self.lora_up(self.lora_down(tokens))
 
 
-def add_lora(network: nn.Module, rank: int) -> int:
+def add_lora(network: nn.Module, rank: int, seed: int = 0) -> int:
     """Replace the layers that ``TARGETS`` names, in place; returns how many.
+
+    Initial values depend on the seed and on the name of a layer alone. On the meta device there are
+    none; ``initial_lora`` has them.
 
     Raises:
         ConfigError: a rank below 1, or no such layer.
@@ -52,14 +57,44 @@ def add_lora(network: nn.Module, rank: int) -> int:
     if not found:
         raise ConfigError(f"LoRA: expected layers named {', '.join(TARGETS)}, got none")
     for parent, name, layer in found:
-        setattr(parent, name, LoraLinear(layer, rank))
+        with torch.random.fork_rng(devices=[]), layer.weight.device:
+            setattr(parent, name, LoraLinear(layer, rank))
+    weights = network.state_dict()
+    for key, value in initial_lora(weights, seed):
+        if not weights[key].is_meta:
+            weights[key].copy_(value)
     return len(found)
+
+
+def initial_lora(weights: Mapping[str, Tensor], seed: int) -> Iterator[tuple[str, Tensor]]:
+    """Name and initial value of everything that LoRA adds to a network with ``weights``."""
+    for key, value in weights.items():
+        if key.endswith(DOWN):
+            digest = hashlib.blake2b(f"{seed}/{key}".encode(), digest_size=8).digest()
+            stream = torch.Generator().manual_seed(int.from_bytes(digest, "big") >> 1)
+            down = torch.empty(value.shape)
+            yield key, nn.init.kaiming_uniform_(down, a=math.sqrt(5), generator=stream)
+        elif key.endswith(UP):
+            yield key, torch.zeros(value.shape)
+        elif key.endswith(SCALE):
+            yield key, torch.tensor(1.0)
+
+
+def is_lora(key: str) -> bool:
+    """Whether a weight is one that LoRA adds."""
+    return ".lora_" in key
+
+
+def with_base(key: str) -> str:
+    """The name that a weight of an adapted layer has in the network with LoRA."""
+    layer, _, kind = key.rpartition(".")
+    return f"{layer}{BASE}{kind}"
 
 
 def merged(weights: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Weights of a network with such layers as those of one without; others pass unchanged."""
     layers = [key.removesuffix(DOWN) for key in weights if key.endswith(DOWN)]
-    plain = {key: value for key, value in weights.items() if ".lora_" not in key}
+    plain = {key: value for key, value in weights.items() if not is_lora(key)}
     for layer in layers:
         up, down = weights[layer + UP].double(), weights[layer + DOWN].double()
         weight = plain.pop(f"{layer}{BASE}weight")
@@ -72,4 +107,4 @@ def merged(weights: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 def lora_weights(weights: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """What has to be stored of such a network if the other weights are at hand."""
-    return {key: value for key, value in weights.items() if ".lora_" in key}
+    return {key: value for key, value in weights.items() if is_lora(key)}

@@ -2,21 +2,21 @@
 
 from torch import nn
 
-from diff4splat.models.adapters.lora import add_lora
+from diff4splat.models.adapters.lora import add_lora, is_lora
 from diff4splat.models.config.tuning import Tuning
 
 ADDED = ("camera_adapter.", "condition_embedding.")
 """What we add to a public video model."""
 
 
-def prepare_tuning(network: nn.Module, tuning: Tuning, rank: int) -> None:
+def prepare_tuning(network: nn.Module, tuning: Tuning, rank: int, seed: int = 0) -> None:
     """Mark the weights that learn; ``lora`` also adds its layers, in place."""
     if tuning == "full":
         return
     if tuning == "lora":
-        add_lora(network, rank)
+        add_lora(network, rank, seed)
     network.learning = frozenset(
-        name for name, _ in network.named_parameters() if name.startswith(ADDED) or ".lora_" in name
+        name for name, _ in network.named_parameters() if name.startswith(ADDED) or is_lora(name)
     )
 
 

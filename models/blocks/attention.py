@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.norm import TokenRmsNorm
 from diff4splat.models.blocks.rope import RopeTables, rotate
+from diff4splat.models.placement.shared_tokens import TokenGroup
 
 
 def attend(
@@ -53,6 +54,8 @@ class Attention(nn.Module):
         self.to_output = nn.Linear(width, width)
         self.query_norm = TokenRmsNorm(width)
         self.key_norm = TokenRmsNorm(width)
+        self.sharing: TokenGroup | None = None
+        """Processes that share the tokens of a self-attention."""
 
     def forward(
         self,
@@ -71,8 +74,18 @@ class Attention(nn.Module):
         value = self._split(self.to_value(source))
         if rope is not None:
             query, key = rotate(query, rope), rotate(key, rope)
+        if self.sharing is not None and context is None and mask is None:
+            return self.to_output(self._shared(self.sharing, query, key, value))
         bias = None if mask is None else mask[:, None, None]
         return self.to_output(attend(query, key, value, bias))
+
+    def _shared(
+        self, sharing: TokenGroup, query: Tensor, key: Tensor, value: Tensor
+    ) -> Float[Tensor, "b s d"]:
+        """The tokens of this process after they attended to those of all processes."""
+        query, key, value = sharing.to_heads(torch.stack([query, key, value])).unbind(0)
+        heads = attend(query, key, value).unflatten(-1, (query.shape[2], -1))
+        return sharing.to_tokens(heads).flatten(2)
 
     def _split(self, tokens: Float[Tensor, "b n d"]) -> Float[Tensor, "b n h c"]:
         return tokens.unflatten(-1, (self.heads, -1))

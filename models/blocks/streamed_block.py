@@ -2,7 +2,8 @@
 
 Public weights are larger than the memory of many machines. They are mapped from their file, often
 in half precision. A block copies its own to the device and to the type of the computation, runs,
-and lets the copies go: memory holds one block in full, whatever the number of blocks.
+and lets the copies go: memory holds one block in full, whatever the number of blocks. On a GPU with
+room for them, blocks keep their weights there, as they are stored.
 """
 
 from collections.abc import Callable
@@ -21,12 +22,30 @@ class StreamedBlock(nn.Module):
         self.block = block
         self.computes = torch.zeros(())
         """Its device and type are those of the computation."""
+        self.kept: dict[str, Tensor] | None = None
+        """Weights on the device of the computation, in their stored type."""
 
     def forward(self, *inputs: Any) -> Tensor:
         """The block's own output."""
         target = {"device": self.computes.device, "dtype": self.computes.dtype}
-        weights = {name: value.to(**target) for name, value in self.block.named_parameters()}
+        stored = dict(self.block.named_parameters()) if self.kept is None else self.kept
+        weights = {name: value.to(**target) for name, value in stored.items()}
         return functional_call(self.block, weights, inputs)
+
+    def keep(self) -> None:
+        """Keep the weights where the computation is."""
+        device = self.computes.device
+        self.kept = {name: value.to(device) for name, value in self.block.named_parameters()}
+
+    @property
+    def stored_bytes(self) -> int:
+        """What keeping takes."""
+        return sum(value.nbytes for value in self.block.parameters())
+
+    @property
+    def largest_copy_bytes(self) -> int:
+        """What one run takes."""
+        return sum(map(torch.numel, self.block.parameters())) * self.computes.element_size()
 
     def state_dict(self, *args: Any, **options: Any) -> dict[str, Any]:
         """The block's own, under the names that it has without streaming."""
@@ -34,7 +53,9 @@ class StreamedBlock(nn.Module):
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "StreamedBlock":
         del recurse
-        self.computes = fn(self.computes)
+        before, self.computes = self.computes.device, fn(self.computes)
+        if self.computes.device != before:
+            self.kept = None
         return self
 
 

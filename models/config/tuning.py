@@ -4,3 +4,5 @@ from typing import Literal
 
 Tuning = Literal["full", "adapters", "lora"]
 TUNINGS = ("full", "adapters", "lora")
+ADAPTER_FILE = "adapter.safetensors"
+"""In a folder: what a stage taught a video model beside its own weights."""

@@ -3,6 +3,7 @@
 config.json  provenance.json  <part>.safetensors  [SHA256SUMS]
 """
 
+import hashlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,9 +13,11 @@ import torch
 
 from diff4splat.errors import ConfigError
 from diff4splat.io.atomic import copy_file
+from diff4splat.io.file_digest import file_sha256
 from diff4splat.io.locks import sole_writer
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.sizes import size_by_name
+from diff4splat.models.config.tuning import ADAPTER_FILE
 from diff4splat.models.hub.checksums import SUMS_FILE
 from diff4splat.models.hub.folders import checked_folder
 from diff4splat.models.hub.provenance import (
@@ -34,6 +37,8 @@ from diff4splat.models.networks import Networks, model_parts
 from diff4splat.models.onnx.manifest import has_graphs, read_manifest
 
 Runtime = Literal["torch", "onnx"]
+ADAPTED = "dit"
+"""The part that adapters are for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +53,8 @@ class Model:
     """Names of the parts that are trained to their end."""
     license: str = NOT_STATED
     origin: str = NOT_STATED
+    adapter: Path | None = None
+    """Folder of what a stage taught the video model beside its own weights."""
 
     @property
     def runtime(self) -> Runtime:
@@ -70,7 +77,12 @@ class Model:
             return "none"
         if self.runtime == "onnx":
             return read_manifest(self.folder).weights_sha256(parts)
-        return weights_sha256(self.folder, self.parts if parts is None else parts)
+        wanted = self.parts if parts is None else parts
+        files = weights_sha256(self.folder, wanted)
+        if self.adapter is None or ADAPTED not in wanted:
+            return files
+        digests = f"{files}\n{file_sha256(self.adapter / ADAPTER_FILE)}\n"
+        return hashlib.sha256(digests.encode()).hexdigest()
 
 
 def load_model(name_or_folder: str | Path, parts: Collection[str] | None = None) -> Model:
@@ -109,7 +121,30 @@ def with_parts(model: Model, parts: Collection[str]) -> Model:
     if not missing:
         return model
     fresh = _networks(model, missing)
+    if model.adapter is not None and ADAPTED in missing:
+        _adapt(fresh, model.adapter)
     return replace(model, networks=replace(model.networks, **dict(fresh.parts())))
+
+
+def with_adapter(model: Model, folder: Path) -> Model:
+    """The same model, whose video model gets the weights of an adapter folder when it is loaded.
+
+    Raises:
+        ConfigError: the model runs ONNX graphs, or its video model is loaded already.
+    """
+    if model.runtime == "onnx" or ADAPTED in model.loaded:
+        raise ConfigError(
+            "adapter: expected a model of PyTorch weights whose video model is not loaded yet, "
+            f"got {model.folder}; name its folder instead"
+        )
+    return replace(model, adapter=folder)
+
+
+def _adapt(networks: Networks, folder: Path) -> None:
+    from diff4splat.models.adapters.adapter_file import put_adapter
+
+    put_adapter(networks.dit, folder)
+    networks.dit.requires_grad_(False)
 
 
 def _networks(model: Model, parts: Collection[str]) -> Networks:

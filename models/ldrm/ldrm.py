@@ -30,6 +30,7 @@ from diff4splat.models.config.networks import GAUSSIAN_SPLIT, TIME_STRIDE, TOKEN
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.branch import RefinementBranch
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.placement.shared_tokens import TokenGroup
 from diff4splat.models.video_dit.camera_adapter import PLUCKER_CHANNELS
 
 
@@ -60,6 +61,13 @@ class Ldrm(nn.Module):
         self.refinement = RefinementBranch(config) if config.refinement.used else None
         if self.refinement is None:
             self.to_gaussians = _to_pixels(ldrm, self.token_px // ldrm.grid_stride)
+        self.sharing: TokenGroup | None = None
+
+    def share_tokens(self, sharing: TokenGroup | None) -> None:
+        """Let processes that compute the same sample share its tokens."""
+        self.sharing = sharing
+        for block in self.blocks:
+            block.attention.sharing = sharing
 
     def forward(
         self,
@@ -96,8 +104,13 @@ class Ldrm(nn.Module):
         grid = tuple(tokens.shape[1:4])
         rope = rope_tables(grid, self.config.width // self.config.heads, tokens.device)
         tokens = tokens.flatten(1, 3)
+        if self.sharing is not None:
+            rope = self.sharing.split_rope(rope, 1)
+            tokens = self.sharing.split(tokens, 1)
         for block in self.blocks:
             tokens = block(tokens, rope)
+        if self.sharing is not None:
+            tokens = self.sharing.join(tokens, 1)
         return self.norm_out(tokens).transpose(1, 2).unflatten(2, grid)
 
     def _latent_tokens(self, latent: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b t h2 w2 d"]:

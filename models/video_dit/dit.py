@@ -35,6 +35,7 @@ from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TOKEN_PATCH
+from diff4splat.models.placement.shared_tokens import TokenGroup
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
 from diff4splat.models.video_dit.conditions import (
     DitConditions,
@@ -86,6 +87,13 @@ class VideoDiT(nn.Module):
         self.norm_out = nn.LayerNorm(dit.width, eps=EPSILON, elementwise_affine=False)
         self.modulation_out = nn.Parameter(torch.zeros(2, dit.width))
         self.head = zero_(nn.Linear(dit.width, channels * TOKEN_PATCH**2))
+        self.sharing: TokenGroup | None = None
+
+    def share_tokens(self, sharing: TokenGroup | None) -> None:
+        """Let processes that compute the same sample share its tokens."""
+        self.sharing = sharing
+        for block in self.blocks:
+            block.attention.sharing = sharing
 
     def forward(
         self,
@@ -191,8 +199,13 @@ class VideoDiT(nn.Module):
             embedding = embedding + conditions.pooled_text[:, None]
         modulation = self.level_modulation(embedding)
         tokens = tokens.flatten(2, 3)
+        if self.sharing is not None:
+            rope = self.sharing.split_rope(rope, tokens.shape[1])
+            tokens = self.sharing.split(tokens, 2)
         for block in self.blocks:
             tokens = block(tokens, modulation, rope, conditions)
+        if self.sharing is not None:
+            tokens = self.sharing.join(tokens, 2)
         wide = at_least_float32(embedding)[..., None, :] + at_least_float32(self.modulation_out)
         shift, scale = wide[..., None, :].unbind(2)
         modulated = modulate(self.norm_out(at_least_float32(tokens)), shift, scale)

@@ -26,11 +26,12 @@ def in_unit(clip: Clip, settings: DataSettings) -> Clip:
     Raises:
         InputError: too little depth, or metres are wanted and the clip does not have them.
     """
-    if settings.unit == "median_depth":
+    metric = clip.note.metric in ("exact", "aligned")
+    if settings.unit == "median_depth" or (settings.unit == "known" and not metric):
         if clip.views[0].depth is None:
             return rescaled(clip, 1 / (_travel(clip) or 1))
         return normalized(clip, settings.min_valid_depth)
-    if clip.note.metric in ("exact", "aligned"):
+    if metric:
         return clip
     raise InputError(
         f"clip {clip.note.identifier}: expected lengths in metres, got metric "

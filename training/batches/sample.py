@@ -3,7 +3,7 @@
 Axes: ``f`` frames, ``h w`` pixels. Everything random comes from the generator of the sample's key.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import torch
 from jaxtyping import Float
@@ -44,6 +44,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         InputError: the clip is too short, has too little depth, or another shape than asked for.
     """
     generator = origin.key.generator()
+    clip, settings = _as_source(clip, settings, origin.settings)
     clip = fitted(_window(clip, settings, generator), settings.size_px)
     clip = augmented(clip, settings, generator)
     clip = in_unit(clip, settings)
@@ -80,6 +81,17 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         is_static=torch.tensor([clip.note.is_static]),
         captions=(clip.note.caption,),
     )
+
+
+def _as_source(
+    clip: Clip, settings: DataSettings, source: SourceSettings
+) -> tuple[Clip, DataSettings]:
+    """What the source gives of the clip: some of its views, its motion or not, its unit."""
+    if source.views:
+        clip = replace(clip, views=clip.views[: source.views])
+    if source.motion_loss == "never":
+        clip = replace(clip, tracks=None)
+    return clip, replace(settings, unit=source.unit or settings.unit)
 
 
 def _window(clip: Clip, settings: DataSettings, generator: torch.Generator) -> Clip:

@@ -54,7 +54,8 @@ class FolderClips:
 
     def __init__(self, settings: SourceSettings, data: DataSettings, seed: int) -> None:
         self.folder = Path(settings.folder)
-        self.views, self.selection = data.views, Selection(commercial_only=data.commercial_only)
+        views = min(settings.views or data.views, data.views)
+        self.views, self.selection = views, Selection(commercial_only=data.commercial_only)
         self.kept: dict[int, Clip] | None = {} if data.in_memory else None
         self.order = ShuffledIndices(settings.still_share, seed)
 

@@ -7,6 +7,8 @@ from typing import Literal
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.training.recipe.checks import require
 
+Unit = Literal["median_depth", "metre", "known"]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceSettings:
@@ -22,10 +24,17 @@ class SourceSettings:
     weight: float = 1.0
     depth_loss: Literal["true", "always", "never"] = "true"
     """``true`` leaves out depth whose scale was only assumed (``pseudo``)."""
+    motion_loss: Literal["true", "never"] = "true"
+    """``never`` leaves out tracks and masks of moving clips."""
+    views: int = 0
+    """Cameras that are read of each clip, such as 1 for monocular use; 0 reads ``data.views``."""
+    unit: Literal["", "median_depth", "metre", "known"] = ""
+    """Unit of length of these clips; empty is ``data.unit``."""
 
     def __post_init__(self) -> None:
         require(0 <= self.still_share <= 1, "source.still_share", "0 to 1", self.still_share)
         require(0 <= self.weight < math.inf, "source.weight", "at least 0", self.weight)
+        require(self.views >= 0, "source.views", "at least 0", self.views)
         named = self.kind == "worlds" or self.folder != ""
         require(named, "source.folder", "the folder of the shards or latents", "none")
 
@@ -55,9 +64,10 @@ class DataSettings:
     """Tracked points per clip."""
     supervise_motion: bool = True
     """False takes all targets of moving clips from their first frame, for static stages."""
-    unit: Literal["median_depth", "metre"] = "median_depth"
-    """Length 1 of a sample: a quarter of the clip's median depth, or a metre; clips without
-    metric scale are then skipped and counted."""
+    unit: Unit = "median_depth"
+    """Length 1 of a sample: a quarter of the clip's median depth, or a metre, and clips without
+    metric scale are skipped and counted; ``known`` is a metre where the clip has metric scale, and
+    a quarter of the median depth elsewhere."""
     fps: float = 0.0
     """Frame rate that faster clips are thinned to; 0 takes every frame."""
     commercial_only: bool = False

@@ -38,7 +38,7 @@ def decisive(stage: Mapping[str, Any]) -> dict[str, Any]:
         {
             key: value
             for key, value in source.items()
-            if key != "folder" and (key, value) != ("depth_loss", "true")
+            if key != "folder" and not (key in _SOURCE_ADDED and _SOURCE_ADDED[key] == value)
         }
         for source in data["sources"]
     ]
@@ -83,6 +83,7 @@ _MODEL_ADDED = (
 )
 """Settings of networks that are off where they are empty or 0."""
 _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
+_SOURCE_ADDED = {"depth_loss": "true", "motion_loss": "true", "views": 0, "unit": ""}
 _NOT_DECISIVE = ("workers", "in_memory")
 _ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False}
 """Settings of later releases, with the value that changes nothing."""

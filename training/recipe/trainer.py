@@ -18,6 +18,13 @@ class TrainerSettings:
     compile: bool = False
     """The networks that a stage names run through ``torch.compile``; most stages name none."""
     parallel: Parallel = "none"
+    recompute: bool = False
+    """Activation checkpointing: blocks run again in the backward pass instead of keeping what they
+    computed; a third more time, and memory for one block."""
+    defer_renders: bool = False
+    """Renders are made without a graph and again, one by one, in the backward pass."""
+    context_parallel: int = 1
+    """Processes that share the tokens of each sample; they divide the heads of every attention."""
     checkpoint_every: int = 500
     evaluate_every: int = 500
     evaluation_samples: int = 8
@@ -39,5 +46,9 @@ class TrainerSettings:
         for name in (*at_least_1, "most_skips_in_a_row", "spikes_before_rollback"):
             value = getattr(self, name)
             require(value >= 1, f"trainer.{name}", "at least 1", value)
+        group = self.context_parallel
+        require(group >= 1, "trainer.context_parallel", "at least 1", group)
+        alone = group > 1 and self.parallel == "none"
+        require(not alone, "trainer.context_parallel", "1 without ddp or fsdp2", group)
         samples = self.evaluation_samples
         require(samples >= 0, "trainer.evaluation_samples", "at least 0", samples)

@@ -27,6 +27,8 @@ class StagePlan:
     seed: int
     features: PerceptualFeatures
     """Compares images in the perceptual term; not called when its weight is 0."""
+    defer_renders: bool = False
+    """Images are rendered again, one by one, in the backward pass."""
 
     @property
     def random(self) -> StageRandom:
@@ -59,7 +61,7 @@ class ModelStage(Stage):
             if name in self.parts:
                 self.add_module(name, part.requires_grad_(name in self.trained))
         if "dit" in self.trained:
-            prepare_tuning(networks.dit, plan.recipe.tuning, plan.recipe.lora_rank)
+            prepare_tuning(networks.dit, plan.recipe.tuning, plan.recipe.lora_rank, plan.seed)
         self.train()
 
     def train(self, mode: bool = True) -> "ModelStage":

@@ -8,7 +8,9 @@ plane prior start below the pruning threshold and could otherwise never be raise
 contributions below ``alpha_cutoff``, which is lowered for the same reason.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import torch
 from jaxtyping import Float, Int
@@ -21,7 +23,6 @@ from diff4splat.generation.video.canonical_scene import (
     reconstruct_refined,
 )
 from diff4splat.geometry import quaternion
-from diff4splat.geometry.camera import Camera
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
@@ -31,20 +32,17 @@ from diff4splat.models.deformation.keyframes import (
     deformation_state,
     raw_scales,
 )
-from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH, UNSEEN, plane_base
+from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH, plane_base
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
 from diff4splat.models.networks import Networks
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.api import render
-from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians, concatenate
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.video_latents import camera_rays
 from diff4splat.training.stages.model_stage import StagePlan
-
-SETTINGS = RenderSettings(alpha_cutoff=UNSEEN / 10)
+from diff4splat.training.stages.moment_images import Moment, images_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +72,8 @@ class ScenePredictor:
         maps = self.networks.ldrm(latent, camera_rays(batch.cameras), video, moving=False)
         with torch.autocast(latent.device.type, enabled=False):
             scenes = canonical_scenes(maps, batch, self.plan.model, video)
-            return _with_input_depth(_static_images(scenes, batch), maps, self.plan.model)
+            rendered = _static_images(scenes, batch, self.plan.defer_renders)
+            return _with_input_depth(rendered, maps, self.plan.model)
 
     def render_dynamic(
         self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]
@@ -85,7 +84,7 @@ class ScenePredictor:
         deformations = self._deformations(maps, batch)
         with torch.autocast(latent.device.type, enabled=False):
             scenes = canonical_scenes(maps, batch, model, video)
-            rendered = _dynamic_images(scenes, deformations, batch, model)
+            rendered = _dynamic_images(scenes, deformations, batch, self.plan)
             return _with_input_depth(rendered, maps, model)
 
     def displacements(
@@ -149,33 +148,50 @@ def log_depth(raw: Float[Tensor, "n 1 h w"], model: ModelConfig) -> Float[Tensor
     return key_depth(raw.float(), model.activation)[:, 0].log()
 
 
-def _static_images(scenes: list[CanonicalScene], batch: ClipBatch) -> RenderedScenes:
-    times = batch.target_time.shape[1]
-    rgb, depth = _target_images([[scene.gaussians] * times for scene in scenes], batch)
+def _static_images(scenes: list[CanonicalScene], batch: ClipBatch, defer: bool) -> RenderedScenes:
+    def shown(index: int, time: int) -> Moment:
+        del time
+        return Moment(gaussians=scenes[index].gaussians)
+
+    rgb, depth = _target_images(shown, batch, defer)
     return RenderedScenes(rgb=rgb, depth=depth, offsets=None)
 
 
 def _dynamic_images(
-    scenes: list[CanonicalScene], deformations: list[Tensor], batch: ClipBatch, model: ModelConfig
+    scenes: list[CanonicalScene], deformations: list[Tensor], batch: ClipBatch, plan: StagePlan
 ) -> RenderedScenes:
     """``deformations`` hold the raw maps of all samples, one tensor (b, 10, …) per target time."""
-    moved = []
-    for index, scene in enumerate(scenes):
-        states = [deformed_state(scene, maps[index], model) for maps in deformations]
-        moved.append([deformed(scene.gaussians, state) for state in states])
-    rgb, depth = _target_images(moved, batch)
-    return RenderedScenes(rgb=rgb, depth=depth, offsets=track_offsets(deformations, batch, model))
+
+    def shown(index: int, time: int) -> Moment:
+        scene = scenes[index]
+        return Moment(
+            gaussians=scene.gaussians,
+            inputs=(deformations[time][index], scene.maps.gaussians),
+            change=partial(_moved, scene, plan.model),
+        )
+
+    rgb, depth = _target_images(shown, batch, plan.defer_renders)
+    offsets = track_offsets(deformations, batch, plan.model)
+    return RenderedScenes(rgb=rgb, depth=depth, offsets=offsets)
+
+
+def _moved(
+    scene: CanonicalScene, model: ModelConfig, gaussians: Gaussians, raw: Tensor, maps: Tensor
+) -> Gaussians:
+    """The Gaussians of a scene at the time of a raw map; gradients follow the arguments."""
+    scene = replace(scene, gaussians=gaussians, maps=replace(scene.maps, gaussians=maps))
+    return deformed(gaussians, deformed_state(scene, raw, model))
 
 
 def _target_images(
-    per_time: list[list[Gaussians]], batch: ClipBatch
+    shown: Callable[[int, int], Moment], batch: ClipBatch, defer: bool
 ) -> tuple[Float[Tensor, "b m p h w 3"], Float[Tensor, "b m p h w"]]:
-    """Colour and depth of every sample's Gaussians, one set per target time."""
+    """Colour and depth of every sample (index) at every target time (index)."""
     images = []
-    for index, moved in enumerate(per_time):
+    for index in range(len(batch)):
         targets = batch.target_cameras[index]
-        flat = [_images(gaussians, targets[time]) for time, gaussians in enumerate(moved)]
-        images.append(_stack(flat))
+        times = range(batch.target_time.shape[1])
+        images.append(_stack([images_of(shown(index, t), targets[t], defer) for t in times]))
     return _stack(images)
 
 
@@ -221,11 +237,6 @@ def deformed(gaussians: Gaussians, state: DeformationState) -> Gaussians:
         scales=moved.scales * state.log_scale_offsets.exp(),
     )
     return concatenate([moved, static]) if len(static) else moved
-
-
-def _images(gaussians: Gaussians, cameras: Camera) -> tuple[Tensor, Tensor]:
-    output = render(gaussians, cameras, outputs=("rgb", "depth"), settings=SETTINGS)
-    return output.rgb, output.depth
 
 
 def _stack(pairs: list[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:

@@ -8,6 +8,7 @@ from typing import Literal
 from diff4splat.errors import ConfigError
 from diff4splat.progress.phases import Phases
 from diff4splat.training.recipe.trainer import TrainerSettings
+from diff4splat.training.stage import Stage
 
 Outcome = Literal["finished", "signalled", "step_limit", "time_limit"]
 """Why training returned; all but ``finished`` go on with the next call."""
@@ -33,6 +34,8 @@ class RunSettings:
     earlier_fingerprint: str | None = None
     """The fingerprint that an earlier release gave the same stage; accepted too."""
     trainer: TrainerSettings = field(default_factory=TrainerSettings)
+    fill: Callable[[Stage], None] | None = None
+    """Gives values to weights on the meta device, once they are sharded."""
     start_from: Path | None = None
     """Folder of the finished stage before this one: its weights and averages are taken over."""
     store_frozen: bool = False

@@ -7,7 +7,7 @@ from diff4splat.errors import ConfigError
 COMMANDS = ("generate", "render", "bake", "export html", "export onnx", "fit", "train")
 
 
-def command_work(arguments: Sequence[str]) -> tuple[str, dict[str, float]]:
+def command_work(arguments: Sequence[str]) -> tuple[str, dict[str, float | int]]:
     """(name in the calibration table, counted work) of a command line.
 
     Raises:

@@ -4,7 +4,7 @@ Axes: ``h w`` pixels, ``n`` Gaussians. Ray tracing takes the whole scene, since 
 gives each row its own time. Rasterisation takes the state at the time of the frame.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 
 import torch
 from jaxtyping import Bool
@@ -43,6 +43,8 @@ class FrameRenderer:
     capture: Capture
     backend: str = "auto"
     settings: CameraSettings = field(default_factory=CameraSettings)
+    device: str = "cpu"
+    """Where frames are rasterised; Gaussians go there, images and gradients come back."""
 
     def __post_init__(self) -> None:
         if self.backend in ("auto", TRACE):
@@ -99,13 +101,14 @@ class FrameRenderer:
         self, state: Gaussians, index: int, outputs: set[str] | None = None
     ) -> RenderOutput:
         """A frame of Gaussians at one time, through the pinhole camera of the capture."""
-        return render(
-            state,
+        output = render(
+            state.to(torch.device(self.device)),
             self.capture.cameras[index],
             outputs=outputs or {"rgb"},
             settings=RenderSettings(background=self.background),
             backend=self.raster_backend,
         )
+        return _on(state.means.device, output)
 
     @property
     def raster_backend(self) -> str:
@@ -144,6 +147,12 @@ class FrameRenderer:
         return photograph(
             subject, camera, time_s, outputs=outputs, settings=settings, backend=backend
         )
+
+
+def _on(device: torch.device, output: RenderOutput) -> RenderOutput:
+    values = {one.name: getattr(output, one.name) for one in fields(output)}
+    moved = {name: one.to(device) for name, one in values.items() if isinstance(one, Tensor)}
+    return replace(output, **moved)
 
 
 def loss_mask(frame: Frame, valid: Bool[Tensor, "h w"]) -> Bool[Tensor, "h w"] | None:

@@ -14,6 +14,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.fitting.evaluator import Evaluator
 from diff4splat.fitting.fit import fit_scene
 from diff4splat.fitting.fit_types import FitRequest
+from diff4splat.fitting.frames import frame_renderer
 from diff4splat.fitting.frames.frame_renderer import FrameRenderer
 from diff4splat.fitting.frames.frame_schedule import FrameSchedule
 from diff4splat.fitting.frames.frame_store import FrameStore
@@ -35,8 +36,11 @@ from diff4splat.fitting.settings import (
     LossWeights,
     StaticDetectionSettings,
 )
+from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.lenses.opencv_fisheye import OpenCVFisheye
 from diff4splat.geometry.optics import Aperture, Optics, Shutter
+from diff4splat.render.settings import RenderOutput
+from diff4splat.scene.gaussians import Gaussians
 
 FISHEYE = Optics(lens=OpenCVFisheye(coefficients=torch.zeros(4), max_angle_rad=0.45))
 READOUT_S = 0.2
@@ -268,3 +272,17 @@ def test_one_ray_per_pixel_is_its_own_residual(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(FrameRenderer, "learn", lambda *given: calls.append(1) or learn(*given))
     objective(fisheye()).loss(model_of(motions()["still"]), 0.0, [0], 0)
     assert calls == [1]
+
+
+def test_frames_are_rasterised_where_they_are_asked_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gaussians go to the device and images come back; a fake renderer stands on the device."""
+    asked = []
+
+    def fake(state: Gaussians, camera: Camera, **_: object) -> RenderOutput:
+        asked.append(state.means.device.type)
+        return RenderOutput(rgb=torch.ones(*camera.size_px, 3))
+
+    monkeypatch.setattr(frame_renderer, "render", fake)
+    renderer = FrameRenderer(capture=fisheye(), device="meta")
+    output = renderer.rasterize(gaussians(), 0)
+    assert asked == ["meta"] and output.rgb.device.type == "cpu"

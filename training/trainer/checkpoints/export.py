@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from diff4splat.errors import CheckpointError
-from diff4splat.training.trainer.checkpoints.state_dict import AVERAGE, MODEL
+from diff4splat.training.trainer.checkpoints.merged import AVERAGE, MODEL
 from diff4splat.training.trainer.checkpoints.tensor_store import read_tensors, stored_shapes
 from diff4splat.training.trainer.loop.optim import part_of
 

@@ -1,25 +1,17 @@
 """One stage on one or many processes: alone, replicated (DDP) or sharded (FSDP2).
 
-FSDP2 shards every element of every ``nn.ModuleList`` inside the trained parts and then what is left
-of them; frozen parts stay whole on every process and never travel. In bfloat16 the weights of list
-elements travel in bfloat16 and are computed with there; all others stay float32, because geometry
-and heads may ask for them outside autocast. Master weights and reduced gradients are float32.
+With FSDP2 trained parts may lie on the meta device: they get memory once they are sharded, and
+their values by ``fill``.
 """
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
-from torch.distributed.device_mesh import init_device_mesh
-from torch.distributed.fsdp import (
-    MixedPrecisionPolicy,
-    fully_shard,
-    register_fsdp_forward_method,
-)
 from torch.nn.parallel import DistributedDataParallel
 
 from diff4splat.errors import ConfigError, ShapeError
@@ -28,6 +20,8 @@ from diff4splat.training.recipe.trainer import Precision, TrainerSettings
 from diff4splat.training.stage import TOTAL, Batch, Stage
 from diff4splat.training.trainer.distributed.compiling import compile_networks
 from diff4splat.training.trainer.distributed.processes import Processes
+from diff4splat.training.trainer.distributed.recomputing import recompute_blocks
+from diff4splat.training.trainer.distributed.sharding import shard
 
 
 class StageModule(nn.Module):
@@ -88,7 +82,13 @@ class ParallelStage:
         return self.losses.no_sync()
 
 
-def parallelise(stage: Stage, processes: Processes, settings: TrainerSettings) -> ParallelStage:
+Fill = Callable[[Stage], None]
+"""Gives values to weights that had none."""
+
+
+def parallelise(
+    stage: Stage, processes: Processes, settings: TrainerSettings, fill: Fill | None = None
+) -> ParallelStage:
     """Freeze what does not learn, move the stage to its device, and wrap it.
 
     Raises:
@@ -96,7 +96,16 @@ def parallelise(stage: Stage, processes: Processes, settings: TrainerSettings) -
         ShapeError: master weights are not float32.
     """
     freeze(stage)
-    stage.to(processes.device)
+    for name, part in stage.named_children():
+        if not _is_meta(part):
+            part.to(processes.device)
+        elif settings.parallel != "fsdp2" or name not in stage.trained:
+            raise ConfigError(f"{name}: expected weights, got none; only fsdp2 makes them sharded")
+    for part in stage.children():
+        if hasattr(part, "share_tokens"):
+            part.share_tokens(processes.sharing)
+    if settings.recompute:
+        recompute_blocks(stage)
     if settings.compile:
         compile_networks(stage)
     module = StageModule(stage, processes.device, settings.precision)
@@ -104,8 +113,22 @@ def parallelise(stage: Stage, processes: Processes, settings: TrainerSettings) -
     if settings.parallel == "ddp":
         losses = _replicate(module, processes.device)
     elif settings.parallel == "fsdp2":
-        _shard(module, processes, settings.precision)
+        shard(module, processes, settings.precision)
+        _allocate(stage, processes.device)
+    if fill is not None:
+        fill(stage)
     return ParallelStage(module=module, losses=losses)
+
+
+def _is_meta(part: nn.Module) -> bool:
+    return any(weight.is_meta for weight in part.parameters())
+
+
+def _allocate(stage: Stage, device: torch.device) -> None:
+    """Memory for this process's shards of parts on the meta device."""
+    for part in stage.children():
+        if _is_meta(part):
+            part.to_empty(device=device)
 
 
 def freeze(stage: Stage) -> None:
@@ -145,31 +168,3 @@ def _replicate(module: StageModule, device: torch.device) -> DistributedDataPara
             broadcast_buffers=False,
             find_unused_parameters=True,
         )
-
-
-def _shard(module: StageModule, processes: Processes, precision: Precision) -> None:
-    mesh = init_device_mesh(processes.device.type, (processes.count,))
-    # Inputs keep their type: positions and times must not be rounded on their way in.
-    half = MixedPrecisionPolicy(
-        param_dtype=torch.bfloat16 if precision == "bfloat16" else None,
-        reduce_dtype=torch.float32,
-        cast_forward_inputs=False,
-    )
-    for block in _blocks(module.stage):
-        fully_shard(block, mesh=mesh, mp_policy=half, reshard_after_forward=True)
-    frozen = {parameter for parameter in module.parameters() if not parameter.requires_grad}
-    # Kept whole after a forward pass, the root would not notice that averages are swapped in.
-    fully_shard(module, mesh=mesh, ignored_params=frozen, reshard_after_forward=True)
-    for method in ("measure", "panel"):
-        register_fsdp_forward_method(module, method)
-
-
-def _blocks(stage: Stage) -> Iterator[nn.Module]:
-    """List elements inside trained parts that can be called and have weights, inner ones first."""
-    for part in stage.trained:
-        for owner in reversed(list(stage.get_submodule(part).modules())):
-            if isinstance(owner, nn.ModuleList):
-                for block in owner:
-                    callable_ = not isinstance(block, nn.ModuleList | nn.ModuleDict)
-                    if callable_ and any(True for _ in block.parameters()):
-                        yield block

@@ -14,8 +14,10 @@ from typing import TypeVar
 
 import torch
 import torch.distributed as dist
+from torch.distributed.device_mesh import init_device_mesh
 
 from diff4splat.errors import ConfigError
+from diff4splat.models.placement.shared_tokens import TokenGroup
 from diff4splat.training.recipe.trainer import Parallel
 
 T = TypeVar("T")
@@ -28,6 +30,23 @@ class Processes:
     rank: int
     count: int
     device: torch.device
+    sharing: TokenGroup | None = None
+    """Those that compute the same samples; None where each computes its own."""
+
+    @property
+    def per_sample(self) -> int:
+        """Processes that share a sample; ranks of a group follow each other."""
+        return 1 if self.sharing is None else self.sharing.count
+
+    @property
+    def data_rank(self) -> int:
+        """Which share of the samples this process computes."""
+        return self.rank // self.per_sample
+
+    @property
+    def data_count(self) -> int:
+        """Shares of the samples."""
+        return self.count // self.per_sample
 
     @property
     def first(self) -> bool:
@@ -64,12 +83,16 @@ class Processes:
 
 @contextmanager
 def open_processes(
-    parallel: Parallel, device: str | None = None, timeout_s: float = 600.0
+    parallel: Parallel,
+    device: str | None = None,
+    timeout_s: float = 600.0,
+    per_sample: int = 1,
 ) -> Iterator[Processes]:
     """Join the other processes, if any, and leave them in the end.
 
     Raises:
-        ConfigError: several processes were started for a run that knows only one.
+        ConfigError: several processes were started for a run that knows only one, or
+            ``per_sample`` does not divide them.
     """
     rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
     if parallel == "none" and count > 1:
@@ -77,15 +100,28 @@ def open_processes(
             f"parallel: expected ddp or fsdp2 for {count} processes, got none; start one process "
             "or choose another"
         )
+    if count % per_sample:
+        raise ConfigError(
+            f"trainer.context_parallel: expected a number that divides {count} processes, got "
+            f"{per_sample}; start more processes or choose a smaller number"
+        )
     target = _device(device)
     joined = parallel != "none" and not dist.is_initialized()
     if joined:
         _join(rank, count, target, timeout_s)
     try:
-        yield Processes(rank=rank, count=count, device=target)
+        sharing = _token_group(count, per_sample, target) if per_sample > 1 else None
+        yield Processes(rank=rank, count=count, device=target, sharing=sharing)
     finally:
         if joined:
             dist.destroy_process_group()
+
+
+def _token_group(count: int, per_sample: int, device: torch.device) -> TokenGroup:
+    names = ("data", "context")
+    shape = (count // per_sample, per_sample)
+    mesh = init_device_mesh(device.type, shape, mesh_dim_names=names)
+    return TokenGroup(group=mesh.get_group("context"))
 
 
 def _device(wanted: str | None) -> torch.device:

@@ -51,7 +51,7 @@ class Evaluation:
         return image
 
     def _mine(self) -> list[int]:
-        rank, ranks = self.processes.rank, self.processes.count
+        rank, ranks = self.processes.data_rank, self.processes.data_count
         return [min(start + rank, self.count - 1) for start in range(0, self.count, ranks)]
 
     def _batch(self, position: int) -> Batch:

@@ -33,8 +33,11 @@ def fit_stage(stage: Stage, samples: Samples, recipe: StageRecipe, run: RunSetti
         OutputError: nothing can be written, or another run trains in the folder; the checkpoints
             so far stay.
     """
+    trainer = run.trainer
     with (
-        open_processes(run.trainer.parallel, run.device, run.timeout_s) as processes,
+        open_processes(
+            trainer.parallel, run.device, run.timeout_s, trainer.context_parallel
+        ) as processes,
         _sole_run(run.folder, processes),
         stop_request(run) as stop,
     ):

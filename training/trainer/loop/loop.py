@@ -42,7 +42,7 @@ def take_step(training: TrainingState, batches: Iterator[Loaded], stop: StopReas
     mine = run_micro_batches(training.parallel, batches, training.plan.accumulation, random)
     norm = gradient_norm(trained_parameters(training.parallel.stage).values())
     mine.stop = stop()
-    report = merge(training.processes.gather(mine))
+    report = merge(training.processes.gather(mine), training.processes.per_sample)
     _learn(training, report, norm)
     training.optimizer.zero_grad(set_to_none=True)
     for failure in report.failures:

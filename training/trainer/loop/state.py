@@ -117,8 +117,8 @@ def assemble(
     Raises:
         ConfigError, CheckpointError: settings, stage and checkpoints do not belong together.
     """
-    plan = plan_batches(recipe, processes.count, processes.rank)
-    parallel = parallelise(stage, processes, run.trainer)
+    plan = plan_batches(recipe, processes.data_count, processes.data_rank)
+    parallel = parallelise(stage, processes, run.trainer, run.fill)
     parameters = trained_parameters(stage)
     training = TrainingState(
         recipe=recipe,

@@ -92,13 +92,14 @@ def run_micro_batches(
     return report
 
 
-def merge(reports: list[RankReport]) -> StepReport:
-    """Put the processes' reports together, in the order of ranks."""
+def merge(reports: list[RankReport], per_sample: int = 1) -> StepReport:
+    """Put the processes' reports together, in the order of ranks; one for each share of samples."""
+    stops = [report.stop for report in reports if report.stop]
+    reports = reports[::per_sample]
     names = sorted({name for report in reports for name in report.terms})
     totals = [value for report in reports for value in report.terms[TOTAL]]
     samples = [sample for report in reports for sample in report.samples]
     sources = [source for report in reports for source in report.sources]
-    stops = [report.stop for report in reports if report.stop]
     by_source: dict[str, list[float]] = {}
     for source, value in zip(sources, totals, strict=False):
         by_source.setdefault(source, []).append(value)

@@ -18,6 +18,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import FileFormatError, InputError
 from diff4splat.training.batches.epoch_shuffle import VALIDATION_EVERY
+from diff4splat.training.batches.normalise_scale import normalized
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.batches.sources import (
     EndlessClips,
@@ -250,6 +251,28 @@ def test_metric_clips_keep_metres_and_others_are_refused() -> None:
     with pytest.raises(InputError, match="metres"):
         relative = replace(clip, note=replace(clip.note, metric="none"))
         ClipSamples(metres, 0, [Counting(relative)])[0]
+
+
+def test_metres_are_kept_where_they_are_known_in_one_stream() -> None:
+    clip = exact_clip(0, True)
+    exact = replace(clip, note=replace(clip.note, metric="exact"))
+    relative = replace(clip, note=replace(clip.note, metric="none"))
+    stream = recipe(
+        SourceSettings(unit="known"), SourceSettings(views=1, motion_loss="never"), data=DATA
+    )
+    samples = ClipSamples(stream, 0, [Counting(exact), Counting(relative)])
+    found = [samples[index] for index in range(12)]
+    batch = samples.collate(found)
+    assert len(set(batch.source)) == 2, "multi-view and monocular clips beside each other"
+    for sample, source in zip(found, batch.source, strict=True):
+        true = (clip if source.startswith("0") else normalized(clip)).views[0].depth[0]
+        assert float(sample.depth[0, 0].max()) == pytest.approx(float(true.max()), rel=1e-3)
+
+
+def test_a_source_without_motion_does_not_teach_stillness() -> None:
+    moving = exact_clip(0, False)
+    sample = ClipSamples(recipe(SourceSettings(motion_loss="never")), 0, [Counting(moving)])[0]
+    assert not bool(sample.motion_known) and not bool(sample.track_valid.any())
 
 
 def test_clips_without_depth_are_replaced_and_counted(tmp_path: Path) -> None:
