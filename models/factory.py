@@ -12,6 +12,9 @@ import torch
 from torch import nn
 from torch.overrides import TorchFunctionMode
 
+from diff4splat.models.cogvideox.t5 import T5Encoder
+from diff4splat.models.cogvideox.transformer import JointVideoDiT
+from diff4splat.models.cogvideox.vae import CogVideoXVae
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
@@ -49,7 +52,7 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
     return {
         "vae": lambda: _vae(config),
         "text_encoder": lambda: _text_encoder(config),
-        "dit": lambda: VideoDiT(config),
+        "dit": lambda: (JointVideoDiT if config.joint.used else VideoDiT)(config),
         "ldrm": lambda: Ldrm(config),
         "deformation": lambda: _deformation(config),
         "monocular_depth": lambda: MonocularDepthNet(config.monocular_depth.channels),
@@ -61,12 +64,15 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
 
 def _vae(config: ModelConfig) -> nn.Module:
     """Ours, or one that holds public weights."""
-    return VideoVae(config.vae) if config.vae.layout == "plain" else WanVae(config.vae)
+    if config.vae.layout == "plain":
+        return VideoVae(config.vae)
+    return (CogVideoXVae if config.vae.layout == "cogvideox" else WanVae)(config.vae)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:
-    bytewise = config.text.encoder == "bytes"
-    return TextEncoder(config.text) if bytewise else Umt5Encoder(config.text)
+    if config.text.encoder == "t5":
+        return T5Encoder(config.text, config.dit.padded_text_tokens)
+    return (TextEncoder if config.text.encoder == "bytes" else Umt5Encoder)(config.text)
 
 
 def _deformation(config: ModelConfig) -> DeformationNetwork | RefinedDeformation:

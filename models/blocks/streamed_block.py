@@ -22,7 +22,7 @@ class StreamedBlock(nn.Module):
         self.computes = torch.zeros(())
         """Its device and type are those of the computation."""
 
-    def forward(self, *inputs: Any) -> Tensor:
+    def forward(self, *inputs: Any) -> Any:
         """The block's own output."""
         target = {"device": self.computes.device, "dtype": self.computes.dtype}
         weights = {name: value.to(**target) for name, value in self.block.named_parameters()}

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeVar
 
 from diff4splat.errors import ConfigError, FileFormatError, InputError
 from diff4splat.models.config.checks import require, require_counts
+from diff4splat.models.config.joint import JointConfig
 from diff4splat.models.config.legacy import upgrade_config
 from diff4splat.models.config.networks import (
     REFINEMENT_TOKEN_PX,
@@ -37,6 +38,7 @@ __all__ = [
     "ActivationConfig",
     "DeformationConfig",
     "DitConfig",
+    "JointConfig",
     "LdrmConfig",
     "ModelConfig",
     "MonocularDepthConfig",
@@ -66,6 +68,8 @@ class ModelConfig:
     refinement: RefinementConfig = field(default_factory=RefinementConfig)
     monocular_depth: MonocularDepthConfig = field(default_factory=MonocularDepthConfig)
     motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
+    joint: JointConfig = field(default_factory=JointConfig)
+    """Where the video model has one sequence of text and video."""
     default_fill: Fill = "video"
     """What fills hidden regions by default; the paper uses the video model. ``none`` where that
     model makes hidden regions worse."""
@@ -84,6 +88,7 @@ class ModelConfig:
         known = self.default_fill in ("none", "video")
         require(known, "ModelConfig.default_fill", "none or video", self.default_fill)
         self._require_fitting_refinement()
+        self._require_fitting_joint()
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)
@@ -99,6 +104,18 @@ class ModelConfig:
         fits = not used or self.token_px == REFINEMENT_TOKEN_PX
         expected = f"tokens of {REFINEMENT_TOKEN_PX} px with a refinement decoder"
         require(fits, "ModelConfig.vae", expected, self.token_px)
+
+    def _require_fitting_joint(self) -> None:
+        """Positions need heads and widths in whole parts; the network predicts v alone."""
+        if not self.joint.used:
+            return
+        head = self.dit.width // self.dit.heads
+        what = "DitConfig.heads"
+        require(head % 8 == 0, what, "heads of a multiple of 8 with a joint sequence", head)
+        require(self.dit.width % 16 == 0, "DitConfig.width", "a multiple of 16", self.dit.width)
+        plain = self.dit.prediction_type == "velocity" and not self.dit.image_width
+        plain = plain and not self.dit.pooled_text
+        require(plain, "JointConfig", "no other prediction type, image states or pooled text", "")
 
     @property
     def token_px(self) -> int:

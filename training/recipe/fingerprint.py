@@ -59,6 +59,7 @@ def _model(model: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Mapping)
         else value
         for key, value in _without_plain(model).items()
+        if not (key == "joint" and not value["level_width"])
     }
 
 
@@ -80,6 +81,8 @@ _MODEL_ADDED = (
     "padded_text_tokens",
     "condition_channels",
     "image_width",
+    "groups",
+    "tile_px",
 )
 """Settings of networks that are off where they are empty or 0."""
 _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
