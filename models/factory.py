@@ -18,6 +18,7 @@ from diff4splat.models.cogvideox.vae import CogVideoXVae
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
+from diff4splat.models.image_encoder.clip import ClipImageEncoder
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
@@ -25,8 +26,12 @@ from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.text_encoder.encoder import TextEncoder
 from diff4splat.models.video_dit.dit import VideoDiT
 from diff4splat.models.video_vae.vae import VideoVae
+from diff4splat.models.wan.experts import NoiseExperts
 from diff4splat.models.wan.umt5 import Umt5Encoder
 from diff4splat.models.wan.vae import WanVae
+
+STREAMS = 7
+"""Random streams per seed: a part that was added later changes no other's weights."""
 
 
 def create_networks(
@@ -52,13 +57,14 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
     return {
         "vae": lambda: _vae(config),
         "text_encoder": lambda: _text_encoder(config),
-        "dit": lambda: (JointVideoDiT if config.joint.used else VideoDiT)(config),
+        "dit": lambda: _dit(config),
         "ldrm": lambda: Ldrm(config),
         "deformation": lambda: _deformation(config),
         "monocular_depth": lambda: MonocularDepthNet(config.monocular_depth.channels),
         "motion_unet": lambda: MotionUNet(
             motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
         ),
+        "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 
 
@@ -67,6 +73,13 @@ def _vae(config: ModelConfig) -> nn.Module:
     if config.vae.layout == "plain":
         return VideoVae(config.vae)
     return (CogVideoXVae if config.vae.layout == "cogvideox" else WanVae)(config.vae)
+
+
+def _dit(config: ModelConfig) -> nn.Module:
+    """Text attended to across or in one sequence, and one network or one per range of noise."""
+    if config.joint.used:
+        return JointVideoDiT(config)
+    return (NoiseExperts if config.dit.expert_boundary else VideoDiT)(config)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:
@@ -85,7 +98,7 @@ def _build(part: str, make: Callable[[], nn.Module], target: torch.device, seed:
         with target, _NoInitialValues():
             return make()
     with torch.random.fork_rng(devices=[]), torch.device("cpu"):
-        torch.manual_seed(seed * len(PARTS) + PARTS.index(part))
+        torch.manual_seed(seed * STREAMS + PARTS.index(part))
         return make().to(target)
 
 

@@ -38,6 +38,6 @@ class StreamedBlock(nn.Module):
         return self
 
 
-def stream_blocks(part: nn.Module, name: str = "blocks") -> None:
+def stream_blocks(network: nn.Module) -> None:
     """Replace the blocks of a network by streamed ones, in place."""
-    setattr(part, name, nn.ModuleList(StreamedBlock(block) for block in getattr(part, name)))
+    network.blocks = nn.ModuleList(StreamedBlock(block) for block in network.blocks)

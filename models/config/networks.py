@@ -178,6 +178,9 @@ class DitConfig:
     CogVideoX: 16 without a mask); 0: the first latent frame is the image's."""
     image_width: int = 0
     """Width of image states that every block also attends to (Wan image-to-video: 1280, CLIP)."""
+    expert_boundary: float = 0.0
+    """Noise level from which another network of the same settings is asked (Wan 2.2 A14B: 0.875, or
+    0.9 from an image); 0: one network for all levels."""
     pooled_text: bool = False
     """The mean of the text states also modulates every block, as the noise level does (Stable
     Diffusion 3, arXiv 2403.03206)."""
@@ -194,6 +197,10 @@ class DitConfig:
             require(isinstance(value, bool), f"DitConfig.{name}", "true or false", value)
         for name in ("padded_text_tokens", "condition_channels", "image_width"):
             require_optional_width(self, name)
+        boundary = self.expert_boundary
+        number = isinstance(boundary, int | float) and not isinstance(boundary, bool)
+        inside = number and 0 <= boundary < 1
+        require(inside, "DitConfig.expert_boundary", "a number from 0 on, below 1", boundary)
         one = not (self.pooled_text and self.padded_text_tokens)
         require(one, "DitConfig.pooled_text", "false with padded_text_tokens", self.pooled_text)
         require(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from torch import Tensor
 
+from diff4splat.models.config.image_encoder import ImageEncoderConfig
 from diff4splat.models.config.joint import JointConfig
 from diff4splat.models.config.networks import DitConfig, TextConfig, VaeConfig
 from diff4splat.models.public_weights.options import ImportOptions
@@ -33,6 +34,7 @@ class PublicNetworks:
     text: TextConfig
     dit: DitConfig
     joint: JointConfig = field(default_factory=JointConfig)
+    image_encoder: ImageEncoderConfig = field(default_factory=ImageEncoderConfig)
     sources: Mapping[str, tuple[WeightSource, ...]]
     """By part of our model."""
     statistics: Mapping[str, Tensor]

@@ -91,7 +91,11 @@ def open_public_model(root: Path, settings: ImportOptions | None = None) -> Publ
     config, tokenizer = _model_config(public, settings), family.tokenizer(folder)
     fresh: dict[str, Mapping[str, Tensor]] = {part: {} for part in public.sources} | {
         "vae": public.statistics,
-        "dit": _added(config, settings),
+        "dit": {
+            source.prefix + key: value
+            for source in public.sources["dit"]
+            for key, value in _added(config, settings).items()
+        },
     }
     networks = dict(create_networks(config, "meta", parts=public.sources).parts())
     shapes = {
@@ -175,6 +179,7 @@ def _model_config(public: PublicNetworks, settings: ImportOptions) -> ModelConfi
         text=public.text,
         dit=public.dit,
         joint=public.joint,
+        image_encoder=public.image_encoder,
         ldrm=replace(base.ldrm, input="latents"),
         deformation=base.deformation,
         activation=base.activation,

@@ -21,8 +21,8 @@ def count(source: Source, name: str, where: str) -> int:
     return value
 
 
-def number(source: Source, name: str, where: str, default: float) -> float:
-    """A finite number above 0.
+def number(source: Source, name: str, where: str, default: float | None = None) -> float:
+    """A finite number above 0; without a default it must be there.
 
     Raises:
         CheckpointError: something else.

@@ -54,6 +54,8 @@ OTHER_VALUES = {
     "offset_width": 8,
     "inverse_image_scale": True,
     "zero_terminal_snr": False,
+    "expert_boundary": 0.5,
+    "activation": "quick_gelu",
 }
 """Valid values where doubling the old one is not."""
 BOUND = [
@@ -64,6 +66,7 @@ BOUND = [
     ("vae", "tile_px"),
     ("joint", "level_width"),
     ("joint", "patch_frames"),
+    ("image_encoder", "width"),
 ]
 """Fields that may not change alone."""
 
@@ -116,7 +119,14 @@ def test_another_version_is_refused(version: object) -> None:
 
 def test_parts_that_a_stored_model_does_not_name_are_left_out() -> None:
     data = json.loads(test_size().to_json())
-    for later in ("refinement", "monocular_depth", "motion_unet", "joint", "default_fill"):
+    for later in (
+        "refinement",
+        "monocular_depth",
+        "motion_unet",
+        "joint",
+        "image_encoder",
+        "default_fill",
+    ):
         del data[later]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 
