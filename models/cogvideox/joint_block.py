@@ -7,14 +7,14 @@ the last frame's.
 """
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.attention import attend
 from diff4splat.models.blocks.feedforward import FeedForward
 from diff4splat.models.blocks.modulation import ZeroModulation
 from diff4splat.models.blocks.norm import EPSILON
-from diff4splat.models.blocks.rope import RopeTables, rotate
+from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.config.networks import DitConfig
 
 MODULATIONS = 6
@@ -62,13 +62,13 @@ class JointAttention(nn.Module):
         self.key_norm = nn.LayerNorm(width // heads, eps=EPSILON)
 
     def forward(
-        self, tokens: Float[Tensor, "b n d"], rope: RopeTables | None
-    ) -> Float[Tensor, "b n d"]:
-        """``rope`` covers all tokens; those of text do not turn."""
-        query = self.query_norm(self._split(self.to_query(tokens)))
+        self, tokens: Float[Tensor, "b n d"], turns: Complex[Tensor, "n 1 p"] | None, skipped: int
+    ) -> Float[Tensor, "b n2 d"]:
+        """``turns`` covers all tokens; the first ``skipped`` ones are only attended to."""
+        query = self.query_norm(self._split(self.to_query(tokens[:, skipped:])))
         key = self.key_norm(self._split(self.to_key(tokens)))
-        if rope is not None:
-            query, key = rotate(query, rope), rotate(key, rope)
+        if turns is not None:
+            query, key = turned(query, turns[skipped:]), turned(key, turns)
         return self.to_output(attend(query, key, self._split(self.to_value(tokens))))
 
     def _split(self, tokens: Float[Tensor, "b n d"]) -> Float[Tensor, "b n h c"]:
@@ -90,13 +90,24 @@ class JointBlock(nn.Module):
         text: Float[Tensor, "b s d"],
         video: Float[Tensor, "b t m d"],
         embedding: Float[Tensor, "b t e"],
-        rope: RopeTables | None,
+        turns: Complex[Tensor, "n 1 p"] | None,
+        last: bool = False,
     ) -> Pair:
-        """Attention, then the perceptron, each with its gates."""
+        """Attention, then the perceptron, each with its gates; no text comes out of the last."""
         normed, gates = self.attention_norm(text, video, embedding)
-        text, video = _gated((text, video), self.attention(_join(normed), rope), gates)
+        skipped = text.shape[1] if last else 0
+        update = self.attention(_join(normed), turns, skipped)
+        text, video = _gated((text[:, skipped:], video), update, gates)
         normed, gates = self.feedforward_norm(text, video, embedding)
         return _gated((text, video), self.feedforward(_join(normed)), gates)
+
+
+def turned(
+    heads: Float[Tensor, "b n h c"], turns: Complex[Tensor, "n 1 p"]
+) -> Float[Tensor, "b n h c"]:
+    """Every pair of channels as a complex number, multiplied by its token's turn."""
+    pairs = torch.view_as_complex(at_least_float32(heads).unflatten(-1, (-1, 2)))
+    return torch.view_as_real(pairs * turns).flatten(-2).to(heads.dtype)
 
 
 def _join(pair: Pair) -> Float[Tensor, "b n d"]:

@@ -7,11 +7,11 @@ are taken of the same float32 or float64 numbers as in diffusers: 998 in float32
 import math
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 from torch import Tensor
 
 from diff4splat.errors import ShapeError
-from diff4splat.models.blocks.rope import BASE, RopeTables
+from diff4splat.models.blocks.rope import BASE
 from diff4splat.models.config.joint import JointConfig
 
 Grid = tuple[int, int, int]
@@ -49,10 +49,10 @@ def _sinusoids(
     return torch.cat([angle.sin(), angle.cos()], -1).float()
 
 
-def rotary_tables(
+def rotary_turns(
     grid: Grid, head_width: int, text_tokens: int, config: JointConfig, device: torch.device
-) -> RopeTables:
-    """Tables of text, which does not turn, and of the grid behind it."""
+) -> Complex[Tensor, "n 1 p"]:
+    """By which channels turn: not for text, and by their positions for the grid behind it."""
     widths = (head_width // 4, head_width // 8 * 3, head_width // 8 * 3)
     angles = []
     for axis, (position, width) in enumerate(
@@ -66,7 +66,7 @@ def rotary_tables(
         angles.append(angle.reshape(shape).expand(*grid, -1))
     flat = torch.cat(angles, -1).flatten(0, 2)
     flat = torch.cat([flat.new_zeros(text_tokens, flat.shape[1]), flat])
-    return RopeTables(cos=flat.cos(), sin=flat.sin())
+    return torch.complex(flat.cos(), flat.sin())[:, None]
 
 
 def _rotary_positions(

@@ -14,12 +14,11 @@ With two frames per token an odd number of latent frames gets the first one twic
 """
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Complex, Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
-from diff4splat.models.blocks.rope import RopeTables
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp
 from diff4splat.models.cogvideox.joint_block import NORM_EPSILON, JointBlock
 from diff4splat.models.cogvideox.noise_schedule import path_norm, step_of_level, velocity_from_v
@@ -27,7 +26,7 @@ from diff4splat.models.cogvideox.positions import (
     Grid,
     added_positions,
     learned_positions,
-    rotary_tables,
+    rotary_turns,
     step_embedding,
 )
 from diff4splat.models.cogvideox.token_frames import join_patches, merge_frames, whole_tokens
@@ -183,16 +182,16 @@ class JointVideoDiT(nn.Module):
         embedding: Float[Tensor, "b t2 e"],
     ) -> Float[Tensor, "b c t h w"]:
         """What the network predicts, v."""
-        sides, rope = tokens.shape[2:4], self._rope(text, tokens)
+        sides, turns = tokens.shape[2:4], self._turns(text, tokens)
         video = tokens.flatten(2, 3)
         for block in self.blocks:
-            text, video = block(text, video, embedding, rope)
+            text, video = block(text, video, embedding, turns, block is self.blocks[-1])
         shift, scale = self.modulation_out(embedding)[:, :, :, None].unbind(2)
         video = modulate(self.norm_out(self.norm_final(video)), shift, scale)
         return join_patches(self.head(video).unflatten(2, sides), self.patch)
 
-    def _rope(self, text: Tensor, tokens: Tensor) -> RopeTables | None:
+    def _turns(self, text: Tensor, tokens: Tensor) -> Complex[Tensor, "n 1 p"] | None:
         if self.joint.positions == "sinusoidal":
             return None
         grid, head_width = tuple(tokens.shape[1:4]), self.config.width // self.config.heads
-        return rotary_tables(grid, head_width, text.shape[1], self.joint, tokens.device)
+        return rotary_turns(grid, head_width, text.shape[1], self.joint, tokens.device)
