@@ -92,7 +92,7 @@ class JointBlock(nn.Module):
         embedding: Float[Tensor, "b t e"],
         turns: Complex[Tensor, "n 1 p"] | None,
         last: bool = False,
-    ) -> Pair:
+    ) -> tuple[Float[Tensor, "b s2 d"], Float[Tensor, "b t m d"]]:
         """Attention, then the perceptron, each with its gates; no text comes out of the last."""
         normed, gates = self.attention_norm(text, video, embedding)
         skipped = text.shape[1] if last else 0
