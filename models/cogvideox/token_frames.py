@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 
-def whole_tokens(frames: Float[Tensor, "..."], patch_frames: int, axis: int = 2) -> Tensor:
+def repeat_first_frame(frames: Float[Tensor, "..."], patch_frames: int, axis: int = 2) -> Tensor:
     """The first frame as often as it takes to a multiple of ``patch_frames`` along ``axis``."""
     missing = -frames.shape[axis] % patch_frames
     if not missing:
@@ -23,7 +23,7 @@ def merge_frames(
     """Means over the frames of each token."""
     if patch_frames == 1:
         return tokens
-    return whole_tokens(tokens, patch_frames, axis=1).unflatten(1, (-1, patch_frames)).mean(2)
+    return repeat_first_frame(tokens, patch_frames, axis=1).unflatten(1, (-1, patch_frames)).mean(2)
 
 
 def join_patches(

@@ -29,7 +29,7 @@ from diff4splat.models.cogvideox.positions import (
     rotary_turns,
     step_embedding,
 )
-from diff4splat.models.cogvideox.token_frames import join_patches, merge_frames, whole_tokens
+from diff4splat.models.cogvideox.token_frames import join_patches, merge_frames, repeat_first_frame
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TOKEN_PATCH
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
@@ -123,7 +123,7 @@ class JointVideoDiT(nn.Module):
 
     def _channel_tokens(self, image: ImageCondition) -> Float[Tensor, "b t2 h2 w2 d"] | None:
         channels, others = image.channels, self.config.condition_channels
-        whole = None if channels is None else whole_tokens(channels, self.joint.patch_frames)
+        whole = None if channels is None else repeat_first_frame(channels, self.joint.patch_frames)
         return channel_tokens(self.patch_embedding, whole, self.patch, others)
 
     def velocity(
@@ -146,7 +146,7 @@ class JointVideoDiT(nn.Module):
         self, scaled: Float[Tensor, "b c t h w"], conditions: DitConditions
     ) -> Float[Tensor, "b t2 h2 w2 d"]:
         whole, others = (
-            whole_tokens(scaled, self.joint.patch_frames),
+            repeat_first_frame(scaled, self.joint.patch_frames),
             self.config.condition_channels,
         )
         tokens = latent_tokens(self.patch_embedding, whole, self.patch, others)
@@ -167,7 +167,7 @@ class JointVideoDiT(nn.Module):
         """A token of several frames has the level of the last of them."""
         frames = self.joint.patch_frames
         step = step_of_level(
-            whole_tokens(level, frames, axis=1)[:, frames - 1 :: frames], self.joint
+            repeat_first_frame(level, frames, axis=1)[:, frames - 1 :: frames], self.joint
         )
         embedding = self.level_mlp(step_embedding(step, self.config.width))
         if not self.joint.offset_width:

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.cogvideox.token_frames import whole_tokens
+from diff4splat.models.cogvideox.token_frames import repeat_first_frame
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.hub.model import Model
 from diff4splat.models.video_dit.conditions import ImageCondition
@@ -42,7 +42,7 @@ def _followed_by_zeros(
     if joint.inverse_image_scale:
         latent = latent * model.networks.vae.latent_std.square().view(1, -1, 1, 1, 1)
     empty = torch.zeros_like(latent).expand(-1, -1, (frames - 1) // TIME_STRIDE, -1, -1)
-    return whole_tokens(torch.cat([latent, empty], 2), joint.patch_frames)
+    return repeat_first_frame(torch.cat([latent, empty], 2), joint.patch_frames)
 
 
 def _followed_by_grey(
