@@ -12,9 +12,13 @@ import torch
 from torch import nn
 from torch.overrides import TorchFunctionMode
 
+from diff4splat.models.cogvideox.t5 import T5Encoder
+from diff4splat.models.cogvideox.transformer import JointVideoDiT
+from diff4splat.models.cogvideox.vae import CogVideoXVae
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
+from diff4splat.models.image_encoder.clip import ClipImageEncoder
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
@@ -27,8 +31,12 @@ from diff4splat.models.placement.initial_weights import (
 from diff4splat.models.text_encoder.encoder import TextEncoder
 from diff4splat.models.video_dit.dit import VideoDiT
 from diff4splat.models.video_vae.vae import VideoVae
+from diff4splat.models.wan.experts import NoiseExperts
 from diff4splat.models.wan.umt5 import Umt5Encoder
 from diff4splat.models.wan.vae import WanVae
+
+STREAMS = 7
+"""Random streams per seed: a part that was added later changes no other's weights."""
 
 
 def create_networks(
@@ -66,24 +74,35 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
     return {
         "vae": lambda: _vae(config),
         "text_encoder": lambda: _text_encoder(config),
-        "dit": lambda: VideoDiT(config),
+        "dit": lambda: _dit(config),
         "ldrm": lambda: Ldrm(config),
         "deformation": lambda: _deformation(config),
         "monocular_depth": lambda: MonocularDepthNet(config.monocular_depth.channels),
         "motion_unet": lambda: MotionUNet(
             motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
         ),
+        "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 
 
 def _vae(config: ModelConfig) -> nn.Module:
     """Ours, or one that holds public weights."""
-    return VideoVae(config.vae) if config.vae.layout == "plain" else WanVae(config.vae)
+    if config.vae.layout == "plain":
+        return VideoVae(config.vae)
+    return (CogVideoXVae if config.vae.layout == "cogvideox" else WanVae)(config.vae)
+
+
+def _dit(config: ModelConfig) -> nn.Module:
+    """Text attended to across or in one sequence, and one network or one per range of noise."""
+    if config.joint.used:
+        return JointVideoDiT(config)
+    return (NoiseExperts if config.dit.expert_boundary else VideoDiT)(config)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:
-    bytewise = config.text.encoder == "bytes"
-    return TextEncoder(config.text) if bytewise else Umt5Encoder(config.text)
+    if config.text.encoder == "t5":
+        return T5Encoder(config.text, config.dit.padded_text_tokens)
+    return (TextEncoder if config.text.encoder == "bytes" else Umt5Encoder)(config.text)
 
 
 def _deformation(config: ModelConfig) -> DeformationNetwork | RefinedDeformation:
@@ -102,7 +121,7 @@ def _build(part: str, make: Callable[[], nn.Module], target: torch.device, seed:
 
 def _stream(part: str, seed: int) -> int:
     """Seed of a part's own random stream."""
-    return seed * len(PARTS) + PARTS.index(part)
+    return seed * STREAMS + PARTS.index(part)
 
 
 class _NoInitialValues(TorchFunctionMode):

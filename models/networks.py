@@ -10,6 +10,7 @@ from diff4splat.models.protocols import (
     DeformationMaps,
     DepthPrior,
     GaussianMaps,
+    ImageStates,
     MotionPrior,
     PromptEncoder,
     VideoCodec,
@@ -28,6 +29,7 @@ class Networks:
     deformation: DeformationMaps | None = None
     monocular_depth: DepthPrior | None = None
     motion_unet: MotionPrior | None = None
+    image_encoder: ImageStates | None = None
 
     def parts(self) -> list[tuple[str, Any]]:
         """(name, network) of the parts that exist."""
@@ -48,6 +50,8 @@ PARTS = tuple(field.name for field in fields(Networks))
 def model_parts(config: ModelConfig) -> tuple[str, ...]:
     """The parts that a model of this configuration has."""
     absent = set()
+    if not config.image_encoder.used:
+        absent.add("image_encoder")
     if not config.monocular_depth.used:
         absent.add("monocular_depth")
     if not config.motion_unet.used:

@@ -23,6 +23,14 @@ class PromptEncoder(Protocol):
 
 
 @runtime_checkable
+class ImageStates(Protocol):
+    """As ``ClipImageEncoder``."""
+
+    def encode_image(self, image: Tensor) -> Tensor:
+        """States of an image that a video model attends to."""
+
+
+@runtime_checkable
 class DepthPrior(Protocol):
     """As ``MonocularDepthNet``."""
 

@@ -21,7 +21,7 @@ from diff4splat.models.networks import model_parts
 from diff4splat.progress.run_log import RunLog
 
 FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
-"""What fills hidden regions by video."""
+"""What fills hidden regions by video; some public models also have an image encoder."""
 RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 """What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
@@ -112,7 +112,7 @@ def plan_generation(
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
     fill = _fill_reason(config, trained, facts)
-    reasons |= dict.fromkeys(FILL_PARTS, fill)
+    reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:
         reasons["deformation"] = _deformation_reason(config, trained, facts)
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]

@@ -6,7 +6,7 @@ from diff4splat.models.adapters.lora import add_lora, is_lora
 from diff4splat.models.config.tuning import Tuning
 
 ADDED = ("camera_adapter.", "condition_embedding.")
-"""What we add to a public video model."""
+"""What we add to a public video model, or to each of its experts."""
 
 
 def prepare_tuning(network: nn.Module, tuning: Tuning, rank: int, seed: int = 0) -> None:
@@ -16,8 +16,13 @@ def prepare_tuning(network: nn.Module, tuning: Tuning, rank: int, seed: int = 0)
     if tuning == "lora":
         add_lora(network, rank, seed)
     network.learning = frozenset(
-        name for name, _ in network.named_parameters() if name.startswith(ADDED) or is_lora(name)
+        name for name, _ in network.named_parameters() if is_added(name) or is_lora(name)
     )
+
+
+def is_added(name: str) -> bool:
+    """Whether a weight belongs to a layer that we add."""
+    return any(f".{layer}" in f".{name}" for layer in ADDED)
 
 
 def learns(network: nn.Module, name: str) -> bool:

@@ -25,7 +25,7 @@ class StreamedBlock(nn.Module):
         self.kept: dict[str, Tensor] | None = None
         """Weights on the device of the computation, in their stored type."""
 
-    def forward(self, *inputs: Any) -> Tensor:
+    def forward(self, *inputs: Any) -> Any:
         """The block's own output."""
         target = {"device": self.computes.device, "dtype": self.computes.dtype}
         stored = dict(self.block.named_parameters()) if self.kept is None else self.kept
@@ -59,6 +59,6 @@ class StreamedBlock(nn.Module):
         return self
 
 
-def stream_blocks(part: nn.Module, name: str = "blocks") -> None:
+def stream_blocks(network: nn.Module) -> None:
     """Replace the blocks of a network by streamed ones, in place."""
-    setattr(part, name, nn.ModuleList(StreamedBlock(block) for block in getattr(part, name)))
+    network.blocks = nn.ModuleList(StreamedBlock(block) for block in network.blocks)

@@ -11,6 +11,8 @@ from typing import Any, Literal, TypeVar
 
 from diff4splat.errors import ConfigError, FileFormatError, InputError
 from diff4splat.models.config.checks import require, require_counts
+from diff4splat.models.config.image_encoder import ImageEncoderConfig
+from diff4splat.models.config.joint import JointConfig
 from diff4splat.models.config.legacy import upgrade_config
 from diff4splat.models.config.networks import (
     REFINEMENT_TOKEN_PX,
@@ -37,6 +39,8 @@ __all__ = [
     "ActivationConfig",
     "DeformationConfig",
     "DitConfig",
+    "ImageEncoderConfig",
+    "JointConfig",
     "LdrmConfig",
     "ModelConfig",
     "MonocularDepthConfig",
@@ -66,6 +70,10 @@ class ModelConfig:
     refinement: RefinementConfig = field(default_factory=RefinementConfig)
     monocular_depth: MonocularDepthConfig = field(default_factory=MonocularDepthConfig)
     motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
+    joint: JointConfig = field(default_factory=JointConfig)
+    """Where the video model has one sequence of text and video."""
+    image_encoder: ImageEncoderConfig = field(default_factory=ImageEncoderConfig)
+    """Where the video model attends to states of the image."""
     default_fill: Fill = "video"
     """What fills hidden regions by default; the paper uses the video model. ``none`` where that
     model makes hidden regions worse."""
@@ -84,6 +92,8 @@ class ModelConfig:
         known = self.default_fill in ("none", "video")
         require(known, "ModelConfig.default_fill", "none or video", self.default_fill)
         self._require_fitting_refinement()
+        self._require_fitting_joint()
+        self._require_fitting_image_encoder()
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)
@@ -99,6 +109,29 @@ class ModelConfig:
         fits = not used or self.token_px == REFINEMENT_TOKEN_PX
         expected = f"tokens of {REFINEMENT_TOKEN_PX} px with a refinement decoder"
         require(fits, "ModelConfig.vae", expected, self.token_px)
+
+    def _require_fitting_joint(self) -> None:
+        """Positions need heads and widths in whole parts; the network predicts v alone."""
+        if not self.joint.used:
+            return
+        head = self.dit.width // self.dit.heads
+        what = "DitConfig.heads"
+        require(head % 8 == 0, what, "heads of a multiple of 8 with a joint sequence", head)
+        require(self.dit.width % 16 == 0, "DitConfig.width", "a multiple of 16", self.dit.width)
+        plain = self.dit.prediction_type == "velocity" and not self.dit.image_width
+        plain = plain and not (self.dit.pooled_text or self.dit.expert_boundary)
+        require(
+            plain,
+            "JointConfig",
+            "velocity alone, no image states, pooled text or experts",
+            self.dit,
+        )
+
+    def _require_fitting_image_encoder(self) -> None:
+        """Its states are those that the video model attends to."""
+        fits = not self.image_encoder.used or self.image_encoder.width == self.dit.image_width
+        expected = f"{self.dit.image_width} as DitConfig.image_width"
+        require(fits, "ImageEncoderConfig.width", expected, self.image_encoder.width)
 
     @property
     def token_px(self) -> int:

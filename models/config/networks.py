@@ -20,6 +20,8 @@ TIME_STRIDE = 4
 """Video frames per latent frame after the first (paper); fixed, files depend on it."""
 MAX_WIDTHS = 12
 """Resolutions of an autoencoder; each halves the image."""
+LEAST_TILE_LATENTS = 6
+"""Latent pixels per side of a tile, which must overlap by one."""
 TOKEN_PATCH = 2
 """Latent pixels per token side, in the video model and in LDRM (paper)."""
 REFINEMENT_TOKEN_PX = 16
@@ -46,15 +48,21 @@ class VaeConfig:
     """Residual blocks per resolution (2 in Wan 2.1)."""
     pca_shortcut: bool = False
     """Convolutions correct a linear (PCA) autoencoder instead of replacing it (ours; ADR 14)."""
-    layout: Literal["plain", "wan2.1", "wan2.2"] = "plain"
-    """Whose layers: ours, or those of Wan's public weights, which ``VideoVae`` cannot hold."""
+    layout: Literal["plain", "wan2.1", "wan2.2", "cogvideox"] = "plain"
+    """Whose layers: ours, or those of public weights, which ``VideoVae`` cannot hold."""
     decoder_widths: tuple[int, ...] = ()
     """Channels of the decoder, finest first, where they differ (Wan 2.2)."""
+    groups: int = 0
+    """Groups of channels that are normalised together (CogVideoX: 32); others have none."""
+    tile_px: tuple[int, ...] = ()
+    """(height, width) of the overlapping tiles that larger videos are cut into (CogVideoX); none:
+    whole frames."""
 
     def __post_init__(self) -> None:
         require_counts(self, "latent_channels", "pixel_patch", "blocks")
-        known = self.layout in ("plain", "wan2.1", "wan2.2")
-        require(known, "VaeConfig.layout", "plain, wan2.1 or wan2.2", self.layout)
+        known = self.layout in ("plain", "wan2.1", "wan2.2", "cogvideox")
+        require(known, "VaeConfig.layout", "plain, wan2.1, wan2.2 or cogvideox", self.layout)
+        self._require_groups_and_tiles()
         same = isinstance(self.decoder_widths, tuple)
         same = same and len(self.decoder_widths) in (0, len(self.widths))
         require(same, "VaeConfig.decoder_widths", "none, or one per width", self.decoder_widths)
@@ -79,6 +87,21 @@ class VaeConfig:
         expected = f"at most the {most} values of a block with a PCA shortcut"
         require(fits, "VaeConfig.latent_channels", expected, self.latent_channels)
 
+    def _require_groups_and_tiles(self) -> None:
+        require_optional_width(self, "groups")
+        needed = self.layout == "cogvideox"
+        fits = bool(self.groups) == needed
+        fits = fits and not (needed and any(width % self.groups for width in self.widths))
+        require(
+            fits, "VaeConfig.groups", "a divisor of the widths of cogvideox, else 0", self.groups
+        )
+        tile = self.tile_px
+        whole = isinstance(tile, tuple) and all(isinstance(side, int) for side in tile)
+        pair = whole and len(tile) == 2 and needed
+        fits = tile == () or (pair and min(tile) >= LEAST_TILE_LATENTS * self.space_stride)
+        least = f"none, or two sides of at least {LEAST_TILE_LATENTS * self.space_stride} px"
+        require(fits, "VaeConfig.tile_px", f"{least} with cogvideox", tile)
+
     @property
     def space_stride(self) -> int:
         """Pixels per latent pixel side; 8 in the paper."""
@@ -87,7 +110,7 @@ class VaeConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextConfig:
-    """Text encoder in the manner of T5 (the paper names only T5): over bytes, or UMT5 itself."""
+    """Text encoder in the manner of T5 (the paper names only T5): over bytes, UMT5 or T5 itself."""
 
     width: int
     """Width of the text states."""
@@ -100,18 +123,19 @@ class TextConfig:
     """Relative-position buckets (T5)."""
     max_distance: int = 128
     """Distance in tokens from which all positions share a bucket (T5)."""
-    encoder: Literal["bytes", "umt5"] = "bytes"
-    """Bytes need no vocabulary; ``umt5`` is Wan's encoder, with a tokenizer beside its weights."""
+    encoder: Literal["bytes", "umt5", "t5"] = "bytes"
+    """Bytes need no vocabulary; ``umt5`` is Wan's encoder and ``t5`` CogVideoX's, with a tokenizer
+    beside their weights."""
     vocabulary: int = 0
-    """Tokens that ``umt5`` knows."""
+    """Tokens that ``umt5`` or ``t5`` knows."""
     head_width: int = 0
-    """Width of a head of ``umt5``, which need not divide the width."""
+    """Width of their heads, which need not divide the width."""
 
     def __post_init__(self) -> None:
         require_counts(self, "width", "blocks", "heads", "feedforward_width", "max_bytes")
         require_counts(self, "relative_position_buckets", "max_distance")
-        known = self.encoder in ("bytes", "umt5")
-        require(known, "TextConfig.encoder", "bytes or umt5", self.encoder)
+        known = self.encoder in ("bytes", "umt5", "t5")
+        require(known, "TextConfig.encoder", "bytes, umt5 or t5", self.encoder)
         for name in ("vocabulary", "head_width"):
             require_optional_width(self, name)
             given = self.encoder == "bytes" or getattr(self, name) > 0
@@ -147,13 +171,16 @@ class DitConfig:
     """Takes the layered image rendered along the path, with a mask of valid pixels. If it predicts
     clean latents it corrects that render (ours; as GEN3C and ViewCrafter; ADR 16, 26)."""
     padded_text_tokens: int = 0
-    """Prompts count as padded with zeros to so many tokens, which are attended to (Wan: 512);
-    0: only real tokens are."""
+    """Prompts count as padded to so many tokens, which are attended to (Wan: 512 with zeros,
+    CogVideoX: 226 before the text encoder); 0: only real tokens are."""
     condition_channels: int = 0
-    """Channels of a mask and image latents beside the noisy ones (Wan image-to-video: 20);
-    0: the first latent frame is the image's."""
+    """Channels of a mask and image latents beside the noisy ones (Wan image-to-video: 20,
+    CogVideoX: 16 without a mask); 0: the first latent frame is the image's."""
     image_width: int = 0
     """Width of image states that every block also attends to (Wan image-to-video: 1280, CLIP)."""
+    expert_boundary: float = 0.0
+    """Noise level from which another network of the same settings is asked (Wan 2.2 A14B: 0.875, or
+    0.9 from an image); 0: one network for all levels."""
     pooled_text: bool = False
     """The mean of the text states also modulates every block, as the noise level does (Stable
     Diffusion 3, arXiv 2403.03206)."""
@@ -170,6 +197,10 @@ class DitConfig:
             require(isinstance(value, bool), f"DitConfig.{name}", "true or false", value)
         for name in ("padded_text_tokens", "condition_channels", "image_width"):
             require_optional_width(self, name)
+        boundary = self.expert_boundary
+        number = isinstance(boundary, int | float) and not isinstance(boundary, bool)
+        inside = number and 0 <= boundary < 1
+        require(inside, "DitConfig.expert_boundary", "a number from 0 on, below 1", boundary)
         one = not (self.pooled_text and self.padded_text_tokens)
         require(one, "DitConfig.pooled_text", "false with padded_text_tokens", self.pooled_text)
         require(

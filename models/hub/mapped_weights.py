@@ -17,10 +17,10 @@ from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.public_weights.merge import match_keys
 from diff4splat.models.public_weights.shard_files import read_header
 
-BLOCKS = {"dit": "blocks", "text_encoder": "blocks"}
-"""Where a part's blocks are, if they are streamed."""
-STORED = ("blocks.", "embedding.")
-"""Prefixes of weights that keep their type."""
+STREAMED = ("dit", "text_encoder", "image_encoder")
+"""Parts whose blocks are streamed."""
+STORED = (".blocks.", ".embedding.")
+"""In names of weights that keep their type."""
 
 
 def mapped_parts(config: ModelConfig) -> frozenset[str]:
@@ -29,6 +29,7 @@ def mapped_parts(config: ModelConfig) -> frozenset[str]:
         "vae": config.vae.layout != "plain",
         "text_encoder": config.text.encoder != "bytes",
         "dit": config.dit.padded_text_tokens > 0,
+        "image_encoder": config.image_encoder.used,
     }
     return frozenset(part for part, holds in public.items() if holds)
 
@@ -48,19 +49,21 @@ def map_weights(part: nn.Module, name: str, file: Path) -> None:
         tensors = {key: _as_used(key, opened.get_tensor(key)) for key in wanted}
     part.load_state_dict(tensors, assign=True)
     part.requires_grad_(False)
-    if name in BLOCKS:
-        stream_blocks(part, BLOCKS[name])
+    if name in STREAMED:
+        # A part may consist of several networks.
+        for network in (part, *part.children()):
+            if hasattr(network, "blocks"):
+                stream_blocks(network)
 
 
 def _as_used(key: str, value: Tensor) -> Tensor:
-    return value if key.startswith(STORED) else value.to(torch.float32)
+    return value if _is_stored(key) else value.to(torch.float32)
+
+
+def _is_stored(key: str) -> bool:
+    return any(place in f".{key}" for place in STORED)
 
 
 def resident_bytes(part: nn.Module) -> int:
     """Bytes of weights that are not mapped: what memory must hold in any case."""
-    mapped = STORED if hasattr(part, "blocks") else ()
-    return sum(
-        value.nbytes
-        for key, value in part.state_dict().items()
-        if not (mapped and key.startswith(mapped))
-    )
+    return sum(value.nbytes for key, value in part.state_dict().items() if not _is_stored(key))

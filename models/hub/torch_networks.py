@@ -38,7 +38,9 @@ def torch_networks(config: ModelConfig, folder: Path | None, parts: Collection[s
     if isinstance(networks.text_encoder, Umt5Encoder) and "text_encoder" not in drawn:
         require_files(folder, (TOKENIZER_FILE,))
         longest = config.dit.padded_text_tokens
-        networks.text_encoder.tokenizer = Tokenizer(folder / TOKENIZER_FILE, longest)
+        networks.text_encoder.tokenizer = Tokenizer(
+            folder / TOKENIZER_FILE, longest, cleans=config.text.encoder == "umt5"
+        )
     return networks
 
 

@@ -1,9 +1,9 @@
-"""A public Wan model as one of our model folders.
+"""A public model, of Wan or CogVideoX, as one of our model folders.
 
     transformer/   ─ renamed ─ + camera adapter, render condition (zero) ─ dit.safetensors
     vae/           ─────────── + latent mean and standard deviation ────── vae.safetensors
     text_encoder/  ─ renamed ───────────────────────────────────────────── text_encoder.safetensors
-    tokenizer/tokenizer.json ───────────────────────────────────────────── tokenizer.json
+    tokenizer/     ─────────────────────────────────────────────────────── tokenizer.json
 
 Weights are copied byte by byte in the type that they have. All configurations and headers are
 checked before the first byte is written.
@@ -16,7 +16,6 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from diff4splat.errors import CheckpointError
 from diff4splat.io.atomic import atomic_folder, write_text
 from diff4splat.models.adapters.tuning import ADDED
 from diff4splat.models.config.model import ModelConfig
@@ -30,41 +29,20 @@ from diff4splat.models.hub.provenance import (
     write_provenance,
 )
 from diff4splat.models.hub.weight_files import CONFIG_FILE, part_file
+from diff4splat.models.public_weights.cogvideox_family import COGVIDEOX
+from diff4splat.models.public_weights.family import Family, PublicNetworks, WeightSource
 from diff4splat.models.public_weights.merge import Shapes, match_keys, write_merged
+from diff4splat.models.public_weights.options import ImportOptions
 from diff4splat.models.public_weights.shard_files import StoredTensor, stored_tensors
 from diff4splat.models.public_weights.source_folder import SourceFolder, require_class
+from diff4splat.models.public_weights.wan_family import WAN
 from diff4splat.models.video_dit.camera_adapter import CameraAdapter
 from diff4splat.models.video_dit.render_condition import RenderConditionEmbedding
-from diff4splat.models.wan import source_config
-from diff4splat.models.wan.key_map import video_dit_key
 from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
-from diff4splat.models.wan.umt5 import umt5_key
 
-IMPORTED = ("vae", "text_encoder", "dit")
-"""Parts that the public model has; the others are ours, to be trained."""
-FOLDERS = {"vae": "vae", "text_encoder": "text_encoder", "dit": "transformer"}
-RENAME: Mapping[str, Callable[[str], str | None]] = {
-    "vae": str,
-    "text_encoder": umt5_key,
-    "dit": video_dit_key,
-}
+__all__ = ["ImportOptions", "PublicModel", "open_public_model", "write_model"]
+FAMILIES = (WAN, COGVIDEOX)
 OWNED = (CONFIG_FILE, PROVENANCE_FILE, SUMS_FILE, TOKENIZER_FILE)
-DEFAULT_FRAMES = 49
-DEFAULT_SIZE_PX = {8: (480, 832), 16: (704, 1280)}
-"""By the stride of the autoencoder: what Wan 2.1 and TI2V-5B were trained at."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ImportOptions:
-    """What the public model does not decide."""
-
-    reconstruction: str = "paper"
-    """The size whose LDRM and deformation network the model gets."""
-    frames: int = DEFAULT_FRAMES
-    size_px: tuple[int, int] | None = None
-    """(height, width); None: what the public model was trained at."""
-    seed: int = 0
-    """Of the new layers that are not zero."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +51,8 @@ class PublicModel:
 
     folder: SourceFolder
     config: ModelConfig
+    tokenizer: bytes
+    """Vocabulary of the text encoder, as JSON."""
     tensors: Mapping[str, Mapping[str, StoredTensor]]
     """By part, under our names."""
     fresh: Mapping[str, Mapping[str, Tensor]]
@@ -106,27 +86,61 @@ def open_public_model(root: Path, settings: ImportOptions | None = None) -> Publ
         FileFormatError: a damaged or cut off file, or one with another hash.
     """
     settings, folder = settings or ImportOptions(), SourceFolder(root=root)
-    config = _model_config(folder, settings)
-    fresh = {
-        "vae": _statistics(folder, config),
-        "text_encoder": {},
-        "dit": _added(config, settings),
+    family = _family(folder)
+    public = family.read(folder, settings)
+    config, tokenizer = _model_config(public, settings), family.tokenizer(folder)
+    fresh: dict[str, Mapping[str, Tensor]] = {part: {} for part in public.sources} | {
+        "vae": public.statistics,
+        "dit": {
+            source.prefix + key: value
+            for source in public.sources["dit"]
+            for key, value in _added(config, settings).items()
+        },
     }
-    networks = dict(create_networks(config, "meta", parts=IMPORTED).parts())
+    networks = dict(create_networks(config, "meta", parts=public.sources).parts())
     shapes = {
         part: {key: tuple(value.shape) for key, value in networks[part].state_dict().items()}
-        for part in IMPORTED
+        for part in public.sources
     }
     tensors = {
-        part: match_keys(
-            stored_tensors(folder, FOLDERS[part]),
-            {key: shape for key, shape in shapes[part].items() if key not in fresh[part]},
-            RENAME[part],
-            f"{root / FOLDERS[part]}",
-        )
-        for part in IMPORTED
+        part: _matched(folder, sources, shapes[part], fresh[part])
+        for part, sources in public.sources.items()
     }
-    return PublicModel(folder=folder, config=config, tensors=tensors, fresh=fresh, shapes=shapes)
+    return PublicModel(
+        folder=folder,
+        config=config,
+        tokenizer=tokenizer,
+        tensors=tensors,
+        fresh=fresh,
+        shapes=shapes,
+    )
+
+
+def _family(folder: SourceFolder) -> Family:
+    index = folder.json("model_index.json")
+    known = {pipeline: family for family in FAMILIES for pipeline in family.pipelines}
+    return known[require_class(index, tuple(known), f"{folder.root} (pipeline)")]
+
+
+def _matched(
+    folder: SourceFolder,
+    sources: tuple[WeightSource, ...],
+    shapes: Shapes,
+    fresh: Mapping[str, Tensor],
+) -> dict[str, StoredTensor]:
+    """Every stored weight of a part under our name."""
+    found = {}
+    for source in sources:
+        wanted = {
+            key.removeprefix(source.prefix): shape
+            for key, shape in shapes.items()
+            if key.startswith(source.prefix) and key not in fresh
+        }
+        stored = stored_tensors(folder, source.folder)
+        where = f"{folder.root / source.folder}"
+        matched = match_keys(stored, wanted, source.rename, where)
+        found |= {source.prefix + key: tensor for key, tensor in matched.items()}
+    return found
 
 
 def write_model(
@@ -140,72 +154,36 @@ def write_model(
     Raises:
         OutputError: the folder cannot be written.
     """
-    tokenizer = model.folder.file(f"tokenizer/{TOKENIZER_FILE}").read_bytes()
     name = model.folder.root.resolve().name
     provenance = ModelProvenance(
-        trained=frozenset(IMPORTED), license=license, origin=f"imported from {name}"
+        trained=frozenset(model.tensors), license=license, origin=f"imported from {name}"
     )
-    owned = (*OWNED, *(part_file(Path(), part).name for part in IMPORTED))
+    owned = (*OWNED, *(part_file(Path(), part).name for part in model.tensors))
     with atomic_folder(out, owned) as staging:
         for part, tensors in model.tensors.items():
             file = part_file(staging, part)
             write_merged(tensors, model.fresh[part], model.shapes[part], file, advance)
-        (staging / TOKENIZER_FILE).write_bytes(tokenizer)
+        (staging / TOKENIZER_FILE).write_bytes(model.tokenizer)
         write_text(staging / CONFIG_FILE, model.config.to_json())
         write_provenance(provenance, staging)
         write_sums(staging)
 
 
-def _model_config(folder: SourceFolder, settings: ImportOptions) -> ModelConfig:
-    index = folder.json("model_index.json")
-    if folder.has("transformer_2/config.json"):
-        raise CheckpointError(
-            f"{folder.root}: expected one transformer, got two experts for high and low noise; "
-            "use TI2V-5B or a Wan 2.1 model"
-        )
-    require_class(index, ("WanPipeline", "WanImageToVideoPipeline"), f"{folder.root} (pipeline)")
-    transformer = folder.json("transformer/config.json")
-    vae = folder.json("vae/config.json")
-    text = folder.json("text_encoder/config.json")
-    require_class(transformer, (source_config.TRANSFORMER,), "transformer/config.json")
-    require_class(vae, (source_config.VAE,), "vae/config.json")
-    require_class(text, (source_config.TEXT,), "text_encoder/config.json")
-    folder.file(f"tokenizer/{TOKENIZER_FILE}")
-    vae_config = source_config.vae_config(vae)
+def _model_config(public: PublicNetworks, settings: ImportOptions) -> ModelConfig:
     base = size_by_name(settings.reconstruction)
-    config = ModelConfig(
-        name=f"wan-{transformer['num_layers']}-blocks",
+    return ModelConfig(
+        name=public.name,
         frames=settings.frames,
-        size_px=settings.size_px or DEFAULT_SIZE_PX.get(vae_config.space_stride, (512, 512)),
-        vae=vae_config,
-        text=source_config.text_config(text),
-        dit=source_config.dit_config(transformer),
+        size_px=settings.size_px or public.size_px,
+        vae=public.vae,
+        text=public.text,
+        dit=public.dit,
+        joint=public.joint,
+        image_encoder=public.image_encoder,
         ldrm=replace(base.ldrm, input="latents"),
         deformation=base.deformation,
         activation=base.activation,
     )
-    _require_agreement(config, transformer)
-    return config
-
-
-def _require_agreement(config: ModelConfig, transformer: Mapping[str, object]) -> None:
-    """Parts of one model: as many channels and as wide text states on both sides."""
-    pairs = {
-        "out_channels": config.vae.latent_channels,
-        "text_dim": config.text.width,
-    }
-    for name, wanted in pairs.items():
-        if transformer.get(name) != wanted:
-            raise CheckpointError(
-                f"transformer/config.json: expected {name} to be {wanted} as in the other parts, "
-                f"got {transformer.get(name)}; the folder mixes models"
-            )
-
-
-def _statistics(folder: SourceFolder, config: ModelConfig) -> dict[str, Tensor]:
-    source = folder.json("vae/config.json")
-    mean, std = source_config.latent_statistics(source, config.vae.latent_channels)
-    return {"latent_mean": torch.tensor(mean), "latent_std": torch.tensor(std)}
 
 
 def _added(config: ModelConfig, settings: ImportOptions) -> dict[str, Tensor]:

@@ -111,3 +111,17 @@ def require_class(config: Mapping[str, Any], known: tuple[str, ...], where: str)
             "this model cannot be imported"
         )
     return found
+
+
+def require_same(transformer: Mapping[str, Any], **wanted: int) -> None:
+    """Parts of one model: as many channels and as wide text states on both sides.
+
+    Raises:
+        CheckpointError: the folder mixes models.
+    """
+    for name, value in wanted.items():
+        if transformer.get(name) != value:
+            raise CheckpointError(
+                f"transformer/config.json: expected {name} to be {value} as in the other parts, "
+                f"got {transformer.get(name)}; the folder mixes models"
+            )

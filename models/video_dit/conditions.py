@@ -4,7 +4,7 @@ Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent frames, rows and colu
 video frames and pixels, ``h2 w2`` tokens, ``d`` width, ``s`` text tokens.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -22,10 +22,12 @@ class RenderCondition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageCondition:
-    """The first frame as Wan's image-to-video weights take it."""
+    """The first frame as image-to-video weights take it."""
 
     channels: Float[Tensor, "b c2 t h w"] | None = None
-    """Mask of known frames, then the latent of the image followed by grey frames."""
+    """Wan: mask of known frames, then the latent of the image followed by grey frames. CogVideoX:
+    the latent of the image, followed by zeros. Frames before the video belong to its first token.
+    """
     states: Float[Tensor, "b i e"] | None = None
     """Of an image encoder."""
 
@@ -47,3 +49,12 @@ class DitConditions:
     render_latent: Float[Tensor, "b c t h w"] | None = None
     """Latent of the render condition, which clean predictions correct."""
     render_tokens: Float[Tensor, "b t h2 w2 d"] | None = None
+
+    def with_text_of(self, other: "DitConditions | None") -> "DitConditions":
+        """The same with the text of others, or without text; all else is held once."""
+        return replace(
+            self,
+            text=None if other is None else other.text,
+            text_mask=None if other is None else other.text_mask,
+            pooled_text=None if other is None else other.pooled_text,
+        )

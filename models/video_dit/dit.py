@@ -24,12 +24,11 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from diff4splat.errors import ShapeError
 from diff4splat.flow.path import velocity_from_clean
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.blocks.modulation import ZeroModulation, modulate
 from diff4splat.models.blocks.norm import EPSILON
-from diff4splat.models.blocks.patches import patchify, unpatchify
+from diff4splat.models.blocks.patches import unpatchify
 from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.blocks.time_embedding import EmbeddingMlp, level_embedding
@@ -45,6 +44,11 @@ from diff4splat.models.video_dit.conditions import (
 from diff4splat.models.video_dit.dit_block import MODULATIONS, DitBlock
 from diff4splat.models.video_dit.image_attention import ImageProjection
 from diff4splat.models.video_dit.padded_text import with_padding
+from diff4splat.models.video_dit.patch_tokens import (
+    channel_tokens,
+    latent_tokens,
+    require_render_condition,
+)
 from diff4splat.models.video_dit.render_condition import RenderConditionEmbedding
 
 PATCH = (1, TOKEN_PATCH, TOKEN_PATCH)
@@ -127,11 +131,7 @@ class VideoDiT(nn.Module):
         """
         if text is not None and self.config.padded_text_tokens:
             text, text_mask = with_padding(text, text_mask, self.config.padded_text_tokens)
-        if self.config.render_condition != (condition is not None):
-            want, got = ("one", "none") if self.config.render_condition else ("none", "one")
-            raise ShapeError(
-                f"render condition: expected {want}, got {got}; DitConfig.render_condition decides"
-            )
+        require_render_condition(self.config.render_condition, condition)
         states = None if text is None else self.text_projection(text)
         pooled = self.config.pooled_text and states is not None
         return DitConditions(
@@ -140,7 +140,7 @@ class VideoDiT(nn.Module):
             text_mask=text_mask,
             pooled_text=self._pooled(states, text_mask) if pooled else None,
             image=None if image is None else self._image_states(image),
-            channel_tokens=None if image is None else self._channel_tokens(image.channels),
+            channel_tokens=None if image is None else self._channel_tokens(image),
             render_latent=None if condition is None else condition.latent,
             render_tokens=None if condition is None else self.condition_embedding(condition),
         )
@@ -150,21 +150,10 @@ class VideoDiT(nn.Module):
             return None
         return self.image_projection(image.states)
 
-    def _channel_tokens(
-        self, channels: Float[Tensor, "b c2 t h w"] | None
-    ) -> Float[Tensor, "b t h2 w2 d"] | None:
+    def _channel_tokens(self, image: ImageCondition) -> Float[Tensor, "b t h2 w2 d"] | None:
         """The part of the patch embedding that is the same at every step."""
-        if channels is None:
-            return None
-        weight = self.patch_embedding.weight[:, self.latent_channels * TOKEN_PATCH**2 :]
-        return torch.nn.functional.linear(patchify(channels, PATCH), weight)
-
-    def _latent_tokens(self, latent: Float[Tensor, "b c t h w"]) -> Float[Tensor, "b t h2 w2 d"]:
-        layer = self.patch_embedding
-        patches = patchify(latent, PATCH)
-        if not self.config.condition_channels:
-            return layer(patches)
-        return torch.nn.functional.linear(patches, layer.weight[:, : patches.shape[-1]], layer.bias)
+        others = self.config.condition_channels
+        return channel_tokens(self.patch_embedding, image.channels, PATCH, others)
 
     def _pooled(
         self, states: Float[Tensor, "b s d"], mask: Bool[Tensor, "b s"] | None
@@ -183,7 +172,7 @@ class VideoDiT(nn.Module):
         conditions: DitConditions,
     ) -> Float[Tensor, "b c t h w"]:
         """Velocity at a noise level per latent frame."""
-        tokens = self._latent_tokens(latent)
+        tokens = latent_tokens(self.patch_embedding, latent, PATCH, self.config.condition_channels)
         if conditions.channel_tokens is not None:
             tokens = tokens + conditions.channel_tokens
         if conditions.camera is not None:

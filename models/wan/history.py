@@ -30,12 +30,16 @@ class History:
         """What the next chunk needs."""
         return tuple(self._new)
 
+    def before_video(self, frames: Float[Tensor, "b c t h w"], count: int) -> Tensor:
+        """Black features before frame 0."""
+        return frames.new_zeros(*frames.shape[:2], count, *frames.shape[3:])
+
     def prepend(
         self, frames: Float[Tensor, "b c t h w"], count: int
     ) -> Float[Tensor, "b c t2 h w"]:
         """``frames`` after the ``count`` frames before them."""
         if self._old is None:
-            before = frames.new_zeros(*frames.shape[:2], count, *frames.shape[3:])
+            before = self.before_video(frames, count)
         else:
             before = self._old[len(self._new)]
         extended = torch.cat([before, frames], 2)

@@ -4,11 +4,13 @@ Supported: T2V-1.3B, T2V-14B, I2V-14B (36 → 16 channels, CLIP states) and TI2V
 read, never assumed; what a configuration asks for beyond them is refused.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
-from diff4splat.errors import CheckpointError
 from diff4splat.models.config.networks import DitConfig, TextConfig, VaeConfig
+from diff4splat.models.public_weights.settings import (
+    Source,
+    count,
+    require_settings,
+    unsupported,
+)
 
 TRANSFORMER, VAE, TEXT = "WanTransformer3DModel", "AutoencoderKLWan", "UMT5EncoderModel"
 TEXT_TOKENS = 512
@@ -16,8 +18,6 @@ TEXT_TOKENS = 512
 MAX_PROMPT_BYTES = 8192
 """Far above 512 tokens; longer prompts are cut, as Wan does."""
 CAMERA_WIDTH = 64
-
-Source = Mapping[str, Any]
 
 
 def dit_config(source: Source) -> DitConfig:
@@ -27,20 +27,20 @@ def dit_config(source: Source) -> DitConfig:
         CheckpointError: a setting that no supported model has.
     """
     where = "transformer/config.json"
-    _require(source, where, patch_size=[1, 2, 2], cross_attn_norm=True, pos_embed_seq_len=None)
-    _require(source, where, qk_norm="rms_norm_across_heads", eps=1e-6)
-    width = _count(source, "num_attention_heads", where) * _count(
-        source, "attention_head_dim", where
+    require_settings(
+        source, where, patch_size=[1, 2, 2], cross_attn_norm=True, pos_embed_seq_len=None
     )
-    inputs, outputs = (_count(source, name, where) for name in ("in_channels", "out_channels"))
+    require_settings(source, where, qk_norm="rms_norm_across_heads", eps=1e-6)
+    width = count(source, "num_attention_heads", where) * count(source, "attention_head_dim", where)
+    inputs, outputs = (count(source, name, where) for name in ("in_channels", "out_channels"))
     image_width = source.get("image_dim") or 0
-    _require(source, where, added_kv_proj_dim=width if image_width else None)
+    require_settings(source, where, added_kv_proj_dim=width if image_width else None)
     return DitConfig(
         width=width,
-        blocks=_count(source, "num_layers", where),
-        heads=_count(source, "num_attention_heads", where),
-        feedforward_width=_count(source, "ffn_dim", where),
-        frequency_width=_count(source, "freq_dim", where),
+        blocks=count(source, "num_layers", where),
+        heads=count(source, "num_attention_heads", where),
+        feedforward_width=count(source, "ffn_dim", where),
+        frequency_width=count(source, "freq_dim", where),
         camera_width=CAMERA_WIDTH,
         render_condition=True,
         padded_text_tokens=TEXT_TOKENS,
@@ -56,22 +56,22 @@ def vae_config(source: Source) -> VaeConfig:
         CheckpointError: a setting that no supported model has.
     """
     where = "vae/config.json"
-    _require(source, where, attn_scales=[], temperal_downsample=[False, True, True])
+    require_settings(source, where, attn_scales=[], temperal_downsample=[False, True, True])
     residual, patch = bool(source.get("is_residual")), source.get("patch_size") or 1
     factors = source.get("dim_mult")
     if not isinstance(factors, list) or not all(isinstance(each, int) for each in factors):
-        raise _unsupported(where, "dim_mult", "whole numbers", factors)
-    base = _count(source, "base_dim", where)
+        raise unsupported(where, "dim_mult", "whole numbers", factors)
+    base = count(source, "base_dim", where)
     decoder_base = source.get("decoder_base_dim") or base
     widths, decoder_widths = (
         tuple(width * each for each in factors) for width in (base, decoder_base)
     )
-    _require(source, where, in_channels=3 * patch**2, out_channels=3 * patch**2)
+    require_settings(source, where, in_channels=3 * patch**2, out_channels=3 * patch**2)
     return VaeConfig(
-        latent_channels=_count(source, "z_dim", where),
+        latent_channels=count(source, "z_dim", where),
         widths=widths,
         pixel_patch=patch,
-        blocks=_count(source, "num_res_blocks", where),
+        blocks=count(source, "num_res_blocks", where),
         layout="wan2.2" if residual else "wan2.1",
         decoder_widths=decoder_widths if decoder_base != base else (),
     )
@@ -83,20 +83,28 @@ def text_config(source: Source) -> TextConfig:
     Raises:
         CheckpointError: a setting that no supported model has.
     """
+    return TextConfig(**t5_sizes(source), max_bytes=MAX_PROMPT_BYTES, encoder="umt5")
+
+
+def t5_sizes(source: Source) -> dict[str, int]:
+    """Sizes of an encoder of the T5 family.
+
+    Raises:
+        CheckpointError: a setting that no supported model has.
+    """
     where = "text_encoder/config.json"
-    _require(source, where, feed_forward_proj="gated-gelu", layer_norm_epsilon=1e-6)
-    return TextConfig(
-        width=_count(source, "d_model", where),
-        blocks=_count(source, "num_layers", where),
-        heads=_count(source, "num_heads", where),
-        feedforward_width=_count(source, "d_ff", where),
-        max_bytes=MAX_PROMPT_BYTES,
-        relative_position_buckets=_count(source, "relative_attention_num_buckets", where),
-        max_distance=_count(source, "relative_attention_max_distance", where),
-        encoder="umt5",
-        vocabulary=_count(source, "vocab_size", where),
-        head_width=_count(source, "d_kv", where),
-    )
+    require_settings(source, where, feed_forward_proj="gated-gelu", layer_norm_epsilon=1e-6)
+    names = {
+        "width": "d_model",
+        "blocks": "num_layers",
+        "heads": "num_heads",
+        "feedforward_width": "d_ff",
+        "relative_position_buckets": "relative_attention_num_buckets",
+        "max_distance": "relative_attention_max_distance",
+        "vocabulary": "vocab_size",
+        "head_width": "d_kv",
+    }
+    return {ours: count(source, theirs, where) for ours, theirs in names.items()}
 
 
 def latent_statistics(source: Source, channels: int) -> tuple[list[float], list[float]]:
@@ -110,29 +118,8 @@ def latent_statistics(source: Source, channels: int) -> tuple[list[float], list[
         values = source.get(name)
         whole = isinstance(values, list) and all(isinstance(v, int | float) for v in values)
         if not whole or len(values) != channels:
-            raise _unsupported("vae/config.json", name, f"{channels} numbers", values)
+            raise unsupported("vae/config.json", name, f"{channels} numbers", values)
         found.append([float(value) for value in values])
     if min(found[1]) <= 0:
-        raise _unsupported("vae/config.json", "latents_std", "numbers above 0", found[1])
+        raise unsupported("vae/config.json", "latents_std", "numbers above 0", found[1])
     return found[0], found[1]
-
-
-def _count(source: Source, name: str, where: str) -> int:
-    value = source.get(name)
-    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-        raise _unsupported(where, name, "a whole number above 0", value)
-    return value
-
-
-def _require(source: Source, where: str, **wanted: object) -> None:
-    """Every setting that is there must have this value."""
-    for name, value in wanted.items():
-        if source.get(name, value) != value:
-            raise _unsupported(where, name, value, source[name])
-
-
-def _unsupported(where: str, name: str, expected: object, got: object) -> CheckpointError:
-    return CheckpointError(
-        f"{where}: expected {name} to be {expected}, got {str(got)[:80]}; "
-        "this variant cannot be imported"
-    )

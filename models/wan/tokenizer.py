@@ -14,14 +14,18 @@ TOKENIZER_FILE = "tokenizer.json"
 class Tokenizer:
     """A vocabulary in the format of the Hugging Face tokenizers."""
 
-    def __init__(self, file: Path, max_tokens: int) -> None:
+    def __init__(self, file: Path, max_tokens: int, *, cleans: bool = True) -> None:
+        self._cleans = cleans
         self._tokenizer = _read(file)
         self._tokenizer.no_padding()
         self._tokenizer.enable_truncation(max_tokens)
 
     def token_row(self, prompt: str) -> list[int]:
-        """Tokens of one prompt with the end token, cut to the longest that the model takes."""
-        return self._tokenizer.encode(clean_prompt(prompt)).ids
+        """Tokens of one prompt with the end token, cut to the longest that the model takes.
+
+        ``cleans``: as Wan's pipeline does first.
+        """
+        return self._tokenizer.encode(clean_prompt(prompt) if self._cleans else prompt).ids
 
 
 def clean_prompt(prompt: str) -> str:

@@ -32,27 +32,37 @@ class Umt5Block(nn.Module):
         self.to_key = nn.Linear(width, inner, bias=False)
         self.to_value = nn.Linear(width, inner, bias=False)
         self.to_output = nn.Linear(inner, width, bias=False)
-        self.distance_bias = nn.Embedding(config.relative_position_buckets, config.heads)
+        if config.encoder == "umt5":
+            self.distance_bias = distance_bias(config)
         self.feedforward_norm = TokenRmsNorm(width)
         self.gate = nn.Linear(width, hidden, bias=False)
         self.expand = nn.Linear(width, hidden, bias=False)
         self.contract = nn.Linear(hidden, width, bias=False)
 
     def forward(
-        self, states: Float[Tensor, "b s d"], buckets: Int[Tensor, "s s"]
+        self,
+        states: Float[Tensor, "b s d"],
+        buckets: Int[Tensor, "s s"],
+        shared: Float[Tensor, "s s h"] | None = None,
     ) -> Float[Tensor, "b s d"]:
-        """``buckets`` are those of the distances between tokens."""
+        """``buckets`` are those of the distances; ``shared`` replaces the block's own bias."""
         normed = self.attention_norm(states)
         query, key, value = (
             layer(normed).unflatten(-1, (self.heads, -1)).transpose(1, 2)
             for layer in (self.to_query, self.to_key, self.to_value)
         )
-        bias = self.distance_bias(buckets).permute(2, 0, 1)[None].to(query.dtype)
+        bias = self.distance_bias(buckets) if shared is None else shared
+        bias = bias.permute(2, 0, 1)[None].to(query.dtype)
         mixed = torch.nn.functional.scaled_dot_product_attention(query, key, value, bias, scale=1.0)
         states = states + self.to_output(mixed.transpose(1, 2).flatten(2))
         normed = self.feedforward_norm(states)
         gate = torch.nn.functional.gelu(self.gate(normed), approximate="tanh")
         return states + self.contract(gate * self.expand(normed))
+
+
+def distance_bias(config: TextConfig) -> nn.Embedding:
+    """What is added to the logits of every head, by the bucket of a distance."""
+    return nn.Embedding(config.relative_position_buckets, config.heads)
 
 
 class Umt5Encoder(nn.Module):
@@ -71,12 +81,26 @@ class Umt5Encoder(nn.Module):
         buckets = distance_buckets(tokens.shape[1], self.config, tokens.device)
         # The table may be stored in half precision: only the rows that are used are widened.
         states = self.embedding(tokens).to(self.norm_out.weight.dtype)
+        shared = self.shared_bias(buckets)
         for block in self.blocks:
-            states = block(states, buckets)
+            states = block(states, buckets, shared)
         return self.norm_out(states)
+
+    def shared_bias(self, buckets: Int[Tensor, "s s"]) -> Float[Tensor, "s s h"] | None:
+        """The bias of all blocks; None where each has its own."""
+        del buckets
 
     def encode_prompt(self, text: str) -> Float[Tensor, "1 s d"]:
         """States of one prompt, which may be empty.
+
+        Raises:
+            ConfigError: the encoder has no tokenizer.
+        """
+        tokens = torch.tensor([self.token_row(text)], device=self.embedding.weight.device)
+        return self(tokens)
+
+    def token_row(self, text: str) -> list[int]:
+        """Tokens of one prompt.
 
         Raises:
             ConfigError: the encoder has no tokenizer.
@@ -86,8 +110,7 @@ class Umt5Encoder(nn.Module):
                 "text encoder: expected a model folder with tokenizer.json, got none; "
                 "import the model again"
             )
-        row = self.tokenizer.token_row(text)
-        return self(torch.tensor([row], device=self.embedding.weight.device))
+        return self.tokenizer.token_row(text)
 
     def encode_prompts(
         self, texts: list[str]

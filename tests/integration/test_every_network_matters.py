@@ -26,7 +26,6 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.config.model import Fill
 from diff4splat.models.hub.weight_files import weights_sha256
-from diff4splat.models.networks import PARTS
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
@@ -36,6 +35,7 @@ SIDE_PX = 64
 PROMPT = "the red box slides to the left"
 PRIORS = frozenset({"text_encoder", "monocular_depth", "motion_unet"})
 VIDEO = frozenset({"vae", "dit", "ldrm", "deformation"})
+PARTS = sorted(PRIORS | VIDEO)
 
 
 @dataclass(frozen=True, kw_only=True)

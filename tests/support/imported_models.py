@@ -11,7 +11,7 @@ from diff4splat.models.public_weights.import_model import (
     write_model,
 )
 
-KINDS = ("t2v", "i2v", "ti2v")
+KINDS = ("t2v", "i2v", "ti2v", "a14b")
 
 
 def settings(kind: str) -> ImportOptions:

@@ -7,6 +7,8 @@ import pytest
 import torch
 
 HEADS, HEAD_WIDTH, TEXT_WIDTH, CLIP_WIDTH = 2, 12, 16, 20
+BOUNDARY, LOW_SEED = 0.875, 8
+"""Of the two experts."""
 MEAN, STD = [0.1, -0.2, 0.3, 0.0], [1.5, 2.0, 0.5, 1.0]
 
 
@@ -21,8 +23,8 @@ def spread_(module: torch.nn.Module) -> torch.nn.Module:
     return module.eval()
 
 
-def transformer(kind: str = "t2v", **changes):
-    """``t2v``, ``i2v`` (mask, image latents, CLIP) or ``ti2v``: the same layout at tiny width."""
+def transformer(kind: str = "t2v", seed: int = 1, **changes):
+    """``t2v``, ``i2v`` (mask, image latents, CLIP), ``ti2v`` or ``a14b``, one expert of two."""
     diffusers = pytest.importorskip("diffusers", reason="needs the package diffusers")
     given = {
         "num_attention_heads": HEADS,
@@ -36,7 +38,7 @@ def transformer(kind: str = "t2v", **changes):
         "image_dim": CLIP_WIDTH if kind == "i2v" else None,
         "added_kv_proj_dim": HEADS * HEAD_WIDTH if kind == "i2v" else None,
     }
-    torch.manual_seed(1)
+    torch.manual_seed(seed)
     return spread_(diffusers.WanTransformer3DModel(**given | changes))
 
 
@@ -69,6 +71,22 @@ def text_encoder():
     return spread_(transformers.UMT5EncoderModel(config))
 
 
+def image_encoder():
+    """A tiny vision transformer of CLIP."""
+    transformers = pytest.importorskip("transformers", reason="needs the package transformers")
+    torch.manual_seed(4)
+    config = transformers.CLIPVisionConfig(
+        hidden_size=CLIP_WIDTH,
+        intermediate_size=24,
+        num_hidden_layers=3,
+        num_attention_heads=2,
+        image_size=28,
+        patch_size=7,
+        hidden_act="gelu",
+    )
+    return spread_(transformers.CLIPVisionModel(config))
+
+
 WORDS = ("<pad>", "</s>", "<unk>", "the", "red", "car", "moves", "to", "left", "blurry")
 
 
@@ -95,5 +113,11 @@ def write_wan(
     text_encoder().to(dtype).save_pretrained(folder / "text_encoder", **options)
     write_tokenizer(folder / "tokenizer")
     index = {"_class_name": "WanImageToVideoPipeline" if kind == "i2v" else "WanPipeline"}
+    if kind == "i2v":
+        image_encoder().to(dtype).save_pretrained(folder / "image_encoder", **options)
+    if kind == "a14b":
+        low = transformer(kind, seed=LOW_SEED).to(dtype)
+        low.save_pretrained(folder / "transformer_2", **options)
+        index["boundary_ratio"] = BOUNDARY
     (folder / "model_index.json").write_text(json.dumps(index))
     return folder

@@ -18,7 +18,7 @@ PIECES = 400
 
 @dataclass(frozen=True, kw_only=True)
 class ImportModel:
-    """Make a model folder of Wan 2.1 or 2.2 weights: T2V-1.3B, T2V-14B, I2V-14B or TI2V-5B."""
+    """Make a model folder of public weights: Wan 2.1, Wan 2.2, CogVideoX or CogVideoX 1.5."""
 
     folder: Annotated[
         Path,
@@ -34,8 +34,11 @@ class ImportModel:
     """Frames per video, 1 + 4 k."""
     size: str | None = None
     """Height and width of the video, such as 480x832. Default: what the weights were trained at."""
+    tile: str | None = None
+    """Height and width of the tiles in which the autoencoder of CogVideoX works on larger frames,
+    such as 240x360: less memory, other rounding. Default: whole frames."""
     license: str = "not stated"
-    """Licence of the weights, as an SPDX name; Wan's own are Apache-2.0."""
+    """Licence of the weights, as an SPDX name; Wan and CogVideoX-2B are Apache-2.0."""
 
     def check(self) -> None:
         """Refuse sizes that are none, and an output inside the input.
@@ -48,15 +51,15 @@ class ImportModel:
         require_inputs_not_overwritten((self.folder,), (self.out,))
         size_by_name(self.reconstruction)
         self.size_px()
+        self.tile_px()
 
     def size_px(self) -> tuple[int, int] | None:
-        """(height, width)."""
-        if self.size is None:
-            return None
-        found = re.fullmatch(r"([1-9]\d{0,3})x([1-9]\d{0,3})", self.size)
-        if not found:
-            raise ConfigError(f"--size: expected HEIGHTxWIDTH such as 480x832, got {self.size!r}")
-        return int(found[1]), int(found[2])
+        """(height, width) of the video."""
+        return _sides("--size", self.size)
+
+    def tile_px(self) -> tuple[int, int] | None:
+        """(height, width) of tiles."""
+        return _sides("--tile", self.tile)
 
     def run(self) -> None:
         """Check everything, then copy."""
@@ -71,6 +74,7 @@ class ImportModel:
             reconstruction=self.reconstruction,
             frames=self.frames,
             size_px=self.size_px(),
+            tile_px=self.tile_px(),
         )
         phases = ConsolePhases()
         with phases.phase("check files"):
@@ -100,6 +104,15 @@ class CheckModel:
         with ConsolePhases().phase("check files"):
             model = open_public_model(self.folder)
         print(model.summary())
+
+
+def _sides(option: str, text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    found = re.fullmatch(r"([1-9]\d{0,3})x([1-9]\d{0,3})", text)
+    if not found:
+        raise ConfigError(f"{option}: expected HEIGHTxWIDTH such as 480x832, got {text!r}")
+    return int(found[1]), int(found[2])
 
 
 def _by_bytes(advance: Callable[[], None], total: int) -> Callable[[int], None]:

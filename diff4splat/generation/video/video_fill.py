@@ -29,6 +29,7 @@ from diff4splat.generation.video.canonical_scene import (
 from diff4splat.generation.video.deformation_motion import deform
 from diff4splat.generation.video.fill_path import fill_path
 from diff4splat.generation.video.hidden_cells import FillGrid, at_grid, full_grid, hidden_grid
+from diff4splat.generation.video.image_condition import image_condition
 from diff4splat.generation.video.render_condition import (
     RenderedImage,
     encode_condition,
@@ -46,7 +47,6 @@ from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.deformation.keyframes import DeformationUnits
 from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-from diff4splat.models.video_dit.conditions import ImageCondition
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.motion.keyframe_algebra import hold_until
@@ -152,28 +152,16 @@ def _conditions(
             rendered = render_layered_image(request.layered, request.path, request.key_times_s)
     with log.phases.phase("encode image"):
         image = request.image.rgb.movedim(-1, 0)[None, :, None] * 2 - 1
+        image_latent = model.networks.vae.encode(image).mean
         conditions = Conditions(
-            image_latent=model.networks.vae.encode(image).mean,
+            image_latent=image_latent,
             plucker=plucker_map(relative_to_first(request.path.cameras)).movedim(0, 1)[None],
             text=request.text.prompt,
             negative_text=request.text.negative,
-            image=_image_condition(model, request, image),
+            image=image_condition(model, image, image_latent, len(request.path)),
             render=encode_condition(model, rendered) if conditioned else None,
         )
     return rendered, conditions
-
-
-def _image_condition(
-    model: Model, request: FillRequest, image: Float[Tensor, "1 3 1 h w"]
-) -> ImageCondition | None:
-    """The image followed by grey frames, and which of them are known (Wan 2.1 image-to-video)."""
-    if not model.config.dit.condition_channels:
-        return None
-    grey = torch.zeros_like(image).expand(-1, -1, len(request.path) - 1, -1, -1)
-    latent = model.networks.vae.encode(torch.cat([image, grey], 2)).mean
-    known = torch.zeros_like(latent[:, :1]).expand(-1, TIME_STRIDE, -1, -1, -1).clone()
-    known[:, :, 0] = 1
-    return ImageCondition(channels=torch.cat([known, latent], 1))
 
 
 def _grid(model: Model, request: FillRequest, video: _FilledVideo, raw: RawVideoMaps) -> FillGrid:

@@ -3,11 +3,11 @@
 Axes: ``b`` batch, ``c`` latent channels, ``t h w`` latent grid, ``f`` video frames, ``s d`` text.
 The first latent frame is the image's own, clean at every step: it has level 0 and velocity 0
 (Wan 2.2 TI2V), so the solver carries it through unchanged. A model that takes the image as channels
-of its own (Wan 2.1 image-to-video) makes the first frame like all others.
+of its own (image-to-video weights) makes the first frame like all others.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from jaxtyping import Bool, Float
@@ -17,6 +17,7 @@ from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
 from diff4splat.flow.samplers import VelocityFn
 from diff4splat.flow.solve import solve
 from diff4splat.generation.settings import GenerationSettings
+from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.protocols import VideoVelocity
 from diff4splat.models.video_dit.conditions import (
     DitConditions,
@@ -76,14 +77,20 @@ def sample_video(
         settings.solver_path,
         advance,
     )
-    return VideoSample(latent=latent, calls=calls)
+    frames = 1 + (conditions.plucker.shape[2] - 1) // TIME_STRIDE
+    return VideoSample(latent=latent[:, :, -frames:], calls=calls)
 
 
 def initial_noise(conditions: Conditions, seed: int) -> Float[Tensor, "b c t h w"]:
-    """Seeded noise after the clean first frame; drawn on the CPU, so every device starts alike."""
+    """Seeded noise after the clean first frame; drawn on the CPU, so every device starts alike.
+
+    Channels of the image may have frames before the video (CogVideoX 1.5), which are noise too.
+    """
     image = conditions.image_latent
     given = conditions.first_frame_is_given
-    frames = (conditions.plucker.shape[2] - 1) // 4 + (0 if given else 1)
+    frames = (conditions.plucker.shape[2] - 1) // TIME_STRIDE + (0 if given else 1)
+    if not given and conditions.image.channels is not None:
+        frames = conditions.image.channels.shape[2]
     generator = torch.Generator().manual_seed(seed)
     noise = torch.randn(*image.shape[:2], frames, *image.shape[3:], generator=generator).to(image)
     return torch.cat([image, noise], 2) if given else noise
@@ -95,16 +102,10 @@ def video_velocity(
     """The velocity that the solver follows, with guidance; ``calls`` counts network evaluations."""
     # Cameras and text are embedded once: they are the same at every level.
     embedded = _prepare(dit, conditions, conditions.text, conditions.text_mask)
-    without = replace(embedded, text=None, text_mask=None, pooled_text=None)
-    if conditions.negative_text is not None:
-        negative = _prepare(dit, conditions, conditions.negative_text)
-        # Cameras and images are those of the other branch, and held once.
-        without = replace(
-            without,
-            text=negative.text,
-            text_mask=negative.text_mask,
-            pooled_text=negative.pooled_text,
-        )
+    negative = conditions.negative_text
+    without = embedded.with_text_of(
+        None if negative is None else _prepare(dit, conditions, negative)
+    )
     first_is_given = conditions.first_frame_is_given
     unconditional = _branch(dit, without, first_is_given)
     if conditions.text is None:

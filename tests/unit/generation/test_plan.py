@@ -122,7 +122,7 @@ def test_the_log_says_why_a_network_does_not_run(
 def test_a_model_may_fill_by_default() -> None:
     filling = replace(config(), default_fill="video")
     plan = plan_generation(filling, PARTS, RequestFacts(prompt=True))
-    assert plan.parts == frozenset(PARTS) and plan.skipped == ()
+    assert plan.parts == frozenset(model_parts(filling)) and plan.skipped == ()
     assert not plan_generation(filling, PARTS, RequestFacts(prompt=True, fill="none")).fills
 
 

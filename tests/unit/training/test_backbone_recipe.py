@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from imported_cogvideox import cogvideox_source, imported_cogvideox
 from imported_models import imported, wan_source
 from safetensors.torch import load_file
 
@@ -16,12 +17,21 @@ from diff4splat.training.prerequisites import last_checkpoint
 from diff4splat.training.train_stage import MODEL_FOLDER, StageRequest, train_stage
 from diff4splat.training.trainer.checkpoints.export import load_parts
 
-__all__ = ["imported", "wan_source"]
+__all__ = ["cogvideox_source", "imported", "imported_cogvideox", "wan_source"]
 PUBLIC = ("vae.safetensors", "dit.safetensors", "text_encoder.safetensors", "tokenizer.json")
 
 
-def test_reconstruction_trains_on_public_latents(imported: dict[str, Path], tmp_path: Path) -> None:
-    folder = imported["t2v"]
+@pytest.fixture(params=["t2v", "2b"])
+def folder(
+    request: pytest.FixtureRequest,
+    imported: dict[str, Path],
+    imported_cogvideox: dict[str, Path],
+) -> Path:
+    """A model of Wan, and one of CogVideoX."""
+    return (imported | imported_cogvideox)[request.param]
+
+
+def test_reconstruction_trains_on_public_latents(folder: Path, tmp_path: Path) -> None:
     recipe = backbone_recipe(find_config(folder))
     stages = [replace(stage, steps=2, gates=()) for stage in recipe.stages]
     recipe = replace(recipe, stages=tuple(stages))
@@ -39,8 +49,7 @@ def test_reconstruction_trains_on_public_latents(imported: dict[str, Path], tmp_
     assert not torch.equal(before, after)
 
 
-def test_only_adapters_of_the_video_model_learn(imported: dict[str, Path], tmp_path: Path) -> None:
-    folder = imported["t2v"]
+def test_only_adapters_of_the_video_model_learn(folder: Path, tmp_path: Path) -> None:
     recipe = backbone_recipe(find_config(folder))
     stages = [replace(stage, steps=2, gates=(), lora_rank=2) for stage in recipe.stages]
     recipe = replace(recipe, stages=tuple(stages))

@@ -48,9 +48,26 @@ OTHER_VALUES = {
     "padded_text_tokens": 16,
     "condition_channels": 8,
     "image_width": 12,
+    "positions": "rotary",
+    "base_grid": [13, 30, 46],
+    "betas": "linear",
+    "offset_width": 8,
+    "inverse_image_scale": True,
+    "zero_terminal_snr": False,
+    "expert_boundary": 0.5,
+    "activation": "quick_gelu",
 }
 """Valid values where doubling the old one is not."""
-BOUND = [("ldrm", "input"), ("text", "encoder"), ("motion_unet", "mask_refiner_width")]
+BOUND = [
+    ("ldrm", "input"),
+    ("text", "encoder"),
+    ("motion_unet", "mask_refiner_width"),
+    ("vae", "groups"),
+    ("vae", "tile_px"),
+    ("joint", "level_width"),
+    ("joint", "patch_frames"),
+    ("image_encoder", "width"),
+]
 """Fields that may not change alone."""
 
 
@@ -102,7 +119,14 @@ def test_another_version_is_refused(version: object) -> None:
 
 def test_parts_that_a_stored_model_does_not_name_are_left_out() -> None:
     data = json.loads(test_size().to_json())
-    for later in ("refinement", "monocular_depth", "motion_unet", "default_fill"):
+    for later in (
+        "refinement",
+        "monocular_depth",
+        "motion_unet",
+        "joint",
+        "image_encoder",
+        "default_fill",
+    ):
         del data[later]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
 

@@ -47,6 +47,7 @@ def test_the_file_lists_parts_in_one_order(tmp_path: Path) -> None:
             "deformation",
             "monocular_depth",
             "motion_unet",
+            "image_encoder",
         ],
         "license": "not stated",
         "origin": "not stated",

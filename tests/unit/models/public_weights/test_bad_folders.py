@@ -86,6 +86,11 @@ def path_in_index(folder: Path) -> None:
     edit(index, weight_map={"a": "../../etc/passwd"})
 
 
+def second_expert_of_another_width(folder: Path) -> None:
+    shutil.copytree(folder / "transformer", folder / "transformer_2")
+    edit(folder / "transformer_2/config.json", ffn_dim=80)
+
+
 BAD: dict[str, tuple[Change, str]] = {
     "another architecture": (
         lambda f: edit(f / "transformer/config.json", _class_name="FluxTransformer2DModel"),
@@ -95,9 +100,17 @@ BAD: dict[str, tuple[Change, str]] = {
         lambda f: edit(f / "model_index.json", _class_name="LTXPipeline"),
         r"expected the architecture WanPipeline",
     ),
-    "two experts": (
+    "two experts without a boundary": (
         lambda f: shutil.copytree(f / "transformer", f / "transformer_2"),
-        r"got two experts",
+        r"expected boundary_ratio to be a number above 0, got None",
+    ),
+    "two experts that differ": (
+        second_expert_of_another_width,
+        r"expected the settings of the first expert",
+    ),
+    "no image encoder": (
+        lambda f: edit(f / "transformer/config.json", image_dim=20, added_kv_proj_dim=24),
+        r"image_encoder/config\.json: expected a file",
     ),
     "another patch": (
         lambda f: edit(f / "transformer/config.json", patch_size=[2, 2, 2]),

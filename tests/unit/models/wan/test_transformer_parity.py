@@ -1,6 +1,6 @@
 """The video model holds Wan's weights: its outputs are those of diffusers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 import torch
@@ -64,6 +64,12 @@ def reference(network: nn.Module, given: Inputs) -> Tensor:
     return network(latent.to(dtype), step, text.to(dtype), return_dict=False, **states)[0].float()
 
 
+def expert(kind: str) -> nn.Module:
+    """The network for the levels of ``inputs``, which lie below the boundary of two."""
+    seed = wan_folder.LOW_SEED if kind == "a14b" else 1
+    return wan_folder.transformer(kind, seed=seed)
+
+
 @torch.no_grad()
 def ours(model: Model, given: Inputs, **conditions: object) -> Tensor:
     dit = model.networks.dit
@@ -84,7 +90,7 @@ def no_render(model: Model) -> RenderCondition:
 
 def test_velocities_are_those_of_diffusers(model: Model, kind: str) -> None:
     given = inputs(kind)
-    want = reference(wan_folder.transformer(kind), given)
+    want = reference(expert(kind), given)
     assert error(ours(model, given, condition=no_render(model)), want) < FP32
 
 
@@ -95,6 +101,21 @@ def test_fresh_adapters_change_no_bit(model: Model, kind: str) -> None:
     assert torch.equal(
         ours(model, given, condition=one), ours(model, given, condition=other, camera=camera)
     )
+
+
+@pytest.mark.parametrize("kind", ["a14b"], indirect=True)
+def test_each_expert_has_its_levels(model: Model, kind: str) -> None:
+    given, render = inputs(kind), no_render(model)
+    high, low = wan_folder.BOUNDARY, wan_folder.BOUNDARY - 1e-3
+    for levels in ((high, high), (low, low), (1.0, 0.1), (0.0, high)):
+        level = torch.tensor(levels)[:, None].expand(-1, FRAMES)
+        mixed = replace(given, level=level)
+        wanted = [
+            reference(wan_folder.transformer(kind, seed=seed), mixed)
+            for seed in (1, wan_folder.LOW_SEED)
+        ]
+        want = torch.where((level[:, :1, None, None, None] >= high), *wanted)
+        assert error(ours(model, mixed, condition=render), want) < FP32
 
 
 @pytest.mark.parametrize("kind", ["t2v"], indirect=True)
@@ -118,8 +139,8 @@ def test_stored_half_precision_is_computed_in_float32(model: Model, kind: str) -
 
 def test_half_precision_is_as_exact_as_that_of_diffusers(model: Model, kind: str) -> None:
     given = inputs(kind)
-    want = reference(wan_folder.transformer(kind), given)
-    theirs = reference(wan_folder.transformer(kind).to(torch.bfloat16), given)
+    want = reference(expert(kind), given)
+    theirs = reference(expert(kind).to(torch.bfloat16), given)
     model.networks.dit.to(torch.bfloat16)
     half = Inputs(
         kind=kind,

@@ -1,0 +1,1 @@
+"""Tiny networks of public families in their own loop and in ours."""

@@ -1,0 +1,1 @@
+"""Encoder of images whose states a video model attends to."""
