@@ -22,6 +22,12 @@ class ErrorTimeReport:
 
     results: tuple[SweepResult, ...]
     files: tuple[Path, ...]
+    partial: PartialReport
+
+    @property
+    def plots(self) -> tuple[Path, ...]:
+        """One for each of the results."""
+        return self.files[-len(self.results) :] if self.results else ()
 
     @property
     def table(self) -> str:
@@ -36,12 +42,14 @@ def run(
     phases: Phases | None = None,
     registry: KnobRegistry | None = None,
     quick: bool = False,
+    keep: bool = False,
 ) -> ErrorTimeReport:
     """Measure the named knobs, or all, and write everything into the folder ``out``.
 
     A run that was stopped goes on after the last complete knob.
 
-    ``registry`` defaults to the known knobs; ``quick`` runs them on two of the eight inputs.
+    ``registry`` defaults to the known knobs; ``quick`` runs them on two of the eight inputs. With
+    ``keep`` a second run finds every row, until ``PartialReport.remove``.
 
     Raises:
         ConfigError: an unknown knob, or ``repeats`` below 1.
@@ -68,5 +76,6 @@ def run(
     for result in results:
         files.append(out / f"error-time-{result.knob.name}.png")
         save_error_time_plot(result, files[-1])
-    partial.remove()
-    return ErrorTimeReport(results=tuple(results), files=tuple(files))
+    if not keep:
+        partial.remove()
+    return ErrorTimeReport(results=tuple(results), files=tuple(files), partial=partial)
