@@ -22,12 +22,6 @@ class ErrorTimeReport:
 
     results: tuple[SweepResult, ...]
     files: tuple[Path, ...]
-    partial: PartialReport
-
-    @property
-    def plots(self) -> tuple[Path, ...]:
-        """One for each of the results."""
-        return self.files[-len(self.results) :] if self.results else ()
 
     @property
     def table(self) -> str:
@@ -49,7 +43,7 @@ def run(
     A run that was stopped goes on after the last complete knob.
 
     ``registry`` defaults to the known knobs; ``quick`` runs them on two of the eight inputs. With
-    ``keep`` a second run finds every row, until ``PartialReport.remove``.
+    ``keep`` the folder keeps every row for another run.
 
     Raises:
         ConfigError: an unknown knob, or ``repeats`` below 1.
@@ -74,8 +68,13 @@ def run(
         partial.add(result)
     files = list(write_tables(out, results))
     for result in results:
-        files.append(out / f"error-time-{result.knob.name}.png")
+        files.append(plot_file(out, result.knob.name))
         save_error_time_plot(result, files[-1])
     if not keep:
         partial.remove()
-    return ErrorTimeReport(results=tuple(results), files=tuple(files), partial=partial)
+    return ErrorTimeReport(results=tuple(results), files=tuple(files))
+
+
+def plot_file(folder: Path, knob: str) -> Path:
+    """Where the plot of a knob lies in the folder of a report."""
+    return folder / f"error-time-{knob}.png"

@@ -14,7 +14,10 @@ from diff4splat.io.atomic import write_text
 from diff4splat.progress.machine import Machine, this_machine
 
 FORMAT = "diff4splat error-time 1"
-NOTE = "Seconds are of this machine and of one run; compare them only within this report."
+NOTE = (
+    "Seconds are of this machine and of one run, with one thread processor seconds; compare them "
+    "only within this report."
+)
 
 
 def to_json(results: Sequence[SweepResult], machine: Machine) -> str:

@@ -95,7 +95,7 @@ class GenerationSettings:
     key_times: int | None = None
     """Times at which the scene keeps the image's motion; None is one per frame of the model."""
     fill_stride: int = 1
-    """The video model's fill has a Gaussian for every n-th cell along both axes, n times as wide."""
+    """The video fill has a Gaussian for every n-th cell along both axes, n times as wide."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:

@@ -47,22 +47,22 @@ def headlines(report: WholeReport) -> list[Headline]:
 
 def _sampler(report: WholeReport) -> Headline | None:
     rows = [row for one in report.knobs if one.knob.name == VIDEO_SAMPLING for row in one.rows]
-    counted = {row: int(row.label) for row in rows if row.label.isdigit()}
-    steps = [row for row in counted if row.series == STEPWISE]
+    counted = [(int(row.label), row) for row in rows if row.label.isdigit()]
+    steps = [one for one in counted if one[1].series == STEPWISE]
     if not steps:
         return None
-    last = max(steps, key=counted.__getitem__)
-    as_good = [row for row in counted if row.error <= last.error]
-    best = min(as_good, key=lambda row: (counted[row], row.error))
+    most, last = max(steps, key=lambda one: one[0])
+    as_good = [one for one in counted if one[1].error <= last.error]
+    fewest, best = min(as_good, key=lambda one: (one[0], one[1].error))
     detail = (
         f"by {best.series}: latent error {best.error:.3f}; "
-        f"{last.series} has {last.error:.3f} with {last.label}"
+        f"{last.series} has {last.error:.3f} with {most}"
     )
     return Headline(
-        number=best.label,
+        number=str(fewest),
         what="evaluations of the video model",
         detail=detail,
-        good=counted[best] < counted[last],
+        good=fewest < most,
     )
 
 

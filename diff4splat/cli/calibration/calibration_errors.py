@@ -22,7 +22,12 @@ if TYPE_CHECKING:
     from diff4splat.generation.pipeline import Diff4SplatPipeline
     from diff4splat.scene.scene import Scene
 
-CAMERA, FRAMES, SEED, SIDE_PX = "arc:0.1", 3, 0, 192
+CAMERAS = ("arc:0.1", "left:0.15", "spiral")
+"""Three frames of an arc are nearly the photograph's own view; the others show it from the side."""
+FRAMES, SEED, SIDE_PX = 3, 0, 192
+
+Paths = Sequence[Sequence["Tensor"]]
+"""Frames ``h w 3`` of every camera path."""
 
 
 def generation_settings() -> list[SettingValues]:
@@ -46,18 +51,21 @@ def photo_errors(photo: Path) -> list[float | None]:
     reference = {"side_share": 1.0, "color_matching_steps": generation.REFERENCE_STEPS}
     exact = generated_frames(photo, reference)
     return [
-        relative_error(generated_frames(photo, values), exact) for values in generation_settings()
+        worst_error(generated_frames(photo, values), exact) for values in generation_settings()
     ]
 
 
-def relative_error(frames: Sequence["Tensor"], exact: Sequence["Tensor"]) -> float | None:
-    """Error over what the first frame loses at the size of ``frames``; None for another shape."""
-    from diff4splat.cli.limits.generation import error_unit
+def worst_error(paths: Paths, exact: Paths) -> float | None:
+    """The largest over camera paths of the error, over what the photograph's view loses.
 
-    (height, width), full = frames[0].shape[:2], exact[0].shape[:2]
+    None where the frames have another shape.
+    """
+    first = exact[0][0]
+    (height, width), full = paths[0][0].shape[:2], first.shape[:2]
     if height * full[1] != width * full[0]:
         return None
-    return mean_error(frames, exact) / error_unit(exact[0].clamp(0, 1), (height, width))
+    errors = [mean_error(*pair) for pair in zip(paths, exact, strict=True)]
+    return max(errors) / generation.error_unit(first.clamp(0, 1), (height, width))
 
 
 def generated_frames(
@@ -65,9 +73,9 @@ def generated_frames(
     values: SettingValues,
     model: str = "small",
     side_px: int = SIDE_PX,
-    camera: str = CAMERA,
-) -> list["Tensor"]:
-    """Frames of a generation with a setting, at its own size."""
+    cameras: Sequence[str] = CAMERAS,
+) -> Paths:
+    """Frames of a generation with a setting, at its own size, along each camera path."""
     from diff4splat.generation.inputs.image_size import find_image_size
     from diff4splat.generation.inputs.input_cameras import path_frame
     from diff4splat.generation.inputs.input_image import load_image
@@ -78,13 +86,15 @@ def generated_frames(
 
     side_px, multiple_px = find_image_size(model, round(side_px * values["side_share"]))
     image = load_image(photo, side_px, multiple_px=multiple_px, convert=True)
-    path = build_path(camera, path_frame(image.camera), PathSettings(frames=FRAMES, fps=24.0))
+    frame, length = path_frame(image.camera), PathSettings(frames=FRAMES, fps=24.0)
+    paths = [build_path(camera, frame, length) for camera in cameras]
     settings = GenerationSettings(
         color_matching_steps=values["color_matching_steps"],
         subpixel_infill=values.get("infill") != "none",
     )
-    scene = _pipeline(model)(image, path, seed=SEED, settings=settings)
-    return [frame.rgb for frame in render_video(scene, scene.path)]
+    # Without a video fill the Gaussians are the same for every path.
+    scene = _pipeline(model)(image, paths[0], seed=SEED, settings=settings)
+    return [[frame.rgb for frame in render_video(scene, path)] for path in paths]
 
 
 def all_rows(

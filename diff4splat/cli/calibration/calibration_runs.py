@@ -119,7 +119,7 @@ def onnx_runs(folder: Path) -> list[Run]:
 
 
 def train_runs(folder: Path) -> list[Run]:
-    """A few steps of stages of the small recipe; each goes on from those before it in its folder."""
+    """A few steps of stages of the small recipe, one after another in a folder."""
     return [
         [
             *("train", "--config", recipe, "--stage", stage, "--steps", steps),

@@ -2,16 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from diff4splat.cli.calibration.skipped import Skipped
 from diff4splat.cli.options.constraints import InputPath, OutFolder
 
 if TYPE_CHECKING:
-    from diff4splat.progress.phases import Phases
-    from diff4splat.stability.check import Record
+    from collections.abc import Mapping
 
-QUICK_PX = 96
+SKIPPED_PX = 96
 PAGE = "report.html"
 
 
@@ -19,7 +18,8 @@ PAGE = "report.html"
 class WholeReports:
     """Error against run time, what runs leave out, and stability, on one page of pictures.
 
-    Minutes; a call that is stopped goes on where it was.
+    Two processes measure at a time, each with one thread. A call that is stopped goes on where it
+    was.
     """
 
     out: OutFolder = Path("report")
@@ -27,49 +27,55 @@ class WholeReports:
     images: Annotated[tuple[Path, ...], InputPath(what="a photograph", folder=False)] = ()
     """Photographs to measure on what runs leave out; worlds make up the number."""
     quick: bool = False
-    """Two of eight inputs and a few extreme ones: less to see in a quarter of the time."""
+    """Two of eight inputs and a few extreme ones: less to see in a fraction of the time."""
 
     def run(self) -> None:
         """Measure, write, say where the page is."""
         import time
 
+        from diff4splat.cli.calibration.shares import run_shares
+        from diff4splat.cli.calibration.whole_shares import whole_shares
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
-        from diff4splat.error_time import report as error_time
-        from diff4splat.io.atomic import write_text
+        from diff4splat.error_time.subjects.inputs import require_photographs
         from diff4splat.io.figures.plots import require_matplotlib
+
+        require_matplotlib()
+        require_photographs()
+        began, phases = time.perf_counter(), ConsolePhases()
+        precompile_renderer(single_gaussian("cpu"), phases)
+        precompile_tracer(phases)
+        skipped = Skipped(out=self.out / "skipped", images=self.images, resolution=SKIPPED_PX)
+        done = run_shares(whole_shares(self.out, skipped, self.quick), phases)
+        note(f"wrote {self.write(done, time.perf_counter() - began)}")
+
+    def write(self, done: "Mapping[str, Any]", seconds: float) -> Path:
+        """The page of all shares; what they kept for a second call goes."""
+        from diff4splat.cli.calibration.whole_shares import KNOBS, SKIPPED, STABILITY, joined
+        from diff4splat.error_time.report import plot_file
+        from diff4splat.error_time.resume import PARTIAL
+        from diff4splat.error_time.tables import write_tables
+        from diff4splat.io.atomic import write_text
         from diff4splat.progress.machine import this_machine
         from diff4splat.reports.page import whole_page
         from diff4splat.reports.whole_report import WholeReport
 
-        require_matplotlib()
-        began, phases = time.perf_counter(), ConsolePhases()
-        precompile_renderer(single_gaussian("cpu"), phases)
-        precompile_tracer(phases)
-        knobs = error_time.run(
-            self.out / "error-time", phases=phases, repeats=1, quick=self.quick, keep=True
-        )
-        skipped = Skipped(
-            out=self.out / "skipped", images=self.images, resolution=QUICK_PX
-        ).measured(phases)
+        folder = self.out / "error-time"
+        plots = {name: plot_file(folder / share, name) for share in KNOBS for name in done[share]}
+        knobs = joined({name: rows for share in KNOBS for name, rows in done[share].items()})
+        write_tables(folder, knobs)
         report = WholeReport(
             machine=this_machine(),
-            seconds=time.perf_counter() - began,
-            knobs=knobs.results,
-            plots=knobs.plots,
-            skipped=skipped.rows,
-            skipped_plot=skipped.plot,
-            records=self.stability(phases),
+            seconds=seconds,
+            knobs=knobs,
+            plots=[plots[result.knob.name] for result in knobs],
+            skipped=done[SKIPPED].rows,
+            skipped_plot=done[SKIPPED].plot,
+            records=done[STABILITY],
         )
         write_text(self.out / PAGE, whole_page(report))
-        knobs.partial.remove()
-        skipped.partial.remove()
-        note(f"wrote {self.out / PAGE}")
-
-    def stability(self, phases: "Phases") -> "tuple[Record, ...]":
-        """All checks; also as files of their own."""
-        from diff4splat.stability import report
-        from diff4splat.stability.known_checks import known_checks
-
-        return report.run(self.out / "stability", known_checks(quick=self.quick), phases).records
+        for share in KNOBS:
+            (folder / share / PARTIAL).unlink(missing_ok=True)
+        done[SKIPPED].partial.remove()
+        return self.out / PAGE

@@ -6,6 +6,7 @@ import tyro
 
 from diff4splat.cli.calibration.calibrate import Calibrate
 from diff4splat.cli.calibration.skipped import Skipped
+from diff4splat.cli.calibration.whole import WholeReports
 from diff4splat.cli.datasets.prepare_curation import (
     PrepareAlign,
     PrepareCaptions,
@@ -56,7 +57,8 @@ Prepare = (
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
 Report = (
-    Annotated[ErrorTime, subcommand("error-time")]
+    Annotated[WholeReports, subcommand("all")]
+    | Annotated[ErrorTime, subcommand("error-time")]
     | Annotated[ListKnobs, subcommand("knobs")]
     | Annotated[Stability, subcommand("stability")]
     | Annotated[Calibrate, subcommand("calibrate")]

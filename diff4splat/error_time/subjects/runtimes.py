@@ -26,7 +26,7 @@ PARTS = ("text_encoder", "monocular_depth", "motion_unet")
 
 def run(runtime: str, inputs: Inputs) -> scenes.Scenes:
     """Scenes with the networks in ``PyTorch``, or in ``ONNX Runtime`` with a precision."""
-    model = shipped_model() if runtime == EAGER else graph_model(runtime.split()[-1])
+    model = shipped_model() if runtime == EAGER else graph_model(runtime.rpartition(" ")[2])
     return scenes.generate(model, GenerationSettings(), inputs)
 
 
