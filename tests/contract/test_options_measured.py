@@ -41,7 +41,13 @@ ASKED, WHERE = "what is asked for: another result, not a coarser one", "where th
 LIMITS = "chooses among measured settings"
 CHOICES = {
     ASKED: (
-        *("Generate.camera", "Generate.prompt", "Generate.options", "Generate.seed", "Generate.fit"),
+        *(
+            "Generate.camera",
+            "Generate.prompt",
+            "Generate.options",
+            "Generate.seed",
+            "Generate.fit",
+        ),
         *("Generate.fov", "Generate.fill", "Generate.still", "Generate.negative_prompt"),
         *("Generate.model", "Generate.depth_kind", "Generate.convert", "Generate.skip_depth"),
         *("Render.camera", "Render.time", "Render.frame", "Render.resolution", "Render.options"),

@@ -50,9 +50,7 @@ def photo_errors(photo: Path) -> list[float | None]:
     """
     reference = {"side_share": 1.0, "color_matching_steps": generation.REFERENCE_STEPS}
     exact = generated_frames(photo, reference)
-    return [
-        worst_error(generated_frames(photo, values), exact) for values in generation_settings()
-    ]
+    return [worst_error(generated_frames(photo, values), exact) for values in generation_settings()]
 
 
 def worst_error(paths: Paths, exact: Paths) -> float | None:
