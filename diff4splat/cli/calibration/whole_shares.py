@@ -60,7 +60,7 @@ def whole_shares(folder: Path, skipped: Skipped, quick: bool) -> list[Share]:
         run=partial(measure_stability, folder / STABILITY, quick),
     )
     made[SKIPPED] = Share(name=SKIPPED, steps=INPUTS, run=skipped.measured)
-    order = ("video", "fill", "scenes", STABILITY, "fits", SKIPPED, "rendering")
+    order = ("video", "scenes", "fill", STABILITY, "fits", SKIPPED, "rendering")
     return [made[name] for name in order]
 
 
