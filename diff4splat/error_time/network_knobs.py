@@ -118,7 +118,7 @@ def _block_caching(references: References) -> ApproximationSetting:
         repeats=0,
         series=lambda caching: caching.series,
         label=lambda caching: caching.label,
-        label_meaning="steps, or the largest change with which blocks are reused",
+        label_meaning="steps, or the largest change that counts as none",
     )
 
 

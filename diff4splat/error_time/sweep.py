@@ -37,6 +37,11 @@ class Measurement:
     peak_bytes: int | None = None
     """Memory that the first run took at most beyond what was in use; None where unknown."""
 
+    @property
+    def name(self) -> str:
+        """Of the setting, in words."""
+        return self.label if self.setting is None else str(self.setting)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepResult:

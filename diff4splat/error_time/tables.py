@@ -94,7 +94,7 @@ def _section(result: SweepResult) -> list[str]:
 
 
 def _table_line(row: Measurement, on_front: bool, is_default: bool, columns: Sequence[str]) -> str:
-    name = f"**{row.setting}** (default)" if is_default else str(row.setting)
+    name = f"**{row.name}** (default)" if is_default else row.name
     cells = [name, f"{row.seconds * 1e3:.3g}", _shown(row.error, ".2e")]
     cells += [_shown(value, ".3g") for value in row.more_errors.values()]
     if "MB" in columns:

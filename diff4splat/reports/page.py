@@ -66,12 +66,12 @@ def _summary(result: SweepResult) -> str:
     """The default in a line."""
     row = result.default
     error = "not finite" if math.isinf(row.error) else f"error {row.error:.2g}"
-    return f"default {row.setting}: {error}, {_duration(row.seconds)}"
+    return f"default {row.name}: {error}, {_duration(row.seconds)}"
 
 
 def _row(row: Measurement, result: SweepResult) -> str:
     mark = "front" if row in result.pareto() else ""
-    name = safe_text(str(row.setting)) + (" (default)" if row is result.default else "")
+    name = safe_text(row.name) + (" (default)" if row is result.default else "")
     numbers = [f"{row.seconds * 1e3:.3g}", _number(row.error, ".2e")]
     numbers += [_number(value, ".3g") for value in row.more_errors.values()]
     cells = "".join(f'<td class="number">{one}</td>' for one in numbers)
