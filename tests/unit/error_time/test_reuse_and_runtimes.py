@@ -8,7 +8,7 @@ from torch import nn
 
 from diff4splat.error_time.block_caching import CACHINGS, NO_CACHING
 from diff4splat.error_time.known_knobs import known_knobs
-from diff4splat.error_time.subjects import runtimes
+from diff4splat.error_time.subjects import runtimes, scenes
 from diff4splat.error_time.subjects.block_cache import ReusedBlocks
 from diff4splat.models.blocks.rope import rope_tables
 from diff4splat.models.hub.model import load_model
@@ -88,3 +88,16 @@ def test_the_settings_are_in_the_report() -> None:
     names = {knob.name: knob for knob in known_knobs()}
     assert {"key-times", "fill-stride", "runtime", "block-caching"} <= set(names)
     assert names["runtime"].repeats == 1  # the first run exports
+
+
+@pytest.mark.usefixtures("as_shipped")
+def test_views_of_a_scene_are_rendered_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rendered = []
+    monkeypatch.setattr(scenes, "_rendered", lambda scene: rendered.append(scene) or views)
+    monkeypatch.setattr(scenes, "_seen", {})
+    monkeypatch.setattr(scenes, "KEPT", 2)
+    zero = torch.zeros(1)
+    views = scenes.Views(rgb=zero, depth=zero, flow_px=zero)
+    for scene in ("a", "b", "a", "c", "a", "b"):
+        assert scenes.views(scene) is views
+    assert rendered == ["a", "b", "c", "b"], "the one that was not asked for longest goes"
