@@ -93,7 +93,7 @@ class References:
     """Results of references, each made once for all settings of a subject."""
 
     inputs: tuple[int, ...] = ALL_INPUTS
-    made: dict[Hashable, Any] = field(default_factory=dict)
+    _made: dict[Hashable, Any] = field(default_factory=dict)
 
     def of(self, one: Approximation) -> Any:
         """The truth, or the result of the reference."""
@@ -112,9 +112,9 @@ class References:
         return self.inputs[:: SUBJECTS[name].every]
 
     def _once(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        if key not in self.made:
-            self.made[key] = make()
-        return self.made[key]
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
 
 
 def _measurable(one: Approximation, references: References) -> ApproximationSetting:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from diff4splat.error_time.sweep import Measurement, SweepResult
 from diff4splat.evaluation.skipped.skipped_report import to_markdown
+from diff4splat.reports.full_report import FullReport, Headline, headlines
 from diff4splat.reports.groups import GROUPS, group_of
-from diff4splat.reports.whole_report import Headline, WholeReport, headlines
 from diff4splat.stability.page.page import stability_overview, stability_sections, stability_style
 from diff4splat.stability.page.svg import safe_text
 
 
-def whole_page(report: WholeReport) -> str:
+def report_page(report: FullReport) -> str:
     """The page as text; everything that was measured is escaped."""
     tiles = "".join(_tile(one) for one in headlines(report))
     minutes = f"Measured in {report.seconds / 60:.1f} minutes on {report.machine}."
@@ -38,7 +38,7 @@ def _tile(one: Headline) -> str:
     )
 
 
-def _knob_group(name: str, report: WholeReport) -> str:
+def _knob_group(name: str, report: FullReport) -> str:
     pairs = [
         (result, plot)
         for result, plot in zip(report.knobs, report.plots, strict=True)
@@ -78,7 +78,7 @@ def _row(row: Measurement, result: SweepResult) -> str:
     return f'<tr class="{mark}"><td>{name}</td>{cells}</tr>'
 
 
-def _skipped(report: WholeReport) -> str:
+def _skipped(report: FullReport) -> str:
     lines = to_markdown(report.skipped).splitlines()
     head, *rows = [_cells(line) for line in lines if not line.startswith("|---")]
     body = "".join(_table_row(row, "td") for row in rows)

@@ -4,6 +4,7 @@ Timings of one share are disturbed little by the other; a share that stops keeps
 """
 
 import os
+import pickle
 import queue
 import signal
 from collections.abc import Callable, Iterator, Mapping
@@ -69,7 +70,7 @@ def _collected(
     while waiting:
         _count(steps, left, advance)
         for name in [name for name, result in waiting.items() if result.ready()]:
-            done[name] = waiting.pop(name).get()
+            done[name] = pickle.loads(waiting.pop(name).get())
             for _ in range(left.pop(name)):
                 advance()
     return done
@@ -91,8 +92,9 @@ def _start(steps: "Queue[str]") -> None:
     _steps[:] = [steps]
 
 
-def _run(share: Share) -> Any:
-    return share.run(_StepPhases(share.name))
+def _run(share: Share) -> bytes:
+    """The result as bytes: tensors would else be shared with a process that has ended by then."""
+    return pickle.dumps(share.run(_StepPhases(share.name)))
 
 
 @contextmanager

@@ -4,9 +4,9 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.calibration.all_reports import AllReports
 from diff4splat.cli.calibration.calibrate import Calibrate
 from diff4splat.cli.calibration.skipped import Skipped
-from diff4splat.cli.calibration.whole import WholeReports
 from diff4splat.cli.datasets.prepare_curation import (
     PrepareAlign,
     PrepareCaptions,
@@ -57,7 +57,7 @@ Prepare = (
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
 Report = (
-    Annotated[WholeReports, subcommand("all")]
+    Annotated[AllReports, subcommand("all")]
     | Annotated[ErrorTime, subcommand("error-time")]
     | Annotated[ListKnobs, subcommand("knobs")]
     | Annotated[Stability, subcommand("stability")]

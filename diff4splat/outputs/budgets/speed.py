@@ -70,8 +70,10 @@ def _multiply(matrix: np.ndarray) -> None:
 
 
 def _stream(numbers: np.ndarray, spare: np.ndarray) -> None:
-    """Between two arrays that exist: whether new ones cost page faults differs between processes
-    by what they did before, four times the seconds.
+    """Between two arrays that exist.
+
+    Whether new ones cost page faults differs between processes by what they did before: four times
+    the seconds.
     """
     for _ in range(_PASSES):
         np.multiply(numbers, 0.5, out=spare)

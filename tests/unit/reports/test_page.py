@@ -12,9 +12,9 @@ from diff4splat.error_time.known_knobs import known_knobs
 from diff4splat.error_time.sweep import Measurement, SweepResult
 from diff4splat.evaluation.skipped.measurement import Measured
 from diff4splat.progress.machine import this_machine
+from diff4splat.reports.full_report import STATIC, FullReport, headlines
 from diff4splat.reports.groups import GROUPS, OTHER, group_of
-from diff4splat.reports.page import whole_page
-from diff4splat.reports.whole_report import STATIC, WholeReport, headlines
+from diff4splat.reports.page import report_page
 from diff4splat.stability.check import Check, Outcome
 from diff4splat.stability.runner import run_check
 
@@ -41,7 +41,7 @@ def sampling(errors: dict[tuple[str, int], float]) -> SweepResult:
 
 
 @pytest.fixture
-def report(tmp_path: Path) -> WholeReport:
+def report(tmp_path: Path) -> FullReport:
     plot = tmp_path / "plot.png"
     Image.new("RGB", (4, 4)).save(plot)
     checks = [
@@ -57,7 +57,7 @@ def report(tmp_path: Path) -> WholeReport:
         error=0.0,
         mean_square=0.0,
     )
-    return WholeReport(
+    return FullReport(
         machine=this_machine(),
         seconds=90.0,
         knobs=[sampling({("euler", 50): 0.06, ("fitted", 12): 0.04, ("unipc", 12): 0.1})],
@@ -68,7 +68,7 @@ def report(tmp_path: Path) -> WholeReport:
     )
 
 
-def test_headlines_say_what_was_measured(report: WholeReport) -> None:
+def test_headlines_say_what_was_measured(report: FullReport) -> None:
     sampler, static, stability, defaults = headlines(report)
     assert (sampler.number, sampler.good) == ("12", True)
     assert "fitted" in sampler.detail and "euler has 0.060 with 50" in sampler.detail
@@ -78,14 +78,14 @@ def test_headlines_say_what_was_measured(report: WholeReport) -> None:
     assert defaults.number.endswith("of 1")
 
 
-def test_a_sampler_that_needs_more_is_not_praised(report: WholeReport) -> None:
+def test_a_sampler_that_needs_more_is_not_praised(report: FullReport) -> None:
     worse = replace(report, knobs=[sampling({("euler", 50): 0.001})])
     assert headlines(worse)[0].number == "50"
     assert not headlines(worse)[0].good
 
 
-def test_the_page_stands_alone_and_nothing_is_markup(report: WholeReport) -> None:
-    page = whole_page(report)
+def test_the_page_stands_alone_and_nothing_is_markup(report: FullReport) -> None:
+    page = report_page(report)
     assert EVIL not in page and "&lt;script&gt;" in page
     assert not re.search(r"\{\{\w+\}\}", page)
     assert not re.search(r'(src|href)="(?!data:|#)', page)

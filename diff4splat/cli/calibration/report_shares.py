@@ -43,7 +43,7 @@ def names_of_shares() -> dict[str, tuple[str, ...]]:
     return {share: tuple(names) for share, names in named.items()}
 
 
-def whole_shares(folder: Path, skipped: Skipped, quick: bool) -> list[Share]:
+def report_shares(folder: Path, skipped: Skipped, quick: bool) -> list[Share]:
     """Everything that the whole report measures."""
     knobs = {knob.name: knob for knob in known_knobs()}
     made = {

@@ -16,7 +16,7 @@ STATIC = "all together, static and without a prompt"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WholeReport:
+class FullReport:
     """Results of all parts, with the pictures that were drawn of them."""
 
     machine: Machine
@@ -39,13 +39,13 @@ class Headline:
     good: bool
 
 
-def headlines(report: WholeReport) -> list[Headline]:
+def headlines(report: FullReport) -> list[Headline]:
     """What a reader wants to know first; those whose part was not measured are left out."""
     found = [_sampler(report), _static(report), _stability(report), _defaults(report)]
     return [one for one in found if one is not None]
 
 
-def _sampler(report: WholeReport) -> Headline | None:
+def _sampler(report: FullReport) -> Headline | None:
     rows = [row for one in report.knobs if one.knob.name == VIDEO_SAMPLING for row in one.rows]
     counted = [(int(row.label), row) for row in rows if row.label.isdigit()]
     steps = [one for one in counted if one[1].series == STEPWISE]
@@ -66,7 +66,7 @@ def _sampler(report: WholeReport) -> Headline | None:
     )
 
 
-def _static(report: WholeReport) -> Headline | None:
+def _static(report: FullReport) -> Headline | None:
     rows = [row for row in report.skipped if row.item == STATIC]
     if not rows:
         return None
@@ -81,7 +81,7 @@ def _static(report: WholeReport) -> Headline | None:
     )
 
 
-def _stability(report: WholeReport) -> Headline | None:
+def _stability(report: FullReport) -> Headline | None:
     counts = count_verdicts(report.records)
     if not report.records:
         return None
@@ -94,7 +94,7 @@ def _stability(report: WholeReport) -> Headline | None:
     )
 
 
-def _defaults(report: WholeReport) -> Headline | None:
+def _defaults(report: FullReport) -> Headline | None:
     if not report.knobs:
         return None
     on_front = [one for one in report.knobs if _is_on_front(one.default, one)]

@@ -4,16 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from diff4splat.cli.calibration import whole_shares
+from diff4splat.cli.calibration import report_shares
+from diff4splat.cli.calibration.all_reports import PAGE, AllReports
 from diff4splat.cli.calibration.shares import Share, run_shares
 from diff4splat.cli.calibration.skipped import Skipped
-from diff4splat.cli.calibration.whole import PAGE, WholeReports
 from diff4splat.error_time.known_knobs import known_knobs
 from diff4splat.progress.phases import Phases
 
 
 def test_every_knob_is_in_one_share() -> None:
-    shares = whole_shares.names_of_shares()
+    shares = report_shares.names_of_shares()
     named = [name for names in shares.values() for name in names]
     assert sorted(named) == sorted(knob.name for knob in known_knobs())
     assert all(shares.values())
@@ -22,7 +22,8 @@ def test_every_knob_is_in_one_share() -> None:
 
 def test_shares_count_their_steps(tmp_path: Path) -> None:
     quick, full = (
-        whole_shares.whole_shares(tmp_path, Skipped(out=tmp_path), quick) for quick in (True, False)
+        report_shares.report_shares(tmp_path, Skipped(out=tmp_path), quick)
+        for quick in (True, False)
     )
     assert [share.name for share in quick] == [share.name for share in full]
     assert all(share.steps > 0 for share in full)
@@ -61,20 +62,20 @@ def test_the_page_is_made_of_all_shares(tmp_path: Path, monkeypatch: pytest.Monk
     from diff4splat.evaluation.skipped.partial_rows import PartialRows
     from diff4splat.evaluation.skipped.skipped_report import SkippedReport, write_skipped
 
-    names = {share: () for share in whole_shares.KNOBS} | {"rendering": ("sh-degree",)}
-    monkeypatch.setattr(whole_shares, "names_of_shares", lambda: names)
+    names = {share: () for share in report_shares.KNOBS} | {"rendering": ("sh-degree",)}
+    monkeypatch.setattr(report_shares, "names_of_shares", lambda: names)
     row = Measured(
         item="depth", source="a", full_s=1.0, lean_s=0.5, saved_bytes=1, error=0.0, mean_square=0.0
     )
     files = write_skipped([row], tmp_path / "skipped")
     partial = PartialRows(tmp_path / "skipped", {})
-    done = {share: {} for share in whole_shares.KNOBS}
-    done["rendering"] = whole_shares.measure_knobs(
+    done = {share: {} for share in report_shares.KNOBS}
+    done["rendering"] = report_shares.measure_knobs(
         tmp_path / "error-time" / "rendering", ("sh-degree",), True, Phases()
     )
     done["skipped"] = SkippedReport(rows=[row], files=files, partial=partial)
     done["stability"] = ()
-    page = WholeReports(out=tmp_path).write(done, 60.0)
+    page = AllReports(out=tmp_path).write(done, 60.0)
     assert page == tmp_path / PAGE and "sh-degree" in page.read_text()
     assert (tmp_path / "error-time" / "error-time.json").exists()
     assert not list(tmp_path.rglob("*.partial.json"))
