@@ -1,10 +1,9 @@
-"""Work in shares, two at a time, each in a process of its own with one thread.
+"""Work in shares, two at a time, in processes with one thread each.
 
 Timings of one share are disturbed little by the other; a share that stops keeps what it measured.
 """
 
 import os
-import pickle
 import queue
 import signal
 from collections.abc import Callable, Iterator, Mapping
@@ -55,7 +54,8 @@ def run_shares(shares: list[Share], phases: Phases) -> dict[str, Any]:
     total = sum(share.steps for share in shares)
     with (
         _one_thread(),
-        context.Pool(PROCESSES, _start, (steps,), maxtasksperchild=1) as pool,
+        # Tensors of a result are read from the process that made them, so that has to stay.
+        context.Pool(PROCESSES, _start, (steps,)) as pool,
         phases.phase("measure", total) as advance,
     ):
         waiting = {share.name: pool.apply_async(_run, (share,)) for share in shares}
@@ -70,7 +70,7 @@ def _collected(
     while waiting:
         _count(steps, left, advance)
         for name in [name for name, result in waiting.items() if result.ready()]:
-            done[name] = pickle.loads(waiting.pop(name).get())
+            done[name] = waiting.pop(name).get()
             for _ in range(left.pop(name)):
                 advance()
     return done
@@ -92,9 +92,8 @@ def _start(steps: "Queue[str]") -> None:
     _steps[:] = [steps]
 
 
-def _run(share: Share) -> bytes:
-    """The result as bytes: tensors would else be shared with a process that has ended by then."""
-    return pickle.dumps(share.run(_StepPhases(share.name)))
+def _run(share: Share) -> Any:
+    return share.run(_StepPhases(share.name))
 
 
 @contextmanager
