@@ -19,7 +19,7 @@ import argparse
 import json
 import os
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -129,8 +129,11 @@ def measured_error(
         command = parse([name, str(source), "--camera", camera, *limit])
         promised, side_px = generation.promise(command)[1], generation.image_side(command)[0]
         values = promised.choice.values
-        made = calibration_errors.generated_frames(source, values, side_px=side_px, camera=camera)
-        return promised, scene_errors.mean_error(made, exact_generation(source, side_px, camera))
+        made = calibration_errors.generated_frames(
+            source, values, side_px=side_px, cameras=(camera,)
+        )
+        exact = exact_generation(source, side_px, camera)
+        return promised, scene_errors.mean_error(made[0], exact)
     if name == "render":
         promised = rendering.promise(parse([name, str(source), "--out", "x.webm", *limit]))
         exact = exact_views(source)
@@ -147,10 +150,13 @@ def measured_error(
 
 
 @cache
-def exact_generation(photo: Path, side_px: int, camera: str) -> list:
+def exact_generation(photo: Path, side_px: int, camera: str) -> Sequence:
     """Frames of the reference setting of ``generate``."""
     reference = {"side_share": 1.0, "color_matching_steps": generation.REFERENCE_STEPS}
-    return calibration_errors.generated_frames(photo, reference, side_px=side_px, camera=camera)
+    found = calibration_errors.generated_frames(
+        photo, reference, side_px=side_px, cameras=(camera,)
+    )
+    return found[0]
 
 
 @cache

@@ -3,7 +3,7 @@
 A subject runs one value of a declaration on the fixed inputs, and compares with the reference.
 """
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
@@ -43,6 +43,8 @@ class Subject:
     """Settings of which a value replaces some."""
     error_unit: str
     known_truth: bool = False
+    every: int = 1
+    """Of the inputs, every n-th is run: where one takes seconds."""
 
     def call(self, name: str, *arguments: Any) -> Any:
         """One function of the module; nothing where there is none."""
@@ -67,7 +69,7 @@ SUBJECTS: Mapping[str, Subject] = {
     ),
     "scene": Subject(module="scenes", base=GenerationSettings(), error_unit=RGB_UNIT),
     "video-scene": Subject(
-        module="scenes", base=GenerationSettings(fill="video"), error_unit=RGB_UNIT
+        module="scenes", base=GenerationSettings(fill="video"), error_unit=RGB_UNIT, every=2
     ),
     "fit": Subject(
         module="fits", base=SHORT_FIT, error_unit=f"{RGB_UNIT} to the true frames", known_truth=True
@@ -81,33 +83,41 @@ def declarations() -> tuple[Approximation, ...]:
     return tuple(one for module in DECLARING for one in module.APPROXIMATIONS)
 
 
-def declared_settings(inputs: tuple[int, ...] = ALL_INPUTS) -> tuple[ApproximationSetting, ...]:
+def declared_settings(references: "References") -> tuple[ApproximationSetting, ...]:
     """Every declaration as a setting of the report; nothing is loaded before the first run."""
-    references = _References(inputs=inputs)
     return tuple(_measurable(one, references) for one in declarations())
 
 
 @dataclass(slots=True)
-class _References:
+class References:
     """Results of references, each made once for all settings of a subject."""
 
-    inputs: tuple[int, ...]
-    made: dict[Hashable, Any] = field(default_factory=dict)
+    inputs: tuple[int, ...] = ALL_INPUTS
+    _made: dict[Hashable, Any] = field(default_factory=dict)
 
     def of(self, one: Approximation) -> Any:
         """The truth, or the result of the reference."""
         subject = SUBJECTS[one.subject]
-        settings = None if subject.known_truth else one.apply(subject.base, one.reference)
-        key = (one.subject, settings)
-        if key not in self.made:
-            known = subject.known_truth
-            self.made[key] = (
-                subject.call("truth") if known else subject.call("run", settings, self.inputs)
-            )
-        return self.made[key]
+        if subject.known_truth:
+            return self._once((one.subject, None), lambda: subject.call("truth"))
+        return self.of_settings(one.subject, one.apply(subject.base, one.reference))
+
+    def of_settings(self, name: str, settings: Any) -> Any:
+        """The result of a subject with settings."""
+        run = lambda: SUBJECTS[name].call("run", settings, self.inputs_of(name))  # noqa: E731
+        return self._once((name, settings), run)
+
+    def inputs_of(self, name: str) -> tuple[int, ...]:
+        """Those on which a subject is run."""
+        return self.inputs[:: SUBJECTS[name].every]
+
+    def _once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
 
 
-def _measurable(one: Approximation, references: _References) -> ApproximationSetting:
+def _measurable(one: Approximation, references: References) -> ApproximationSetting:
     subject = SUBJECTS[one.subject]
     return ApproximationSetting(
         name=one.name,
@@ -116,7 +126,9 @@ def _measurable(one: Approximation, references: _References) -> ApproximationSet
         settings=one.values,
         default=one.default,
         reference="the truth" if subject.known_truth else one.reference,
-        run=lambda value: subject.call("run", one.apply(subject.base, value), references.inputs),
+        run=lambda value: subject.call(
+            "run", one.apply(subject.base, value), references.inputs_of(one.subject)
+        ),
         run_reference=lambda: references.of(one),
         error=lambda *results: subject.call("error", *results),
         more_errors=lambda *results: subject.call("more_errors", *results) or {},

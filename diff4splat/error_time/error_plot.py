@@ -13,7 +13,10 @@ from diff4splat.io.figures.plots import label_log_axis, new_figure, save_figure
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito: distinct with any colour vision, and in grey with the markers."""
-MARKERS = "osD^vPX"
+MARKERS = "osD^vPX*<>h"
+"""More than colours: curves beyond the last colour begin anew with other markers, and dashed."""
+LONG_LABEL = 50
+"""Characters of the meaning of labels that still fit beside the name of the axis."""
 
 
 def save_error_time_plot(result: SweepResult, file: Path) -> None:
@@ -37,7 +40,7 @@ def draw(axes: Any, result: SweepResult) -> None:
     canvas = _Canvas(axes, result)
     canvas.front()
     for number, series in enumerate(dict.fromkeys(row.series for row in result.rows)):
-        canvas.curve(series, COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)])
+        canvas.curve(series, number)
     canvas.default()
     canvas.exact_line()
     canvas.lost_settings()
@@ -65,13 +68,14 @@ class _Canvas:
         seconds, errors = self.points(list(self.result.pareto()))
         self.axes.plot(seconds, errors, drawstyle="steps-post", label="Pareto front", **look)
 
-    def curve(self, series: str, color: str, marker: str) -> None:
+    def curve(self, series: str, number: int) -> None:
         """The points of one series with their labels."""
+        color, marker = COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)]
         rows = [r for r in self.result.rows if r.series == series and math.isfinite(r.error)]
         seconds, errors = self.points(rows)
         # Only settings of a named series form a curve; others have no order to connect them in.
         look = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1}
-        line = "-" if series else "none"
+        line = ("-" if number < len(COLORS) else "--") if series else "none"
         self.axes.plot(seconds, errors, linestyle=line, label=series or None, **look)
         for row, x, y in zip(rows, seconds, errors, strict=True):
             place = {"xytext": (5, 4), "textcoords": "offset points"}
@@ -82,7 +86,7 @@ class _Canvas:
         row = self.result.default
         if math.isfinite(row.error):
             ring = {"markersize": 12, "markerfacecolor": "none", "markeredgecolor": "0.2"}
-            name = f"default: {row.setting}"
+            name = f"default: {row.name}"
             self.axes.plot(*self.points([row]), marker="o", linestyle="none", label=name, **ring)
 
     def exact_line(self) -> None:
@@ -102,7 +106,8 @@ class _Canvas:
     def frame(self) -> None:
         """Scales, names and legend."""
         knob = self.result.knob
-        meaning = f"   (at the points: {knob.label_meaning})" if knob.label_meaning else ""
+        between = "\n" if len(knob.label_meaning) > LONG_LABEL else "   "
+        meaning = f"{between}(at the points: {knob.label_meaning})" if knob.label_meaning else ""
         if any(math.isfinite(row.error) for row in self.result.rows):
             self.axes.set(xscale="log", yscale="log")
         self.axes.set_ylabel(knob.error_unit)

@@ -1,7 +1,7 @@
 """The knobs that come with the library; other packages register theirs beside them."""
 
 from diff4splat.error_time import camera_knobs, flow_knobs, network_knobs, render_knobs, scene_knobs
-from diff4splat.error_time.declared import ALL_INPUTS, declared_settings
+from diff4splat.error_time.declared import ALL_INPUTS, References, declared_settings
 from diff4splat.error_time.knobs import ApproximationSetting, KnobRegistry
 
 _BUILDERS = (
@@ -27,7 +27,8 @@ def register_known_knobs(registry: KnobRegistry, inputs: tuple[int, ...] = ALL_I
     """Add every knob to ``registry``; those of the shipped networks run on ``inputs``."""
     for build in _BUILDERS:
         registry.register(build())
-    for setting in (*declared_settings(inputs), *network_knobs.network_settings(inputs)):
+    references = References(inputs=inputs)
+    for setting in (*declared_settings(references), *network_knobs.network_settings(references)):
         registry.register(setting)
 
 

@@ -36,12 +36,14 @@ def run(
     phases: Phases | None = None,
     registry: KnobRegistry | None = None,
     quick: bool = False,
+    keep: bool = False,
 ) -> ErrorTimeReport:
     """Measure the named knobs, or all, and write everything into the folder ``out``.
 
     A run that was stopped goes on after the last complete knob.
 
-    ``registry`` defaults to the known knobs; ``quick`` runs them on two of the eight inputs.
+    ``registry`` defaults to the known knobs; ``quick`` runs them on two of the eight inputs. With
+    ``keep`` the folder keeps every row for another run.
 
     Raises:
         ConfigError: an unknown knob, or ``repeats`` below 1.
@@ -66,7 +68,13 @@ def run(
         partial.add(result)
     files = list(write_tables(out, results))
     for result in results:
-        files.append(out / f"error-time-{result.knob.name}.png")
+        files.append(plot_file(out, result.knob.name))
         save_error_time_plot(result, files[-1])
-    partial.remove()
+    if not keep:
+        partial.remove()
     return ErrorTimeReport(results=tuple(results), files=tuple(files))
+
+
+def plot_file(folder: Path, knob: str) -> Path:
+    """Where the plot of a knob lies in the folder of a report."""
+    return folder / f"error-time-{knob}.png"

@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+import torch
+
 from diff4splat.error_time.knobs import ApproximationSetting
 from diff4splat.errors import ConfigError
 from diff4splat.progress.peak_memory import PeakMemory
@@ -34,6 +36,11 @@ class Measurement:
     """By other measures, under their names with units."""
     peak_bytes: int | None = None
     """Memory that the first run took at most beyond what was in use; None where unknown."""
+
+    @property
+    def name(self) -> str:
+        """Of the setting, in words."""
+        return self.label if self.setting is None else str(self.setting)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,19 +69,20 @@ def sweep(
     knob: ApproximationSetting,
     repeats: int = 3,
     advance: Callable[[], None] = lambda: None,
-    clock: Clock = time.perf_counter,
+    clock: Clock | None = None,
     known: Mapping[Hashable, Measurement] | None = None,
 ) -> SweepResult:
     """Run the reference once and every setting ``1 + repeats`` times, or as the knob says.
 
-    ``advance`` is called ``steps_of`` times. Settings in ``known`` are not run again.
+    ``advance`` is called ``steps_of`` times. Settings in ``known`` are not run again. Without a
+    ``clock`` it is ``fitting_clock``.
 
     Raises:
         ConfigError: ``repeats`` is below 1.
     """
     if repeats < 1:
         raise ConfigError(f"repeats: expected at least 1, got {repeats}")
-    repeats, known = _repeats(knob, repeats), known or {}
+    repeats, known, clock = repeats_of(knob, repeats), known or {}, clock or fitting_clock()
     missing = [setting for setting in knob.settings if setting not in known]
     firsts = dict(_first_runs(knob, missing, advance, clock)) if missing else {}
     seconds: dict[Hashable, list[float]] = {one: [] for one in missing}
@@ -89,13 +97,22 @@ def sweep(
     return SweepResult(knob=knob, repeats=repeats, rows=tuple(rows))
 
 
+def fitting_clock() -> Clock:
+    """Processor time of one thread, which other programs hardly lengthen; else time by the clock.
+
+    With several threads processor time would be the sum over them.
+    """
+    return time.process_time if torch.get_num_threads() == 1 else time.perf_counter
+
+
 def steps_of(knob: ApproximationSetting, repeats: int, known: int = 0) -> int:
     """How many runs ``sweep`` makes, with ``known`` settings left out."""
     missing = len(knob.settings) - known
-    return 1 + missing * (1 + _repeats(knob, repeats)) if missing else 0
+    return 1 + missing * (1 + repeats_of(knob, repeats)) if missing else 0
 
 
-def _repeats(knob: ApproximationSetting, repeats: int) -> int:
+def repeats_of(knob: ApproximationSetting, repeats: int) -> int:
+    """The knob's own number of timed runs, or the one that is asked for."""
     return repeats if knob.repeats is None else knob.repeats
 
 

@@ -14,7 +14,10 @@ from diff4splat.io.atomic import write_text
 from diff4splat.progress.machine import Machine, this_machine
 
 FORMAT = "diff4splat error-time 1"
-NOTE = "Seconds are of this machine and of one run; compare them only within this report."
+NOTE = (
+    "Seconds are of this machine and of one run, with one thread processor seconds; compare them "
+    "only within this report."
+)
 
 
 def to_json(results: Sequence[SweepResult], machine: Machine) -> str:
@@ -91,7 +94,7 @@ def _section(result: SweepResult) -> list[str]:
 
 
 def _table_line(row: Measurement, on_front: bool, is_default: bool, columns: Sequence[str]) -> str:
-    name = f"**{row.setting}** (default)" if is_default else str(row.setting)
+    name = f"**{row.name}** (default)" if is_default else row.name
     cells = [name, f"{row.seconds * 1e3:.3g}", _shown(row.error, ".2e")]
     cells += [_shown(value, ".3g") for value in row.more_errors.values()]
     if "MB" in columns:

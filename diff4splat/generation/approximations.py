@@ -98,13 +98,13 @@ APPROXIMATIONS = (
     Approximation(
         name="video-last-level",
         subject="video",
-        summary="ending at a level above 0, 128 steps",
+        summary="ending at a level above 0, 32 steps",
         fields=("GenerationSettings.last_level", "StepControl.last_level"),
         values=(0.1, 0.05, DEFAULTS.last_level, 0.01, 0.005),
         default=DEFAULTS.last_level,
         reference=0.002,
         apply=lambda settings, value: replace(
-            settings, sampler="unipc", steps=64, last_level=value
+            settings, sampler="unipc", steps=32, last_level=value
         ),
         label_meaning="last level",
     ),
@@ -141,7 +141,7 @@ APPROXIMATIONS = (
         fields=("MotionSettings.steps",),
         values=(1, 2, 4, 8, 16),
         default=1,
-        reference=64,
+        reference=32,
         apply=set_field("motion.steps"),
         label_meaning="steps",
     ),
@@ -155,7 +155,7 @@ APPROXIMATIONS = (
         reference=None,
         apply=lambda settings, value: replace(
             settings,
-            motion=MotionSettings(steps=64)
+            motion=MotionSettings(steps=32)
             if value is None
             else replace(settings.motion, steps=8, shift=value),
         ),
@@ -187,11 +187,34 @@ APPROXIMATIONS = (
         subject="scene",
         summary="no key times for what hardly moves",
         fields=("GenerationSettings.static_threshold_px",),
-        values=(0.0, 0.01, 0.05, 0.2, 1.0, 4.0),
+        values=(0.0, 0.05, 0.2, 1.0, 4.0),
         default=0.05,
         reference=0.0,
         apply=set_field("static_threshold_px"),
         label_meaning="pixels of the input view",
+    ),
+    Approximation(
+        name="key-times",
+        subject="scene",
+        summary="motion at few key times; the motion network has three points in time",
+        fields=("GenerationSettings.key_times",),
+        values=(2, 3, 4, 9, None),
+        default=None,
+        reference=65,
+        apply=set_field("key_times"),
+        label=lambda value: "one per frame" if value is None else str(value),
+        label_meaning="key times",
+    ),
+    Approximation(
+        name="fill-stride",
+        subject="video-scene",
+        summary="every n-th cell of the video fill, n times as wide",
+        fields=("GenerationSettings.fill_stride",),
+        values=(1, 2, 4),
+        default=1,
+        reference=1,
+        apply=set_field("fill_stride"),
+        label_meaning="cells from Gaussian to Gaussian",
     ),
     Approximation(
         name="fill-pruning",

@@ -183,7 +183,7 @@ class Diff4SplatPipeline:
             border_cells = self.model.config.refinement.border_cells
             infill = request.settings.subpixel_infill
             layered = build_layered_image(request.small, request.image, maps, border_cells, infill)
-            found = image_gaussians(layered, request.small_path.times_s)
+            found = image_gaussians(layered, request.key_times_s)
         threshold_px, camera = request.settings.static_threshold_px, request.image.camera
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
         return replace(found, motion=motion), layered.visible_count
@@ -194,7 +194,7 @@ class Diff4SplatPipeline:
             image=request.small,
             layered=build_layered_image(request.small, request.small, maps, border_cells),
             path=request.small_path,
-            key_times_s=request.small_path.times_s,
+            key_times_s=request.key_times_s,
             text=text,
             seed=request.seed,
             settings=request.settings,

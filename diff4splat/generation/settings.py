@@ -19,6 +19,7 @@ from diff4splat.models.config.model import Fill
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
+MAX_KEY_TIMES, MAX_FILL_STRIDE = 1000, 8
 LAST_LEVEL = 0.02
 """Where eight steps end that are even in log signal-to-noise ratio (docs/results/samplers.md)."""
 ADAPTIVE_STEPS = 16
@@ -91,6 +92,10 @@ class GenerationSettings:
     subpixel_infill: bool = True
     """Gaussians between the image's pixels; without them there are a quarter as many, twice as
     wide."""
+    key_times: int | None = None
+    """Times at which the scene keeps the image's motion; None is one per frame of the model."""
+    fill_stride: int = 1
+    """The video fill has a Gaussian for every n-th cell along both axes, n times as wide."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
@@ -103,6 +108,12 @@ class GenerationSettings:
         if not 0 <= self.color_matching_steps <= 100:
             raise ConfigError(
                 f"color_matching_steps: expected 0 to 100, got {self.color_matching_steps}"
+            )
+        if self.key_times is not None and not 2 <= self.key_times <= MAX_KEY_TIMES:
+            raise ConfigError(f"key_times: expected 2 to {MAX_KEY_TIMES}, got {self.key_times}")
+        if not 1 <= self.fill_stride <= MAX_FILL_STRIDE:
+            raise ConfigError(
+                f"fill_stride: expected 1 to {MAX_FILL_STRIDE}, got {self.fill_stride}"
             )
         if not 0 <= self.min_opacity <= 1:
             raise ConfigError(f"--min-opacity: expected 0 to 1, got {self.min_opacity:g}")

@@ -37,6 +37,8 @@ class ExportSettings:
     shapes_only: bool = False
     """Without weights, from the meta device: for sizes that this machine cannot hold."""
     parity: bool = True
+    parts: tuple[str, ...] | None = None
+    """Networks to export; None is all."""
     triton: bool = False
 
 
@@ -55,8 +57,12 @@ def export_model(
     if settings.shapes_only:
         networks = create_networks(model.config, "meta")
     else:
-        networks = with_parts(model, model.parts).networks
-    sources = graph_sources(networks, model.config)
+        networks = with_parts(model, settings.parts or model.parts).networks
+    sources = [
+        source
+        for source in graph_sources(networks, model.config)
+        if settings.parts is None or source.part in settings.parts
+    ]
     owned = [MANIFEST_FILE, CONFIG_FILE, PROVENANCE_FILE, PARITY_FILE]
     owned += [f"{source.name}.onnx{suffix}" for source in sources for suffix in ("", ".data")]
     with atomic_folder(folder, owned) as staging:

@@ -23,6 +23,7 @@ LAYERS = [  # lower may never import higher; the same row may not import each ot
     {"fitting", "evaluation"},
     {"error_time"},
     {"configs", "serving", "stability"},
+    {"reports"},
     {"cli"},
 ]
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row}

@@ -131,11 +131,11 @@ class Calibrate:
 
 
 def warm_up(photo: Path, record: "CalibrationRecord") -> None:
-    """Draw the capture, and run each command once in short: kernels compile, files are cached."""
+    """Draw the captures, and run each command once in short: kernels compile, files are cached."""
     from diff4splat.cli.calibration import calibration_runs as runs
     from diff4splat.cli.calibration.measured_process import measure_process
 
-    capture, folder = record.folder / "capture", record.folder
-    for run in (runs.draw_capture(folder), *runs.warm_up_runs(photo, folder)):
-        if run[0] != "prepare" or not capture.exists():
+    folder = record.folder
+    for run in (*runs.draw_captures(folder), *runs.warm_up_runs(photo, folder)):
+        if run[0] != "prepare" or not Path(run[-1]).exists():
             record.once(f"warm up {run[0]} {run[-1]}", lambda run=run: measure_process(run).seconds)

@@ -12,7 +12,11 @@ WORLDS = ((11, 0), (19, 5))
 """(seed, index) of worlds of the test split, which no model was trained on."""
 SIDE_PX, TIMES, TRACKS = 256, 5, 8
 PROMPT = "a rounded block slides to the left"
-CAPTURE = ("--rig", "--size", "64", "--frames", "9", "--views", "5", "--clips", "1")
+CAPTURES = {
+    "capture": ("--rig", "--size", "64", "--frames", "9", "--views", "5", "--clips", "1"),
+    "large-capture": ("--rig", "--size", "128", "--frames", "3", "--views", "5", "--clips", "1"),
+}
+"""Folder to options: clips that fits learn from. Two sizes, as pixels have a rate of their own."""
 WIDE_GAUSSIANS = 20_000
 
 

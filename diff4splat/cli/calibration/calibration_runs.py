@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from diff4splat.cli.calibration.calibration_inputs import CAPTURE, PROMPT
+from diff4splat.cli.calibration.calibration_inputs import CAPTURES, PROMPT
 from diff4splat.cli.calibration.calibration_record import CalibrationRecord
 from diff4splat.cli.calibration.measured_process import measure_process
 from diff4splat.cli.limits.command_work import command_work
@@ -33,14 +33,18 @@ GENERATE = (
 STATIC, PROMPTED, LARGE = 3, 4, 6
 """Places among ``GENERATE`` of scenes that other runs read."""
 FITS = (
-    ("hexplane", "1500", "100", "100", ()),
-    ("hexplane", "6000", "100", "200", ("--set", "stillness.min_score=0")),
-    ("spacetime", "1500", "50", "60", ()),
-    ("spacetime", "6000", "100", "200", ("--set", "stillness.min_score=0")),
-    ("static", "1500", "50", "50", ()),
-    ("static", "12000", "50", "150", ()),
+    ("capture", "hexplane", "1500", "100", "100", ()),
+    ("capture", "hexplane", "6000", "100", "200", ("--set", "stillness.min_score=0")),
+    ("capture", "spacetime", "1500", "50", "60", ()),
+    ("capture", "spacetime", "6000", "100", "200", ("--set", "stillness.min_score=0")),
+    ("capture", "static", "1500", "50", "50", ()),
+    ("capture", "static", "12000", "50", "150", ()),
+    ("capture", "hexplane", "1500", "50", "300", ()),
+    ("capture", "spacetime", "1500", "50", "250", ()),
+    ("large-capture", "static", "1500", "50", "100", ()),
 )
-"""(motion, budget, coarse steps, fine steps, options); without a smallest score all may move."""
+"""(capture, motion, budget, coarse steps, fine steps, options); without a smallest score all may
+move. Of each motion three: steps, Gaussians and moving ones have rates of their own."""
 FIELD, NATIVE = 1, 3
 ONNX = (("--shapes-only",), ())
 SCENE_COMMANDS = frozenset({"render", "bake", "export html"})
@@ -99,14 +103,14 @@ def scene_file(folder: Path, kind: str, number: int) -> Path:
 
 
 def fit_runs(folder: Path) -> list[Run]:
-    """Short fits with each motion; the capture is drawn first."""
+    """Short fits with each motion; captures are drawn first."""
     return [
         [
-            *("fit", str(folder / "capture"), "--motion", motion, "--budget", budget),
+            *("fit", str(folder / capture), "--motion", motion, "--budget", budget),
             *("--steps", fine, "--set", f"coarse_steps={coarse}", *rest),
             *("--out", str(folder / f"fit-{n}")),
         ]
-        for n, (motion, budget, coarse, fine, rest) in enumerate(FITS)
+        for n, (capture, motion, budget, coarse, fine, rest) in enumerate(FITS)
     ]
 
 
@@ -119,11 +123,11 @@ def onnx_runs(folder: Path) -> list[Run]:
 
 
 def train_runs(folder: Path) -> list[Run]:
-    """A few steps of stages of the small recipe."""
+    """A few steps of stages of the small recipe, one after another in a folder."""
     return [
         [
             *("train", "--config", recipe, "--stage", stage, "--steps", steps),
-            *("--ignore-gates", "--out", str(folder / f"train-{recipe}-{stage}-{steps}")),
+            *("--ignore-gates", "--out", str(folder / f"train-{recipe}-{steps}")),
         ]
         for recipe, stage in TRAIN_STAGES
         for steps in TRAIN_STEPS
@@ -140,9 +144,12 @@ def warm_up_runs(photo: Path, folder: Path) -> list[Run]:
     ]
 
 
-def draw_capture(folder: Path) -> Run:
-    """The command that draws the clip which fits learn from."""
-    return ["prepare", "synth", *CAPTURE, "--out", str(folder / "capture")]
+def draw_captures(folder: Path) -> list[Run]:
+    """The commands that draw the clips which fits learn from."""
+    return [
+        ["prepare", "synth", *options, "--out", str(folder / name)]
+        for name, options in CAPTURES.items()
+    ]
 
 
 def measure_costs(

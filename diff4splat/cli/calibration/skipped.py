@@ -10,7 +10,9 @@ from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from diff4splat.evaluation.skipped.measurement import Item
+    from diff4splat.evaluation.skipped.measurement import Item, Measured
+    from diff4splat.evaluation.skipped.skipped_report import SkippedReport
+    from diff4splat.progress.phases import Phases
 
 WORLDS = ((7, 3), (11, 0), (19, 5), (23, 8), (29, 2), (31, 4), (37, 6), (41, 1))
 """(seed, index); the first ones make up the number where photographs are named."""
@@ -41,20 +43,31 @@ class Skipped:
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.cli.common.installation import single_gaussian
         from diff4splat.cli.common.precompile import precompile_renderer
-        from diff4splat.evaluation.skipped.measurement import Bench
-        from diff4splat.evaluation.skipped.partial_rows import PartialRows
-        from diff4splat.evaluation.skipped.skipped_report import to_markdown, write_skipped
+        from diff4splat.evaluation.skipped.skipped_report import to_markdown
         from diff4splat.io.figures.plots import require_matplotlib
 
         require_matplotlib()
-        phases, rows = ConsolePhases(), []
+        phases = ConsolePhases()
+        precompile_renderer(single_gaussian("cpu"), phases)
+        written = self.measured(phases)
+        written.partial.remove()
+        print(to_markdown(written.rows))
+        note(f"wrote {', '.join(file.name for file in written.files)} to {self.out}")
+
+    def measured(self, phases: "Phases") -> "SkippedReport":
+        """Rows of all inputs, and the files that hold them; rows are kept for a second call."""
+        from diff4splat.cli.common.console import note
+        from diff4splat.evaluation.skipped.measurement import Bench
+        from diff4splat.evaluation.skipped.partial_rows import PartialRows
+        from diff4splat.evaluation.skipped.skipped_report import SkippedReport, write_skipped
+
+        rows: list[Measured] = []
         partial = PartialRows(self.out, {"resolution": self.resolution})
         if partial.rows:
             note(f"going on from an interrupted report: {len(partial.rows)} inputs are measured")
-        precompile_renderer(single_gaussian("cpu"), phases)
         with TemporaryDirectory(prefix="diff4splat-skipped-") as folder:
             inputs = self.inputs(Path(folder))
-            with phases.phase("measure", len(inputs)) as advance:
+            with phases.phase("what runs skip", len(inputs)) as advance:
                 for name, items in inputs.items():
                     bench = Bench(name)
                     measure = lambda bench=bench, items=items: [  # noqa: E731
@@ -62,10 +75,7 @@ class Skipped:
                     ]
                     rows += partial.once(name, measure)
                     advance()
-        files = write_skipped(rows, self.out)
-        partial.remove()
-        print(to_markdown(rows))
-        note(f"wrote {', '.join(file.name for file in files)} to {self.out}")
+        return SkippedReport(rows=rows, files=write_skipped(rows, self.out), partial=partial)
 
     def inputs(self, folder: Path) -> "dict[str, Callable[[], Iterator[Item]]]":
         """Functions that give the items of every input, by its name."""

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import tyro
 
+from diff4splat.cli.calibration.all_reports import AllReports
 from diff4splat.cli.calibration.calibrate import Calibrate
 from diff4splat.cli.calibration.skipped import Skipped
 from diff4splat.cli.datasets.prepare_curation import (
@@ -56,7 +57,8 @@ Prepare = (
 )
 Export = Annotated[ExportHtml, subcommand("html")] | Annotated[ExportOnnx, subcommand("onnx")]
 Report = (
-    Annotated[ErrorTime, subcommand("error-time")]
+    Annotated[AllReports, subcommand("all")]
+    | Annotated[ErrorTime, subcommand("error-time")]
     | Annotated[ListKnobs, subcommand("knobs")]
     | Annotated[Stability, subcommand("stability")]
     | Annotated[Calibrate, subcommand("calibrate")]

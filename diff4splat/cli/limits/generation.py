@@ -1,6 +1,6 @@
 """Work and settings of ``diff4splat generate``, counted from its options and the photo's header."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -93,13 +93,13 @@ def promise(command: "Generate") -> tuple["Generate", Promise]:
     if not limits.given:
         return command, plain
     frames, full_px = frame_count(command), image_side(command)[0]
-    detail = photo_detail(command)
+    unit = photo_unit(command, full_px)
     choice = costing.choose(
         NAME,
         lambda values: _setting_work(command, values, full_px, frames),
         lambda values: agrees(values, fixed(command)) and _keeps_shape(command, values, full_px),
         limits,
-        lambda row: row.error * detail,
+        lambda row: row.error * unit(row.values),
     )
     return with_setting(command, choice.values, full_px), plain.with_choice(choice)
 
@@ -144,11 +144,22 @@ def _keeps_shape(command: "Generate", values: SettingValues, full_px: int) -> bo
     return full[0] * small[1] == full[1] * small[0]
 
 
-def photo_detail(command: "Generate") -> float:
-    """Mean square of what the photo loses at half of its size."""
-    from diff4splat.generation.inputs.image_detail import image_detail
+def photo_unit(command: "Generate", full_px: int) -> "Callable[[SettingValues], float]":
+    """What the error of a setting is a share of, for this photo."""
+    rgb = command.read_image().rgb
 
-    return image_detail(command.read_image().rgb)
+    def unit(values: SettingValues) -> float:
+        small = with_setting(command, values, full_px)
+        return error_unit(rgb, _size(small, *image_side(small)))
+
+    return unit
+
+
+def error_unit(rgb: "Tensor", size_px: tuple[int, int]) -> float:
+    """Mean square of what an image ``h w 3`` loses at (height, width), or at half of its own."""
+    from diff4splat.generation.inputs.image_detail import image_detail, lost_at
+
+    return image_detail(rgb) if size_px[0] >= rgb.shape[0] else lost_at(rgb, size_px)
 
 
 def _setting_work(

@@ -8,6 +8,7 @@ from functools import partial
 import torch
 from torch import Tensor, nn
 
+from diff4splat.error_time.network_knobs import FILL_PARTS
 from diff4splat.error_time.subjects import scenes
 from diff4splat.error_time.subjects.inputs import Inputs
 from diff4splat.error_time.subjects.model import request, shipped_model
@@ -18,8 +19,6 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.onnx_export.precision import LEAST_ELEMENTS, quantized
 from diff4splat.progress.run_log import RunLog
 
-FILL_PARTS = ("dit", "vae", "ldrm")
-"""Networks that run only where the video model fills."""
 MULTIPLYING = (nn.Linear, nn.Conv2d, nn.Conv3d)
 
 

@@ -26,6 +26,8 @@ Scenes = list[Scene]
 
 SHARES = (0.0, 0.3, 0.8)
 """Along the path and in time."""
+KEPT = 32
+"""Scenes whose views are kept: those of a reference and of the setting that is compared."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +37,9 @@ class Views:
     rgb: Tensor
     depth: Tensor
     flow_px: Tensor
+
+
+_seen: dict[int, tuple[Scene, Views]] = {}
 
 
 def run(settings: GenerationSettings, inputs: Inputs) -> Scenes:
@@ -69,9 +74,22 @@ def more_errors(scenes: Scenes, reference: Scenes) -> dict[str, float]:
     }
 
 
-@torch.no_grad()
 def views(scene: Scene) -> Views:
-    """Colour, depth and flow of a scene along its path."""
+    """Colour, depth and flow of a scene along its path.
+
+    Those of the last scenes are kept: every setting is compared with the same reference, twice.
+    """
+    known = _seen.pop(id(scene), None)
+    if known is None or known[0] is not scene:
+        known = (scene, _rendered(scene))
+    _seen[id(scene)] = known
+    while len(_seen) > KEPT:
+        del _seen[next(iter(_seen))]
+    return known[1]
+
+
+@torch.no_grad()
+def _rendered(scene: Scene) -> Views:
     count, times = len(scene.path), scene.path.times_s
     settings = RenderSettings(flow_time_s=float(times[-1]))
     outputs = []

@@ -26,6 +26,7 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.render_condition import encode_condition, render_layered_image
 from diff4splat.generation.video.video_sampling import Conditions, initial_noise, video_velocity
 from diff4splat.geometry.rays import plucker_map, relative_to_first
+from diff4splat.models.protocols import VideoVelocity
 from diff4splat.models.video_dit.conditions import RenderCondition
 
 Latents = Float[Tensor, "b c t h w"]
@@ -43,14 +44,18 @@ def run(settings: GenerationSettings, inputs: Inputs) -> Latents:
     return sampled(every, settings)
 
 
-def sampled(every: Sequence[tuple[Conditions, int]], settings: GenerationSettings) -> Latents:
-    """Latents of conditions and seeds, as one batch."""
-    velocity, noise = batch(every, settings.guidance)
+def sampled(
+    every: Sequence[tuple[Conditions, int]],
+    settings: GenerationSettings,
+    dit: VideoVelocity | None = None,
+) -> Latents:
+    """Latents of conditions and seeds, as one batch; by the shipped network, or by ``dit``."""
+    velocity, noise = batch(every, settings.guidance, dit)
     return solve(settings.sampler, velocity, noise, settings.solver_path)
 
 
 def batch(
-    every: Sequence[tuple[Conditions, int]], guidance: Guidance
+    every: Sequence[tuple[Conditions, int]], guidance: Guidance, dit: VideoVelocity | None = None
 ) -> tuple[VelocityFn, Latents]:
     """Velocity and noise of conditions and seeds; prompts are padded, and masked there."""
     parts = [one for one, _ in every]
@@ -68,7 +73,8 @@ def batch(
         render=render,
     )
     noise = torch.cat([initial_noise(one, seed) for one, seed in every])
-    return video_velocity(shipped_model().networks.dit, joined, guidance, CallCount()), noise
+    dit = dit or shipped_model().networks.dit
+    return video_velocity(dit, joined, guidance, CallCount()), noise
 
 
 def error(latents: Latents, reference: Latents) -> float:

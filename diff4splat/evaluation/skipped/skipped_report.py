@@ -3,15 +3,30 @@
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from diff4splat.evaluation.skipped.measurement import Measured
+from diff4splat.evaluation.skipped.partial_rows import PartialRows
 from diff4splat.io.atomic import write_text
 from diff4splat.io.figures.plots import new_figure, save_figure
 
 FORMAT = "diff4splat skipped 1"
 COLORS = ("#0072B2", "#E69F00")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkippedReport:
+    """What was measured, and the files that hold it."""
+
+    rows: Sequence[Measured]
+    files: tuple[Path, ...]
+    partial: PartialRows
+
+    @property
+    def plot(self) -> Path:
+        """The picture."""
+        return self.files[-1]
 
 
 def by_item(rows: Sequence[Measured]) -> dict[str, list[Measured]]:

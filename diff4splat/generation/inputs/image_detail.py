@@ -1,5 +1,7 @@
 """How much of an image is detail, that a smaller or softer copy loses."""
 
+from collections.abc import Sequence
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -9,14 +11,18 @@ LEAST = 1e-7
 
 
 def image_detail(rgb: Float[Tensor, "h w 3"]) -> float:
-    """Mean square difference to the image at half of its size, enlarged again."""
+    """Mean square of what the image loses at half of its size."""
+    return lost_at(rgb, (max(rgb.shape[0] // 2, 1), max(rgb.shape[1] // 2, 1)))
+
+
+def lost_at(rgb: Float[Tensor, "h w 3"], size_px: tuple[int, int]) -> float:
+    """Mean square difference to the image at (height, width), enlarged again."""
     image = rgb.movedim(-1, 0)[None].float()
-    half = [max(side // 2, 1) for side in image.shape[2:]]
-    error = (resized(resized(image, half), image.shape[2:]) - image).square().mean()
+    error = (resized(resized(image, size_px), image.shape[2:]) - image).square().mean()
     return max(float(error), LEAST)
 
 
-def resized(image: Float[Tensor, "b c h w"], size: list[int] | torch.Size) -> Tensor:
+def resized(image: Float[Tensor, "b c h w"], size: Sequence[int]) -> Tensor:
     """Bicubic, averaging where it shrinks; colours stay in [0, 1]."""
     scaled = torch.nn.functional.interpolate(
         image, tuple(size), mode="bicubic", align_corners=False, antialias=True

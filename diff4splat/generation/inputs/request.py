@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.captions.known_words import why_static
 from diff4splat.generation.given_depth.source import DepthSource
@@ -60,6 +62,14 @@ class Request:
     settings: GenerationSettings
     plan: GenerationPlan
     depth: DepthSource | None = None
+
+    @property
+    def key_times_s(self) -> Float[Tensor, " k"]:
+        """Times at which the scene keeps the image's motion, evenly spread."""
+        times_s, count = self.small_path.times_s, self.settings.key_times
+        if count is None:
+            return times_s
+        return torch.linspace(float(times_s[0]), float(times_s[-1]), count).to(times_s)
 
 
 def prepare_request(model: Model, user: UserInput, device: torch.device) -> Request:

@@ -83,6 +83,13 @@ def depth_ratio(depth: Float[Tensor, "f h w"], rendered: RenderedImage) -> Float
     return torch.stack(ratios)[:, None, None]
 
 
+def every_nth(cells: Bool[Tensor, "f h w"], stride: int) -> Bool[Tensor, "f h w"]:
+    """The cells of every ``stride``-th row and column."""
+    chosen = torch.zeros_like(cells)
+    chosen[:, ::stride, ::stride] = True
+    return cells & chosen
+
+
 def at_grid(rendered: RenderedImage, frames: Int[Tensor, " f"], stride: int) -> RenderedImage:
     """The render at LDRM's frames and cells."""
     cells = (frames, slice(None, None, stride), slice(None, None, stride))

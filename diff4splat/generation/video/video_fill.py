@@ -28,7 +28,13 @@ from diff4splat.generation.video.canonical_scene import (
 )
 from diff4splat.generation.video.deformation_motion import deform
 from diff4splat.generation.video.fill_path import fill_path
-from diff4splat.generation.video.hidden_cells import FillGrid, at_grid, full_grid, hidden_grid
+from diff4splat.generation.video.hidden_cells import (
+    FillGrid,
+    at_grid,
+    every_nth,
+    full_grid,
+    hidden_grid,
+)
 from diff4splat.generation.video.image_condition import image_condition
 from diff4splat.generation.video.render_condition import (
     RenderedImage,
@@ -115,10 +121,10 @@ def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill | 
         moving = model.networks.deformation is not None
         raw = raw_video_maps(model, video.latent, moving=moving, log=log)
         grid = _grid(model, request, video, raw)
-        config = model.config.activation
-        if request.hidden_only:
-            config = replace(config, footprint_px=FOOTPRINT_CELLS)
-        canonical = reconstruct(raw.maps, grid.base, config, grid.filled)
+        config, stride = model.config.activation, request.settings.fill_stride
+        footprint = FOOTPRINT_CELLS if request.hidden_only else config.footprint_px
+        config = replace(config, footprint_px=stride * footprint)
+        canonical = reconstruct(raw.maps, grid.base, config, every_nth(grid.filled, stride))
         least = request.settings.min_opacity
         # Where the image is shown, its own Gaussians are left in any case.
         canonical = prune_cells(canonical, least, log, may_be_empty=request.hidden_only)

@@ -31,19 +31,37 @@ MEANINGS = {
 
 def stability_page(records: Sequence[Record], machine: Machine) -> str:
     """The page as text; everything that comes from records is escaped."""
-    by_group = [
+    seconds = sum(record.seconds for record in records)
+    parts = {
+        "STYLE": stability_style(),
+        "MACHINE": safe_text(f"{machine}. {len(records)} checks in {seconds:.0f} s."),
+        "TILES": _tiles(records),
+        "OVERVIEW": stability_overview(records),
+        "SECTIONS": stability_sections(records),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda part: parts[part[1]], _asset("page.html"))
+
+
+def stability_style() -> str:
+    """Style sheet of the page and of its parts."""
+    return _asset("style.css")
+
+
+def stability_overview(records: Sequence[Record]) -> str:
+    """One square per check, one row per group."""
+    return _overview(_by_group(records))
+
+
+def stability_sections(records: Sequence[Record]) -> str:
+    """One section per group: plots and a table."""
+    return "\n".join(_section(group, members) for group, members in _by_group(records))
+
+
+def _by_group(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
+    return [
         (group, list(members))
         for group, members in itertools.groupby(records, key=lambda record: record.check.group)
     ]
-    seconds = sum(record.seconds for record in records)
-    parts = {
-        "STYLE": _asset("style.css"),
-        "MACHINE": safe_text(f"{machine}. {len(records)} checks in {seconds:.0f} s."),
-        "TILES": _tiles(records),
-        "OVERVIEW": _overview(by_group),
-        "SECTIONS": "\n".join(_section(group, members) for group, members in by_group),
-    }
-    return re.sub(r"\{\{(\w+)\}\}", lambda part: parts[part[1]], _asset("page.html"))
 
 
 def _tiles(records: Sequence[Record]) -> str:

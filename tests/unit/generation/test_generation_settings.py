@@ -37,6 +37,10 @@ def test_the_schedule_follows_the_number_of_steps_unless_named() -> None:
         {"color_matching_steps": 101},
         {"shift": 0.0},
         {"sampler": "magic"},
+        {"key_times": 1},
+        {"key_times": 1001},
+        {"fill_stride": 0},
+        {"fill_stride": 9},
     ],
 )
 def test_numbers_out_of_range_are_refused(wrong: dict) -> None:

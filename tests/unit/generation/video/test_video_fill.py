@@ -133,3 +133,15 @@ def test_seeds_and_text_decide(tiny: Model) -> None:
     assert "no prompt" not in {omission.why for omission in log.skipped}
     left, right = (each.gaussians.gaussians.sh for each in (plain, prompted))
     assert left.shape != right.shape or not torch.equal(left, right)
+
+
+def test_a_stride_fills_fewer_and_wider_cells(tiny: Model) -> None:
+    fine, _ = filled(tiny, hidden_only=False, min_opacity=0.0)
+    coarse, _ = filled(tiny, hidden_only=False, min_opacity=0.0, fill_stride=2)
+    rows = fine.cell_index // SIDE_PX % SIDE_PX
+    chosen = (rows % 2 == 0) & (fine.cell_index % SIDE_PX % 2 == 0)
+    assert torch.equal(coarse.cell_index, fine.cell_index[chosen])
+    torch.testing.assert_close(
+        coarse.gaussians.gaussians.scales, 2 * fine.gaussians.gaussians.scales[chosen]
+    )
+    assert torch.equal(coarse.grid.filled, fine.grid.filled), "guesses are hidden as before"
