@@ -14,7 +14,11 @@ from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
+    from diff4splat.evaluation.systems.variants import Variant
     from diff4splat.generation.settings import GenerationSettings
+
+Without = tuple[Literal["depth", "motion", "text", "video", "ldrm", "deformation", "all"], ...]
+"""Networks of ablations."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +47,9 @@ class Evaluate:
     """Where networks of generation run: cpu, cuda, or auto, which is cuda where there is one."""
     dtype: Literal["float32", "bfloat16", "float16"] = "float32"
     """What they compute in."""
+    without: Without = ()
+    """Also measure the same scenes without a network, in a row each: depth, motion, text, video,
+    ldrm (with the VAE), deformation; `all` is all of them."""
     fresh: bool = False
     """Ignore the results of an earlier run in the same folder."""
 
@@ -54,6 +61,11 @@ class Evaluate:
             raise ConfigError(
                 "--device, --dtype: expected without --task reconstruction, which runs on the CPU "
                 "in float32; leave them out"
+            )
+        if self.task == "reconstruction" and self.without:
+            raise ConfigError(
+                "--without: expected without --task reconstruction, which has no networks to "
+                "choose from; leave it out"
             )
         load_protocol(self.protocol)
 
@@ -84,6 +96,7 @@ class Evaluate:
             system=system,
             features=features,
             captioner=grammar_caption,
+            variants=self.variants(system),
         )
         precompile_renderer(single_gaussian("cpu"), phases)
         precompile_sources([protocol.source], phases)
@@ -121,6 +134,14 @@ class Evaluate:
             reconstruct=partial(reconstruct_clip, model),
             identity=model_identity(model, RECONSTRUCTION_PARTS, "reconstruction"),
         )
+
+    def variants(self, system: "EvaluatedSystem") -> "tuple[Variant, ...]":
+        """The same system without the networks that ``--without`` names."""
+        from diff4splat.evaluation.systems.variants import NETWORKS, ablations
+
+        if not self.without:
+            return ()
+        return ablations(system, NETWORKS if "all" in self.without else self.without)
 
     def settings(self) -> "GenerationSettings":
         """Steps and filling as requested, the defaults elsewhere."""

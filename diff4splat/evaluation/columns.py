@@ -5,6 +5,7 @@ from typing import Literal
 
 from diff4splat.evaluation.protocols.protocol import Task
 
+Table = Literal["images", "hidden"]
 SYSTEM = "system"
 """Row of the system in stored results."""
 PSNR_CAP_DB = 100.0
@@ -21,11 +22,47 @@ class Column:
     """``neither`` if the value depends on the clips alone."""
     meaning: str
     tasks: tuple[Task, ...] = ("generation", "reconstruction")
+    table: Table = "images"
+    """Part of the report that shows it."""
 
     @property
     def sign(self) -> int:
         """Factor that makes differences above 0 mean better; 0 for ``neither``."""
         return {"higher": 1, "lower": -1, "neither": 0}[self.better]
+
+
+HIDDEN_REGIONS = {
+    "hidden": "pixels with a true depth whose surface the input does not show",
+    "disoccluded": "hidden pixels that were behind what is static: the camera uncovers them",
+    "uncovered": "hidden pixels that were behind what moves",
+    "outside": "hidden pixels that were out of the frame",
+}
+"""What the input hides, and the three classes of it."""
+
+
+def _hidden_columns(region: str, what: str) -> tuple[Column, ...]:
+    share = Column(
+        key=f"{region}_share",
+        title=region,
+        better="neither",
+        table="hidden",
+        meaning=f"share of {what}; depends on the clips alone",
+    )
+    error = Column(
+        key=f"{region}_psnr",
+        title=f"PSNR {region} [dB]",
+        better="higher",
+        table="hidden",
+        meaning="PSNR over these pixels",
+    )
+    distance = Column(
+        key=f"{region}_perceptual",
+        title=f"perceptual {region}",
+        better="lower",
+        table="hidden",
+        meaning="perceptual distance where only these pixels differ from the true image",
+    )
+    return share, error, distance
 
 
 COLUMNS = (
@@ -46,18 +83,6 @@ COLUMNS = (
         title="seen",
         better="neither",
         meaning="fraction of such pixels in the target images; depends on the clips alone",
-    ),
-    Column(
-        key="hidden_psnr",
-        title="PSNR hidden [dB]",
-        better="higher",
-        meaning="PSNR over the other pixels that have a true depth: what the input hides",
-    ),
-    Column(
-        key="hidden_perceptual",
-        title="perceptual hidden",
-        better="lower",
-        meaning="perceptual distance where only the hidden pixels differ from the true image",
     ),
     Column(
         key="ssim",
@@ -126,6 +151,7 @@ COLUMNS = (
         better="lower",
         meaning="fraction of steps whose estimation failed",
     ),
+    *(column for item in HIDDEN_REGIONS.items() for column in _hidden_columns(*item)),
     Column(
         key="text_right",
         title="direction right",

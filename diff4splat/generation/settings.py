@@ -16,6 +16,7 @@ from diff4splat.flow.levels import (
 from diff4splat.flow.solve import ADAPTIVE, FITTED, SolverPath, require_solver
 from diff4splat.generation.fitted_steps import find_steps
 from diff4splat.models.config.model import Fill
+from diff4splat.models.networks import PARTS
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
@@ -91,6 +92,10 @@ class GenerationSettings:
     subpixel_infill: bool = True
     """Gaussians between the image's pixels; without them there are a quarter as many, twice as
     wide."""
+    extended_layers: bool = True
+    """False shows the image's own layers alone, and nothing where it hides what is there."""
+    without: tuple[str, ...] = ()
+    """Networks that stay out although the request needs them: ablations."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
@@ -103,6 +108,11 @@ class GenerationSettings:
         if not 0 <= self.color_matching_steps <= 100:
             raise ConfigError(
                 f"color_matching_steps: expected 0 to 100, got {self.color_matching_steps}"
+            )
+        unknown = sorted(set(self.without) - set(PARTS))
+        if unknown:
+            raise ConfigError(
+                f"without: expected names of networks ({', '.join(PARTS)}), got {unknown[0]!r}"
             )
         if not 0 <= self.min_opacity <= 1:
             raise ConfigError(f"--min-opacity: expected 0 to 1, got {self.min_opacity:g}")

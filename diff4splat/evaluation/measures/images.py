@@ -5,12 +5,9 @@ without true depth has no depth error: means skip and count both.
 """
 
 import torch
-from jaxtyping import Bool, Float
-from torch import Tensor
 
 from diff4splat.evaluation.columns import PSNR_CAP_DB
-from diff4splat.evaluation.measures.covisibility import hidden_masks
-from diff4splat.evaluation.measures.regions import ComparedImages, region_entries
+from diff4splat.evaluation.measures.regions import ComparedImages, TrueRegions, region_entries
 from diff4splat.evaluation.protocols.sample import EvalSample
 from diff4splat.evaluation.records import Score, Skip, score
 from diff4splat.evaluation.systems.predictions import Prediction, RenderedView
@@ -28,13 +25,10 @@ def image_entries(
     row: str,
     sample: EvalSample,
     prediction: Prediction,
-    covisible: Bool[Tensor, "p h w"] | None,
+    regions: TrueRegions | None,
     features: PerceptualFeatures | None,
 ) -> Entries:
-    """Colour and depth metrics of one prediction; empty if it has no images.
-
-    ``covisible`` marks the pixels that are visible in the input; None without true depth.
-    """
+    """Colour and depth metrics of one prediction; empty if it has no images."""
     views = _rendered_views(sample, prediction)
     if not views:
         return []
@@ -42,7 +36,7 @@ def image_entries(
     truth = torch.stack([sample.true_rgb(pair) for pair in sample.targets.pairs])
     entries = [
         score(row, "psnr", psnr(rgb, truth).clamp_max(PSNR_CAP_DB).tolist()),
-        *region_entries(row, _compared(sample, rgb, truth, covisible), features),
+        *region_entries(row, ComparedImages(rgb=rgb, truth=truth, regions=regions), features),
         score(row, "ssim", ssim(rgb, truth).tolist()),
     ]
     if features is not None:
@@ -50,16 +44,6 @@ def image_entries(
             distances = perceptual_distance(rgb, truth, features)
         entries.append(score(row, "perceptual", distances.tolist()))
     return entries + _depth_entries(row, sample, views)
-
-
-def _compared(
-    sample: EvalSample,
-    rgb: Float[Tensor, "p h w 3"],
-    truth: Float[Tensor, "p h w 3"],
-    covisible: Bool[Tensor, "p h w"] | None,
-) -> ComparedImages:
-    hidden = None if covisible is None else hidden_masks(sample, covisible)
-    return ComparedImages(rgb=rgb, truth=truth, covisible=covisible, hidden=hidden)
 
 
 def _rendered_views(sample: EvalSample, prediction: Prediction) -> list[RenderedView]:

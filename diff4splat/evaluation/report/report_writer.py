@@ -10,13 +10,13 @@ from dataclasses import asdict
 from diff4splat import __version__
 from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, columns_of
 from diff4splat.evaluation.records import ItemResult
-from diff4splat.evaluation.report.summary import Mean, Summary
+from diff4splat.evaluation.report.cells import line, mean_text, number, system_name, title
+from diff4splat.evaluation.report.comparison_tables import ablation_section, hidden_section
+from diff4splat.evaluation.report.summary import Summary, row_names
 from diff4splat.evaluation.runner import Outcome
-from diff4splat.evaluation.systems.baselines import BASELINES
 from diff4splat.progress.machine import this_machine
 
 FORMAT = "diff4splat-evaluation-results 1"
-DIRECTION_ARROWS = {"higher": "↑", "lower": "↓", "neither": ""}
 
 
 def to_json(outcome: Outcome, summary: Summary) -> str:
@@ -35,6 +35,7 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
         "columns": [asdict(column) for column in columns_of(setup.task)],
         "table": [asdict(cell) for cell in summary.cells],
         "differences": [asdict(difference) for difference in summary.differences],
+        "comparisons": [asdict(comparison) for comparison in summary.comparisons],
         "skipped": [asdict(skipped) for skipped in summary.skipped],
         "failures": [asdict(failure) for failure in outcome.failures],
         "items": [item.to_json() for item in outcome.items],
@@ -45,10 +46,13 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
 def to_markdown(outcome: Outcome, summary: Summary) -> str:
     """Table, protocol, differences, and the best and worst items as Markdown."""
     columns = _filled(outcome, summary)
+    images = [column for column in columns if column.table == "images"]
     parts = [
         _head(outcome),
-        _table(outcome, summary, columns),
-        _differences(summary, columns),
+        _table(outcome, summary, images),
+        _differences(summary, images),
+        hidden_section(outcome, summary),
+        ablation_section(outcome, summary),
         _meanings(outcome, columns),
         _items(outcome, summary),
         _skipped(outcome, summary),
@@ -60,13 +64,6 @@ def _filled(outcome: Outcome, summary: Summary) -> list[Column]:
     """Columns with at least one value."""
     keys = {cell.key for cell in summary.cells}
     return [column for column in columns_of(outcome.setup.task) if column.key in keys]
-
-
-def system_name(outcome: Outcome) -> str:
-    """Name of the system, marked if it is untrained."""
-    identity = outcome.setup.system.identity
-    marks = ["untrained"] if identity.untrained else []
-    return f"{identity.name} ({', '.join(marks)})" if marks else identity.name
 
 
 def _head(outcome: Outcome) -> list[str]:
@@ -91,18 +88,18 @@ def _head(outcome: Outcome) -> list[str]:
 
 def _table(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
     percent = f"{outcome.setup.protocol.bootstrap.coverage:.0%}"
-    titles = [f"{c.title} {DIRECTION_ARROWS[c.better]}".rstrip() for c in columns]
+    titles = [title(column) for column in columns]
     lines = [
         f"Means over items with {percent} bootstrap intervals.",
         "",
-        _line(["", *titles]),
-        _line(["---", *["---:"] * len(columns)]),
+        line(["", *titles]),
+        line(["---", *["---:"] * len(columns)]),
     ]
-    for row in (SYSTEM, *BASELINES):
+    for row in row_names(outcome):
         means = [summary.cell(row, column.key) for column in columns]
         if any(mean is not None for mean in means):
             name = f"**{system_name(outcome)}**" if row == SYSTEM else row
-            lines.append(_line([name, *(_mean(mean) for mean in means)]))
+            lines.append(line([name, *(mean_text(mean) for mean in means)]))
     return lines
 
 
@@ -113,12 +110,12 @@ def _differences(summary: Summary, columns: Sequence[Column]) -> list[str]:
     lines = [
         "Item by item against the best baseline of each measure; above 0 the system is better.",
         "",
-        _line(["measure", "best baseline", "difference", "items"]),
-        _line(["---", "---", "---:", "---:"]),
+        line(["measure", "best baseline", "difference", "items"]),
+        line(["---", "---", "---:", "---:"]),
     ]
     for column, row in rows:
-        cells = [column.title, row.baseline, _mean(row.mean, sign="+"), str(row.mean.count)]
-        lines.append(_line(cells))
+        cells = [column.title, row.baseline, mean_text(row.mean, sign="+"), str(row.mean.count)]
+        lines.append(line(cells))
     return lines
 
 
@@ -131,8 +128,8 @@ def _meanings(outcome: Outcome, columns: Sequence[Column]) -> list[str]:
 
 def _items(outcome: Outcome, summary: Summary) -> list[str]:
     key = PRIMARY[outcome.setup.task]
-    title = next(c.title for c in columns_of(outcome.setup.task) if c.key == key)
-    return [f"- {name}: {_item(item, key)} {title}" for name, item in summary.examples()]
+    ranked_by = next(c.title for c in columns_of(outcome.setup.task) if c.key == key)
+    return [f"- {name}: {_item(item, key)} {ranked_by}" for name, item in summary.examples()]
 
 
 def _item(item: ItemResult, key: str) -> str:
@@ -141,25 +138,10 @@ def _item(item: ItemResult, key: str) -> str:
 
 def _skipped(outcome: Outcome, summary: Summary) -> list[str]:
     failed = [f"- failed: item {f.item} ({f.clip}): {f.why}" for f in outcome.failures]
-    skipped = [
-        f"- not measured on {s.items} items: {s.key} of {s.row}: {s.why}" for s in summary.skipped
+    # What a clip lacks is missing in every row: once is enough.
+    of_system = {(s.key, s.why, s.items) for s in summary.skipped if s.row == SYSTEM}
+    told = [
+        s for s in summary.skipped if s.row == SYSTEM or (s.key, s.why, s.items) not in of_system
     ]
+    skipped = [f"- not measured on {s.items} items: {s.key} of {s.row}: {s.why}" for s in told]
     return failed + skipped
-
-
-def number(value: float, sign: str = "") -> str:
-    """Four significant digits, in fixed notation where possible."""
-    return f"{value:{sign}.4g}"
-
-
-def _mean(mean: Mean | None, sign: str = "") -> str:
-    if mean is None:
-        return ""
-    if mean.low is None or mean.high is None:
-        return number(mean.value, sign)
-    low, high = number(mean.low, sign), number(mean.high, sign)
-    return f"{number(mean.value, sign)} [{low}, {high}]"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"

@@ -28,6 +28,7 @@ def run_key(setup: Setup) -> str:
         "protocol": setup.protocol.digest,
         "task": setup.task,
         "subject": asdict(setup.system.identity),
+        "variants": [asdict(v.system.identity) | {"row": v.row} for v in setup.variants],
         "features": None if setup.features is None else setup.features.name,
         "captioner": setup.captioner.__qualname__,
         # Items that were stored before a column existed have no value for it.
