@@ -50,6 +50,8 @@ class Evaluate:
     without: Without = ()
     """Also measure the same scenes without a network, in a row each: depth, motion, text, video,
     ldrm (with the VAE), deformation; `all` is all of them."""
+    seeds: Annotated[int, Number(least=1, most=64)] = 1
+    """Generate each scene with this many seeds, and measure how much they differ."""
     fresh: bool = False
     """Ignore the results of an earlier run in the same folder."""
 
@@ -97,6 +99,7 @@ class Evaluate:
             features=features,
             captioner=grammar_caption,
             variants=self.variants(system),
+            seeds=self.seeds,
         )
         precompile_renderer(single_gaussian("cpu"), phases)
         precompile_sources([protocol.source], phases)

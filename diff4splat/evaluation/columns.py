@@ -5,7 +5,7 @@ from typing import Literal
 
 from diff4splat.evaluation.protocols.protocol import Task
 
-Table = Literal["images", "hidden"]
+Table = Literal["images", "hidden", "objects", "camera", "diversity"]
 SYSTEM = "system"
 """Row of the system in stored results."""
 PSNR_CAP_DB = 100.0
@@ -137,21 +137,94 @@ COLUMNS = (
         key="pose_translation",
         title="RPE trans",
         better="lower",
+        table="camera",
         meaning="translation error of camera steps estimated from rendered images, scene units",
     ),
     Column(
         key="pose_rotation",
         title="RPE rot [°]",
         better="lower",
+        table="camera",
         meaning="rotation error of the same steps",
     ),
     Column(
         key="pose_failed",
         title="RPE failed",
         better="lower",
+        table="camera",
         meaning="fraction of steps whose estimation failed",
     ),
+    Column(
+        key="object_iou",
+        title="overlap",
+        better="higher",
+        table="objects",
+        tasks=("generation", "reconstruction", "text"),
+        meaning="intersection over union of what moves in the first image with the objects that "
+        "are asked to",
+    ),
+    Column(
+        key="object_torn",
+        title="torn",
+        better="lower",
+        table="objects",
+        tasks=("generation", "reconstruction", "text"),
+        meaning="share of these objects that fall into parts, of those that move",
+    ),
+    Column(
+        key="text_object",
+        title="right object",
+        better="higher",
+        table="objects",
+        tasks=("text",),
+        meaning="share of captions whose named object moves farthest, where the image shows "
+        "several named objects",
+    ),
+    Column(
+        key="diversity",
+        title="spread over seeds",
+        better="neither",
+        table="diversity",
+        meaning="RMS difference of colours between two seeds, mean over pairs",
+    ),
+    Column(
+        key="diversity_hidden",
+        title="spread, hidden",
+        better="neither",
+        table="diversity",
+        meaning="the same over hidden pixels",
+    ),
     *(column for item in HIDDEN_REGIONS.items() for column in _hidden_columns(*item)),
+    Column(
+        key="camera_translation",
+        title="path trans",
+        better="lower",
+        table="camera",
+        meaning="translation error of every frame of the path, recovered from its image and the "
+        "first one, over the length of the asked translation",
+    ),
+    Column(
+        key="camera_rotation",
+        title="path rot [°]",
+        better="lower",
+        table="camera",
+        meaning="rotation error of the same poses",
+    ),
+    Column(
+        key="camera_failed",
+        title="path failed",
+        better="lower",
+        table="camera",
+        meaning="fraction of these frames whose pose was not recovered",
+    ),
+    Column(
+        key="pose_matches",
+        title="matches",
+        better="higher",
+        table="camera",
+        meaning="points of a rendered image that are found in the next where its depth puts them "
+        "(SIFT)",
+    ),
     Column(
         key="text_right",
         title="direction right",

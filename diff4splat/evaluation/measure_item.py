@@ -15,6 +15,7 @@ from diff4splat.evaluation.measure_rows import (
     variant_entries,
 )
 from diff4splat.evaluation.measures.camera_poses import pose_entries
+from diff4splat.evaluation.measures.diversity import diversity_entries
 from diff4splat.evaluation.measures.images import Entries
 from diff4splat.evaluation.measures.scenes import check_path, scene_entries
 from diff4splat.evaluation.measures.text import (
@@ -46,6 +47,8 @@ class Setup:
     """Writes captions for the text task; its name is part of the run key."""
     variants: tuple[Variant, ...] = ()
     """The system with one thing changed: a row each, compared with the full system."""
+    seeds: int = 1
+    """Scenes per item whose spread is measured; 1 measures none."""
 
     def __post_init__(self) -> None:
         if self.task == "text" and not hasattr(self.system, "generate"):
@@ -91,6 +94,9 @@ def _measure_images(sample: EvalSample, setup: Setup) -> Entries:
     full = prediction_entries(SYSTEM, item, ScenePrediction(scene))
     entries = full + scene_entries(SYSTEM, sample, scene, setup.protocol)
     entries += pose_entries(SYSTEM, scene, check_path(setup.protocol.pose, sample))
+    later = range(setup.protocol.seed + 1, setup.protocol.seed + setup.seeds)
+    scenes = [scene, *(setup.system.predict(sample, seed) for seed in later)]
+    entries += diversity_entries(SYSTEM, sample, scenes, item.regions)
     entries += baseline_entries(item)
     if isinstance(setup.system, Generator):
         entries += fill_entries(setup.system, item, full)

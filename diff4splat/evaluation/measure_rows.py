@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from diff4splat.errors import InputError
 from diff4splat.evaluation.measures.images import Entries, image_entries
+from diff4splat.evaluation.measures.objects import object_entries
 from diff4splat.evaluation.measures.regions import TrueRegions, true_regions
 from diff4splat.evaluation.measures.tracks import TrackedPoints, track_entries, tracked_points
 from diff4splat.evaluation.protocols.protocol import Protocol
@@ -43,9 +44,13 @@ def prepare_item(
 
 
 def prediction_entries(row: str, item: MeasuredItem, prediction: Prediction) -> Entries:
-    """Images, depth and tracks of one row."""
-    images = image_entries(row, item.sample, prediction, item.regions, item.features)
-    return images + track_entries(row, item.sample, prediction, item.tracked)
+    """Images, depth, tracks and objects of one row."""
+    entries = image_entries(row, item.sample, prediction, item.regions, item.features)
+    entries += track_entries(row, item.sample, prediction, item.tracked)
+    if prediction.scene is not None:
+        still_px = item.protocol.still_px
+        entries += object_entries(row, item.sample, prediction.scene, still_px)
+    return entries
 
 
 def baseline_entries(item: MeasuredItem) -> Entries:

@@ -29,7 +29,7 @@ def image_entries(
     features: PerceptualFeatures | None,
 ) -> Entries:
     """Colour and depth metrics of one prediction; empty if it has no images."""
-    views = _rendered_views(sample, prediction)
+    views = target_views(sample, prediction)
     if not views:
         return []
     rgb = torch.stack([view.rgb.cpu().float() for view in views])
@@ -46,7 +46,8 @@ def image_entries(
     return entries + _depth_entries(row, sample, views)
 
 
-def _rendered_views(sample: EvalSample, prediction: Prediction) -> list[RenderedView]:
+def target_views(sample: EvalSample, prediction: Prediction) -> list[RenderedView]:
+    """Every target image of a prediction; none if it has no images."""
     views = (
         prediction.render(sample.camera(pair), sample.time_s(pair[1]), pair[1])
         for pair in sample.targets.pairs

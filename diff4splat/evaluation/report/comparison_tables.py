@@ -14,7 +14,8 @@ from diff4splat.evaluation.systems.baselines import BASELINES
 
 ABLATION_KEYS = (
     *("psnr", "perceptual", "hidden_psnr", "hidden_perceptual", "depth_pearson", "depth_absrel"),
-    *("track_error", "text_right", "text_both", "text_still"),
+    *("track_error", "object_iou", "object_torn"),
+    *("text_right", "text_both", "text_still", "text_object"),
 )
 """Columns in which networks are compared; ``results.json`` has all."""
 

@@ -8,14 +8,20 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from diff4splat import __version__
-from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, columns_of
+from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, Table, columns_of
 from diff4splat.evaluation.records import ItemResult
-from diff4splat.evaluation.report.cells import line, mean_text, number, system_name, title
+from diff4splat.evaluation.report.cells import head, line, mean_text, number, system_name, title
 from diff4splat.evaluation.report.comparison_tables import ablation_section, hidden_section
 from diff4splat.evaluation.report.summary import Summary, row_names
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.progress.machine import this_machine
 
+SECTIONS: dict[Table, str] = {
+    "objects": "Objects",
+    "camera": "Camera",
+    "diversity": "Spread over seeds",
+}
+"""Smaller tables and their titles."""
 FORMAT = "diff4splat-evaluation-results 1"
 
 
@@ -47,17 +53,41 @@ def to_markdown(outcome: Outcome, summary: Summary) -> str:
     """Table, protocol, differences, and the best and worst items as Markdown."""
     columns = _filled(outcome, summary)
     images = [column for column in columns if column.table == "images"]
+    others = [_section(outcome, summary, columns, table) for table in SECTIONS]
     parts = [
         _head(outcome),
         _table(outcome, summary, images),
         _differences(summary, images),
         hidden_section(outcome, summary),
+        *others,
         ablation_section(outcome, summary),
         _meanings(outcome, columns),
         _items(outcome, summary),
         _skipped(outcome, summary),
     ]
     return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
+
+
+def _section(
+    outcome: Outcome, summary: Summary, columns: Sequence[Column], table: Table
+) -> list[str]:
+    """One of the smaller tables; empty if nothing of it was measured."""
+    shown = [column for column in columns if column.table == table]
+    rows = _rows(outcome, summary, shown)
+    if not rows:
+        return []
+    return [f"## {SECTIONS[table]}", "", *head([title(column) for column in shown]), *rows]
+
+
+def _rows(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
+    """Rows that have a value in any column."""
+    lines = []
+    for row in row_names(outcome):
+        means = [summary.cell(row, column.key) for column in columns]
+        if any(mean is not None for mean in means):
+            name = f"**{system_name(outcome)}**" if row == SYSTEM else row
+            lines.append(line([name, *(mean_text(mean) for mean in means)]))
+    return lines
 
 
 def _filled(outcome: Outcome, summary: Summary) -> list[Column]:
@@ -88,19 +118,8 @@ def _head(outcome: Outcome) -> list[str]:
 
 def _table(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
     percent = f"{outcome.setup.protocol.bootstrap.coverage:.0%}"
-    titles = [title(column) for column in columns]
-    lines = [
-        f"Means over items with {percent} bootstrap intervals.",
-        "",
-        line(["", *titles]),
-        line(["---", *["---:"] * len(columns)]),
-    ]
-    for row in row_names(outcome):
-        means = [summary.cell(row, column.key) for column in columns]
-        if any(mean is not None for mean in means):
-            name = f"**{system_name(outcome)}**" if row == SYSTEM else row
-            lines.append(line([name, *(mean_text(mean) for mean in means)]))
-    return lines
+    lines = [f"Means over items with {percent} bootstrap intervals.", ""]
+    return lines + head([title(column) for column in columns]) + _rows(outcome, summary, columns)
 
 
 def _differences(summary: Summary, columns: Sequence[Column]) -> list[str]:

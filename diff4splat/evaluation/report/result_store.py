@@ -29,6 +29,7 @@ def run_key(setup: Setup) -> str:
         "task": setup.task,
         "subject": asdict(setup.system.identity),
         "variants": [asdict(v.system.identity) | {"row": v.row} for v in setup.variants],
+        "seeds": setup.seeds,
         "features": None if setup.features is None else setup.features.name,
         "captioner": setup.captioner.__qualname__,
         # Items that were stored before a column existed have no value for it.
