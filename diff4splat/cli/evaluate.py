@@ -83,6 +83,7 @@ class Evaluate:
         from diff4splat.evaluation.measures.captions import grammar_caption
         from diff4splat.evaluation.protocols.datasets import open_clips
         from diff4splat.evaluation.protocols.protocol_json import load_protocol
+        from diff4splat.metrics.features.fixed_features import FixedFeatures
         from diff4splat.metrics.features.load import load_features
 
         loaded, phases = load_protocol(self.protocol), ConsolePhases()
@@ -97,6 +98,7 @@ class Evaluate:
             task=self.task,
             system=system,
             features=features,
+            video_features=FixedFeatures(),
             captioner=grammar_caption,
             variants=self.variants(system),
             seeds=self.seeds,

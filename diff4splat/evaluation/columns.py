@@ -8,6 +8,8 @@ from diff4splat.evaluation.protocols.protocol import Task
 Table = Literal["images", "hidden", "objects", "camera", "diversity"]
 SYSTEM = "system"
 """Row of the system in stored results."""
+TRUTH = "truth"
+"""Row of the true videos, with which distributions are compared."""
 PSNR_CAP_DB = 100.0
 """Value of identical images: an infinite PSNR would make every mean infinite."""
 

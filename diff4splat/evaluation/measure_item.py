@@ -6,17 +6,18 @@ import torch
 
 from diff4splat.data.clip import Clip
 from diff4splat.errors import ConfigError
-from diff4splat.evaluation.columns import SYSTEM
+from diff4splat.evaluation.columns import SYSTEM, TRUTH
 from diff4splat.evaluation.measure_rows import (
     baseline_entries,
     fill_entries,
     prediction_entries,
     prepare_item,
     variant_entries,
+    video_entries,
 )
 from diff4splat.evaluation.measures.camera_poses import pose_entries
 from diff4splat.evaluation.measures.diversity import diversity_entries
-from diff4splat.evaluation.measures.images import Entries
+from diff4splat.evaluation.measures.images import Entries, true_images
 from diff4splat.evaluation.measures.scenes import check_path, scene_entries
 from diff4splat.evaluation.measures.text import (
     Captioner,
@@ -26,12 +27,12 @@ from diff4splat.evaluation.measures.text import (
 )
 from diff4splat.evaluation.protocols.protocol import Protocol, Task
 from diff4splat.evaluation.protocols.sample import EvalSample, clip_sha256, make_sample
-from diff4splat.evaluation.records import ItemResult, Score, Skip
+from diff4splat.evaluation.records import Embedding, ItemResult, Score, Skip
 from diff4splat.evaluation.systems.baselines import ZERO_MOTION
 from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem, Generator
 from diff4splat.evaluation.systems.predictions import ScenePrediction
 from diff4splat.evaluation.systems.variants import Variant
-from diff4splat.metrics.features.protocol import PerceptualFeatures
+from diff4splat.metrics.features.protocol import PerceptualFeatures, VideoFeatures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +44,8 @@ class Setup:
     system: EvaluatedSystem
     features: PerceptualFeatures | None = None
     """None skips the perceptual column."""
+    video_features: VideoFeatures | None = None
+    """For distances of distributions; None measures none."""
     captioner: Captioner = plain_caption
     """Writes captions for the text task; its name is part of the run key."""
     variants: tuple[Variant, ...] = ()
@@ -74,6 +77,7 @@ def measure_item(item: int, clip: Clip, setup: Setup) -> ItemResult:
         clip_sha256=clip_sha256(clip),
         scores=tuple(entry for entry in entries if isinstance(entry, Score)),
         skips=tuple(entry for entry in entries if isinstance(entry, Skip)),
+        embeddings=tuple(entry for entry in entries if isinstance(entry, Embedding)),
     )
 
 
@@ -90,9 +94,10 @@ def _measure_text(sample: EvalSample, setup: Setup) -> Entries:
 
 def _measure_images(sample: EvalSample, setup: Setup) -> Entries:
     scene = setup.system.predict(sample, setup.protocol.seed)
-    item = prepare_item(sample, setup.protocol, setup.features)
+    item = prepare_item(sample, setup.protocol, setup.features, setup.video_features)
+    truth = video_entries(TRUTH, item, true_images(sample))
     full = prediction_entries(SYSTEM, item, ScenePrediction(scene))
-    entries = full + scene_entries(SYSTEM, sample, scene, setup.protocol)
+    entries = truth + full + scene_entries(SYSTEM, sample, scene, setup.protocol)
     entries += pose_entries(SYSTEM, scene, check_path(setup.protocol.pose, sample))
     later = range(setup.protocol.seed + 1, setup.protocol.seed + setup.seeds)
     scenes = [scene, *(setup.system.predict(sample, seed) for seed in later)]

@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.evaluation.measures.images import Entries, target_views
+from diff4splat.evaluation.measures.images import Entries, stacked_rgb, target_views
 from diff4splat.evaluation.measures.regions import MIN_PIXELS, TrueRegions
 from diff4splat.evaluation.protocols.sample import EvalSample
 from diff4splat.evaluation.records import Score, Skip
@@ -28,7 +28,7 @@ def diversity_entries(
     """Spread of scenes of several seeds; empty for fewer than two."""
     if len(scenes) < 2:
         return []
-    rgb = torch.stack([_images(sample, scene) for scene in scenes])
+    rgb = torch.stack([stacked_rgb(target_views(sample, ScenePrediction(one))) for one in scenes])
     every = torch.ones(rgb.shape[1:-1], dtype=torch.bool)
     entries: Entries = [Score(row=row, key=KEYS[0], value=round(pairwise_rms(rgb, every), 6))]
     hidden = None if regions is None else regions.hidden.regions["hidden"]
@@ -44,8 +44,3 @@ def pairwise_rms(rgb: Float[Tensor, "s p h w 3"], mask: Bool[Tensor, "p h w"]) -
         float((one - other).square().mean().sqrt()) for one, other in combinations(pixels, 2)
     ]
     return math.fsum(distances) / len(distances)
-
-
-def _images(sample: EvalSample, scene: Scene) -> Float[Tensor, "p h w 3"]:
-    views = target_views(sample, ScenePrediction(scene))
-    return torch.stack([view.rgb.cpu().float() for view in views])

@@ -5,11 +5,13 @@ without true depth has no depth error: means skip and count both.
 """
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.evaluation.columns import PSNR_CAP_DB
 from diff4splat.evaluation.measures.regions import ComparedImages, TrueRegions, region_entries
 from diff4splat.evaluation.protocols.sample import EvalSample
-from diff4splat.evaluation.records import Score, Skip, score
+from diff4splat.evaluation.records import Embedding, Score, Skip, score
 from diff4splat.evaluation.systems.predictions import Prediction, RenderedView
 from diff4splat.metrics.depth import depth_pearson, relative_error
 from diff4splat.metrics.features.protocol import PerceptualFeatures
@@ -18,22 +20,20 @@ from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.metrics.ssim import ssim
 from diff4splat.training.batches.normalise_scale import valid_depth
 
-Entries = list[Score | Skip]
+Entries = list[Score | Skip | Embedding]
 
 
 def image_entries(
     row: str,
     sample: EvalSample,
-    prediction: Prediction,
+    views: list[RenderedView],
     regions: TrueRegions | None,
     features: PerceptualFeatures | None,
 ) -> Entries:
-    """Colour and depth metrics of one prediction; empty if it has no images."""
-    views = target_views(sample, prediction)
+    """Colour and depth metrics of the target images of one prediction; empty without images."""
     if not views:
         return []
-    rgb = torch.stack([view.rgb.cpu().float() for view in views])
-    truth = torch.stack([sample.true_rgb(pair) for pair in sample.targets.pairs])
+    rgb, truth = stacked_rgb(views), true_images(sample)
     entries = [
         score(row, "psnr", psnr(rgb, truth).clamp_max(PSNR_CAP_DB).tolist()),
         *region_entries(row, ComparedImages(rgb=rgb, truth=truth, regions=regions), features),
@@ -53,6 +53,16 @@ def target_views(sample: EvalSample, prediction: Prediction) -> list[RenderedVie
         for pair in sample.targets.pairs
     )
     return [view for view in views if view is not None]
+
+
+def stacked_rgb(views: list[RenderedView]) -> Float[Tensor, "p h w 3"]:
+    """Colours of rendered views."""
+    return torch.stack([view.rgb.cpu().float() for view in views])
+
+
+def true_images(sample: EvalSample) -> Float[Tensor, "p h w 3"]:
+    """The target images."""
+    return torch.stack([sample.true_rgb(pair) for pair in sample.targets.pairs])
 
 
 def _depth_entries(row: str, sample: EvalSample, views: list[RenderedView]) -> Entries:

@@ -12,6 +12,10 @@ from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, Table, column
 from diff4splat.evaluation.records import ItemResult
 from diff4splat.evaluation.report.cells import head, line, mean_text, number, system_name, title
 from diff4splat.evaluation.report.comparison_tables import ablation_section, hidden_section
+from diff4splat.evaluation.report.distributions import (
+    distribution_distances,
+    distribution_section,
+)
 from diff4splat.evaluation.report.summary import Summary, row_names
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.progress.machine import this_machine
@@ -36,12 +40,14 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
         "protocol": setup.protocol.record() | {"digest": setup.protocol.digest},
         "subject": asdict(setup.system.identity),
         "features": None if setup.features is None else setup.features.name,
+        "video_features": None if setup.video_features is None else setup.video_features.name,
         "asked": outcome.requested,
         "subset": outcome.is_subset,
         "columns": [asdict(column) for column in columns_of(setup.task)],
         "table": [asdict(cell) for cell in summary.cells],
         "differences": [asdict(difference) for difference in summary.differences],
         "comparisons": [asdict(comparison) for comparison in summary.comparisons],
+        "distributions": [asdict(distance) for distance in distribution_distances(outcome)],
         "skipped": [asdict(skipped) for skipped in summary.skipped],
         "failures": [asdict(failure) for failure in outcome.failures],
         "items": [item.to_json() for item in outcome.items],
@@ -53,6 +59,7 @@ def to_markdown(outcome: Outcome, summary: Summary) -> str:
     """Table, protocol, differences, and the best and worst items as Markdown."""
     columns = _filled(outcome, summary)
     images = [column for column in columns if column.table == "images"]
+    names = {SYSTEM: f"**{system_name(outcome)}**"}
     others = [_section(outcome, summary, columns, table) for table in SECTIONS]
     parts = [
         _head(outcome),
@@ -60,6 +67,7 @@ def to_markdown(outcome: Outcome, summary: Summary) -> str:
         _differences(summary, images),
         hidden_section(outcome, summary),
         *others,
+        distribution_section(outcome, distribution_distances(outcome), names),
         ablation_section(outcome, summary),
         _meanings(outcome, columns),
         _items(outcome, summary),

@@ -73,7 +73,9 @@ def test_text_is_asked_of_the_same_model(protocol_file: Path, tmp_path: Path) ->
         model="test", protocol=str(protocol_file), task="text", out=tmp_path / "out", steps=2
     ).run()
     stored = json.loads((tmp_path / "out" / "results.json").read_text())
-    assert {cell["key"] for cell in stored["table"]} == {"text_right", "text_both", "text_still"}
+    keys = {"text_right", "text_both", "text_still"}
+    # A random model moves nothing, so nothing can be torn.
+    assert {cell["key"] for cell in stored["table"]} == keys | {"object_iou", "text_object"}
 
 
 def test_the_newest_protocol_of_all_tasks_is_the_default() -> None:
