@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from diff4splat.cli.options.constraints import Number, OutFolder
+from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.models import FeatureFiles, ModelName
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
+    from diff4splat.evaluation.measures.videos import VideoNetworks
     from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
     from diff4splat.evaluation.systems.variants import Variant
     from diff4splat.generation.settings import GenerationSettings
@@ -39,6 +40,12 @@ class Evaluate:
     """Measure only the first N clips; the table is then marked as a subset."""
     features: Annotated[str | None, FeatureFiles()] = None
     """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
+    video_features: str | None = None
+    """I3D weights for FVD and KVD: `i3d:FILE`. Default: fixed features without weights."""
+    clip: Annotated[Path | None, InputPath("a folder of a CLIP", file=False)] = None
+    """Folder of a CLIP (Hugging Face layout) for the CLIP score and the consistency of frames."""
+    aesthetic: Annotated[Path | None, InputPath("weights of an aesthetic predictor")] = None
+    """Weights of an aesthetic predictor on that CLIP."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
     fill: Literal["none", "video"] | None = None
@@ -64,6 +71,8 @@ class Evaluate:
                 "--device, --dtype: expected without --task reconstruction, which runs on the CPU "
                 "in float32; leave them out"
             )
+        if self.aesthetic is not None and self.clip is None:
+            raise ConfigError("--aesthetic: expected --clip, on which it works, got none; add it")
         if self.task == "reconstruction" and self.without:
             raise ConfigError(
                 "--without: expected without --task reconstruction, which has no networks to "
@@ -83,7 +92,6 @@ class Evaluate:
         from diff4splat.evaluation.measures.captions import grammar_caption
         from diff4splat.evaluation.protocols.datasets import open_clips
         from diff4splat.evaluation.protocols.protocol_json import load_protocol
-        from diff4splat.metrics.features.fixed_features import FixedFeatures
         from diff4splat.metrics.features.load import load_features
 
         loaded, phases = load_protocol(self.protocol), ConsolePhases()
@@ -98,7 +106,7 @@ class Evaluate:
             task=self.task,
             system=system,
             features=features,
-            video_features=FixedFeatures(),
+            videos=self.video_networks(),
             captioner=grammar_caption,
             variants=self.variants(system),
             seeds=self.seeds,
@@ -138,6 +146,23 @@ class Evaluate:
         return Reconstructor(
             reconstruct=partial(reconstruct_clip, model),
             identity=model_identity(model, RECONSTRUCTION_PARTS, "reconstruction"),
+        )
+
+    def video_networks(self) -> "VideoNetworks":
+        """What videos are measured with: fixed features, or networks whose weights are given."""
+        from diff4splat.evaluation.measures.videos import VideoNetworks
+        from diff4splat.metrics.features.aesthetic import read_aesthetic
+        from diff4splat.metrics.features.clip import read_clip
+        from diff4splat.metrics.features.fixed_features import FixedFeatures
+        from diff4splat.metrics.features.load_video import load_video_features
+
+        clip = None if self.clip is None else read_clip(self.clip)
+        judge = None if self.aesthetic is None else read_aesthetic(self.aesthetic, clip)
+        return VideoNetworks(
+            distribution=load_video_features(self.video_features),
+            frames=clip or FixedFeatures(),
+            text=clip,
+            aesthetic=judge,
         )
 
     def variants(self, system: "EvaluatedSystem") -> "tuple[Variant, ...]":

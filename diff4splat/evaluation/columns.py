@@ -5,7 +5,7 @@ from typing import Literal
 
 from diff4splat.evaluation.protocols.protocol import Task
 
-Table = Literal["images", "hidden", "objects", "camera", "diversity"]
+Table = Literal["images", "hidden", "objects", "camera", "diversity", "videos"]
 SYSTEM = "system"
 """Row of the system in stored results."""
 TRUTH = "truth"
@@ -195,6 +195,28 @@ COLUMNS = (
         better="neither",
         table="diversity",
         meaning="the same over hidden pixels",
+    ),
+    Column(
+        key="frame_consistency",
+        title="consistency",
+        better="higher",
+        table="videos",
+        meaning="mean cosine of the features of every frame with those of the first frame and of "
+        "the frame before; 1 for an image that does not change",
+    ),
+    Column(
+        key="clip_score",
+        title="CLIP score",
+        better="higher",
+        table="videos",
+        meaning="100 times the cosine of frames and caption",
+    ),
+    Column(
+        key="aesthetic",
+        title="aesthetic",
+        better="higher",
+        table="videos",
+        meaning="score of an aesthetic predictor",
     ),
     *(column for item in HIDDEN_REGIONS.items() for column in _hidden_columns(*item)),
     Column(

@@ -13,7 +13,6 @@ from diff4splat.evaluation.measure_rows import (
     prediction_entries,
     prepare_item,
     variant_entries,
-    video_entries,
 )
 from diff4splat.evaluation.measures.camera_poses import pose_entries
 from diff4splat.evaluation.measures.diversity import diversity_entries
@@ -25,6 +24,7 @@ from diff4splat.evaluation.measures.text import (
     text_entries,
     zero_motion_entries,
 )
+from diff4splat.evaluation.measures.videos import VideoNetworks, video_entries
 from diff4splat.evaluation.protocols.protocol import Protocol, Task
 from diff4splat.evaluation.protocols.sample import EvalSample, clip_sha256, make_sample
 from diff4splat.evaluation.records import Embedding, ItemResult, Score, Skip
@@ -32,7 +32,9 @@ from diff4splat.evaluation.systems.baselines import ZERO_MOTION
 from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem, Generator
 from diff4splat.evaluation.systems.predictions import ScenePrediction
 from diff4splat.evaluation.systems.variants import Variant
-from diff4splat.metrics.features.protocol import PerceptualFeatures, VideoFeatures
+from diff4splat.metrics.features.protocol import PerceptualFeatures
+
+NO_NETWORKS = VideoNetworks()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,8 +46,8 @@ class Setup:
     system: EvaluatedSystem
     features: PerceptualFeatures | None = None
     """None skips the perceptual column."""
-    video_features: VideoFeatures | None = None
-    """For distances of distributions; None measures none."""
+    videos: VideoNetworks = NO_NETWORKS
+    """What the target images are measured with as a video."""
     captioner: Captioner = plain_caption
     """Writes captions for the text task; its name is part of the run key."""
     variants: tuple[Variant, ...] = ()
@@ -94,8 +96,8 @@ def _measure_text(sample: EvalSample, setup: Setup) -> Entries:
 
 def _measure_images(sample: EvalSample, setup: Setup) -> Entries:
     scene = setup.system.predict(sample, setup.protocol.seed)
-    item = prepare_item(sample, setup.protocol, setup.features, setup.video_features)
-    truth = video_entries(TRUTH, item, true_images(sample))
+    item = prepare_item(sample, setup.protocol, setup.features, setup.videos)
+    truth = video_entries(TRUTH, sample, true_images(sample), setup.videos)
     full = prediction_entries(SYSTEM, item, ScenePrediction(scene))
     entries = truth + full + scene_entries(SYSTEM, sample, scene, setup.protocol)
     entries += pose_entries(SYSTEM, scene, check_path(setup.protocol.pose, sample))

@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-from jaxtyping import Float
-from torch import Tensor
-
 from diff4splat.errors import InputError
 from diff4splat.evaluation.measures.images import (
     Entries,
@@ -15,15 +12,16 @@ from diff4splat.evaluation.measures.images import (
 from diff4splat.evaluation.measures.objects import object_entries
 from diff4splat.evaluation.measures.regions import TrueRegions, true_regions
 from diff4splat.evaluation.measures.tracks import TrackedPoints, track_entries, tracked_points
+from diff4splat.evaluation.measures.videos import VideoNetworks, video_entries
 from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.evaluation.protocols.sample import EvalSample
-from diff4splat.evaluation.records import Embedding, Skip
+from diff4splat.evaluation.records import Skip
 from diff4splat.evaluation.systems.baselines import BASELINES, make_baseline
 from diff4splat.evaluation.systems.evaluated_system import Generator
 from diff4splat.evaluation.systems.inpainting import METHODS, InpaintedViews
 from diff4splat.evaluation.systems.predictions import Prediction, ScenePrediction
 from diff4splat.evaluation.systems.variants import Variant, border_extension, unfilled
-from diff4splat.metrics.features.protocol import PerceptualFeatures, VideoFeatures
+from diff4splat.metrics.features.protocol import PerceptualFeatures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +31,7 @@ class MeasuredItem:
     sample: EvalSample
     protocol: Protocol
     features: PerceptualFeatures | None
-    video_features: VideoFeatures | None
+    videos: VideoNetworks
     tracked: list[TrackedPoints]
     regions: TrueRegions | None
     """None without true depth."""
@@ -43,14 +41,14 @@ def prepare_item(
     sample: EvalSample,
     protocol: Protocol,
     features: PerceptualFeatures | None,
-    video_features: VideoFeatures | None,
+    videos: VideoNetworks,
 ) -> MeasuredItem:
     """The sample with its ground truth."""
     return MeasuredItem(
         sample=sample,
         protocol=protocol,
         features=features,
-        video_features=video_features,
+        videos=videos,
         tracked=tracked_points(sample, protocol),
         regions=true_regions(sample),
     )
@@ -60,23 +58,13 @@ def prediction_entries(row: str, item: MeasuredItem, prediction: Prediction) -> 
     """Images, depth, tracks and objects of one row."""
     views = target_views(item.sample, prediction)
     entries = image_entries(row, item.sample, views, item.regions, item.features)
-    entries += video_entries(row, item, stacked_rgb(views) if views else None)
+    if views:
+        entries += video_entries(row, item.sample, stacked_rgb(views), item.videos)
     entries += track_entries(row, item.sample, prediction, item.tracked)
     if prediction.scene is not None:
         still_px = item.protocol.still_px
         entries += object_entries(row, item.sample, prediction.scene, still_px)
     return entries
-
-
-def video_entries(row: str, item: MeasuredItem, rgb: Float[Tensor, "p h w 3"] | None) -> Entries:
-    """Features of the target images of the input view as a video; of fewer than two, none."""
-    pairs = item.sample.targets.pairs
-    frames = [index for index, (view, _) in enumerate(pairs) if view == 0]
-    if item.video_features is None or rgb is None or len(frames) < 2:
-        return []
-    video = rgb[frames].movedim(-1, 1)[None]
-    values = item.video_features.embed_videos(video)[0].double()
-    return [Embedding(row=row, values=tuple(round(v, 6) for v in values.tolist()))]
 
 
 def baseline_entries(item: MeasuredItem) -> Entries:

@@ -54,15 +54,15 @@ def distribution_section(
     outcome: Outcome, distances: Sequence[DistributionDistance], names: dict[str, str]
 ) -> list[str]:
     """The table of distances, with ``names`` shown for rows; empty without video features."""
-    if not distances or outcome.setup.video_features is None:
+    if not distances or outcome.setup.videos.distribution is None:
         return []
     cells = {(one.row, one.distance): one.mean for one in distances}
     rows = list(dict.fromkeys(one.row for one in distances))
     lines = [
         "## Distribution of videos",
         "",
-        f"Generated against true videos along the path; {outcome.setup.video_features.name}. The "
-        "Fréchet distance of few videos is too large; the kernel distance is unbiased.",
+        f"Generated against true videos along the path; {outcome.setup.videos.distribution.name}. "
+        "The Fréchet distance of few videos is too large; the kernel distance is unbiased.",
         "",
         *head([f"{name} ↓" for name in DISTANCES]),
     ]

@@ -24,8 +24,11 @@ SECTIONS: dict[Table, str] = {
     "objects": "Objects",
     "camera": "Camera",
     "diversity": "Spread over seeds",
+    "videos": "Videos",
 }
 """Smaller tables and their titles."""
+VIDEO_COLUMNS = {"frames": "Consistency", "text": "CLIP score", "aesthetic": "Aesthetic"}
+"""Columns of videos by what their network is for."""
 FORMAT = "diff4splat-evaluation-results 1"
 
 
@@ -40,7 +43,7 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
         "protocol": setup.protocol.record() | {"digest": setup.protocol.digest},
         "subject": asdict(setup.system.identity),
         "features": None if setup.features is None else setup.features.name,
-        "video_features": None if setup.video_features is None else setup.video_features.name,
+        "videos": setup.videos.names,
         "asked": outcome.requested,
         "subset": outcome.is_subset,
         "columns": [asdict(column) for column in columns_of(setup.task)],
@@ -119,6 +122,9 @@ def _head(outcome: Outcome) -> list[str]:
     ]
     if setup.features is not None and setup.task != "text":
         lines.append(f"Perceptual distance: {setup.features.name}.")
+    for purpose, name in VIDEO_COLUMNS.items():
+        if purpose in setup.videos.names and setup.task != "text":
+            lines.append(f"{name}: {setup.videos.names[purpose]}.")
     if identity.untrained:
         lines.append("**Untrained**: the weights are random; this row is a starting point.")
     return lines

@@ -31,7 +31,7 @@ def run_key(setup: Setup) -> str:
         "variants": [asdict(v.system.identity) | {"row": v.row} for v in setup.variants],
         "seeds": setup.seeds,
         "features": None if setup.features is None else setup.features.name,
-        "video_features": None if setup.video_features is None else setup.video_features.name,
+        "videos": setup.videos.names,
         "captioner": setup.captioner.__qualname__,
         # Items that were stored before a column existed have no value for it.
         "columns": [column.key for column in columns_of(setup.task)],
