@@ -6,6 +6,9 @@ Axes: ``n m`` samples, ``d`` features. Everything is computed in float64.
     kernel   mean_{i≠j} k(x_i, x_j) + mean_{i≠j} k(y_i, y_j) − 2 mean_{ij} k(x_i, y_j),
              k(x, y) = (x·y / d + 1)³                                 (Bińkowski et al. 2018)
 
+Samples that come in pairs, such as a generated video and the true one of the same scene, are not
+independent: i ≠ j then holds in the last mean too (Gretton et al. 2012, lemma 6).
+
 With S = AᵀA the trace of the root is the sum of singular values of A₁A₂ᵀ: no root of a singular
 matrix is taken, so few samples of many features are as exact as many. The Fréchet distance of few
 samples is too large all the same, by an amount that depends on their number; the kernel distance is
@@ -37,15 +40,22 @@ def frechet_distance(one: Float[Tensor, "n d"], other: Float[Tensor, "m _d"]) ->
     return max(float(means + traces - 2 * roots), 0.0)
 
 
-def kernel_distance(one: Float[Tensor, "n d"], other: Float[Tensor, "m _d"]) -> float:
+def kernel_distance(
+    one: Float[Tensor, "n d"], other: Float[Tensor, "m _d"], *, paired: bool = False
+) -> float:
     """Unbiased squared maximum mean discrepancy with the cubic kernel.
 
+    ``paired``: sample i of both belongs together.
+
     Raises:
-        ShapeError, InputError: as ``frechet_distance``.
+        ShapeError, InputError: as ``frechet_distance``; unequal numbers of paired samples.
     """
     one, other = _checked(one, other)
+    if paired and len(one) != len(other):
+        raise ShapeError(f"features: expected as many pairs, got {len(one)} and {len(other)}")
     within = _mean_off_diagonal(_kernel(one, one)) + _mean_off_diagonal(_kernel(other, other))
-    return float(within - 2 * _kernel(one, other).mean())
+    between = _kernel(one, other)
+    return float(within - 2 * (_mean_off_diagonal(between) if paired else between.mean()))
 
 
 def _factor(samples: Float[Tensor, "n d"]) -> Float[Tensor, "k d"]:

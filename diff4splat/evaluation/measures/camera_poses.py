@@ -29,6 +29,8 @@ from diff4splat.scene.scene import Scene
 MIN_MATCHES = 12
 """Twice the six points that determine a pose, so that errors are detectable."""
 INLIER_PX = 1.5
+FARTHEST = 10.0
+"""Longest translation of a recovered pose, over the depth of its farthest point."""
 MIN_LENGTH = 0.1
 """Shortest translation that has a relative error, as a share of the longest of its path."""
 RANSAC_ROUNDS = 500
@@ -131,6 +133,9 @@ def recover_step(
     axis_angle, translation = cv2.solvePnPRefineLM(
         points[kept], pixels[kept], intrinsics, None, axis_angle, translation
     )
+    # Points on one line of sight determine no distance: least squares then leaves the scene.
+    if not float(np.linalg.norm(translation)) <= FARTHEST * float(points[kept, 2].max()):
+        return None
     rotation = torch.from_numpy(cv2.Rodrigues(axis_angle)[0])
     pose = rigid.from_parts(rotation, torch.from_numpy(translation[:, 0]))
     return RecoveredPose(pose=pose, matches=len(kept))

@@ -7,6 +7,7 @@ have a video. Intervals are of the jackknife over items.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import torch
 from jaxtyping import Float64
@@ -23,7 +24,8 @@ from diff4splat.metrics.jackknife import jackknife_interval
 Distance = Callable[[Tensor, Tensor], float]
 DISTANCES: dict[str, Distance] = {
     "Fréchet distance": frechet_distance,
-    "kernel distance": kernel_distance,
+    # Both videos of an item show one world.
+    "kernel distance": partial(kernel_distance, paired=True),
 }
 
 

@@ -76,6 +76,20 @@ def test_the_kernel_distance_is_unbiased_and_finds_a_difference() -> None:
     assert kernel_distance(samples(12, 6, 1), samples(12, 6, 2) + 2) > 10 * float(np.std(equal))
 
 
+def test_pairs_of_one_scene_do_not_bring_distributions_nearer_than_equal() -> None:
+    def pair(seed: int) -> tuple[torch.Tensor, torch.Tensor]:
+        scene = samples(12, 6, seed)
+        return scene + 0.1 * samples(12, 6, seed + 500), scene + 0.1 * samples(12, 6, seed + 900)
+
+    found = [kernel_distance(*pair(seed), paired=True) for seed in range(300)]
+    naive = [kernel_distance(*pair(seed)) for seed in range(300)]
+    error = float(np.std(found)) / math.sqrt(len(found))
+    assert abs(float(np.mean(found))) < 3 * error
+    assert float(np.mean(naive)) < -10 * error
+    with pytest.raises(ShapeError, match="pairs"):
+        kernel_distance(samples(3, 2, 1), samples(4, 2, 1), paired=True)
+
+
 def test_single_precision_far_from_zero_is_exact() -> None:
     one, other = samples(20, 8, 8), samples(20, 8, 9)
     shifted = frechet_distance((one + 1e3).float(), (other + 1e3).float())

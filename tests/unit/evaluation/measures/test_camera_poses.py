@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 import torch
 from oracles_evaluation import SIZE, as_scene, slab, wall_and_patch
@@ -96,3 +98,14 @@ def test_images_of_half_the_path_are_half_of_it_wrong(scene: Scene) -> None:
 
 def test_a_camera_that_stands_has_no_relative_translation(scene: Scene) -> None:
     assert path_errors(rendered_frames(scene, path("static", 3)), path("static", 3)).relative == ()
+
+
+def test_a_pose_that_leaves_the_scene_counts_as_failed(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def away(*arguments: object) -> tuple[object, object]:
+        return arguments[4], np.array([[1e12], [0.0], [0.0]])
+
+    monkeypatch.setattr(cv2, "solvePnPRefineLM", away)
+    errors = path_errors(rendered_frames(scene, path("right:0.1")), path("right:0.1"))
+    assert (errors.failed, errors.relative) == (3, ())
