@@ -42,9 +42,11 @@ class Evaluate:
     """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
     video_features: str | None = None
     """I3D weights for FVD and KVD: `i3d:FILE`. Default: fixed features without weights."""
-    clip: Annotated[Path | None, InputPath("a folder of a CLIP", file=False)] = None
+    clip: Annotated[Path | None, InputPath(what="a folder of a CLIP", file=False)] = None
     """Folder of a CLIP (Hugging Face layout) for the CLIP score and the consistency of frames."""
-    aesthetic: Annotated[Path | None, InputPath("weights of an aesthetic predictor")] = None
+    aesthetic: Annotated[
+        Path | None, InputPath(what="weights of an aesthetic predictor", folder=False)
+    ] = None
     """Weights of an aesthetic predictor on that CLIP."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
