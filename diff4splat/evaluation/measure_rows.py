@@ -91,8 +91,8 @@ def variant_entries(variant: Variant, item: MeasuredItem, full: Entries) -> Entr
 def fill_entries(generator: Generator, item: MeasuredItem, full: Entries) -> Entries:
     """Baselines that fill what the image hides, on the depth and the motion of the system."""
     entries = variant_entries(border_extension(generator), item, full)
-    shown = unfilled(generator).predict(item.sample, item.protocol.seed)
+    visible = unfilled(generator).predict(item.sample, item.protocol.seed)
     for row, method in METHODS.items():
-        prediction = InpaintedViews(shown=shown, method=method)
+        prediction = InpaintedViews(visible_scene=visible, method=method)
         entries += prediction_entries(row, item, prediction)
     return entries

@@ -26,8 +26,8 @@ RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 """What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
 DEPTH_GIVEN = "depth is given"
-LEFT_OUT = "it is left out on request"
-CHOICES = (WORSE_FILL, DEPTH_GIVEN, LEFT_OUT)
+REMOVED = "it is left out on request"
+CHOICES = (WORSE_FILL, DEPTH_GIVEN, REMOVED)
 """Reasons that are choices: the part would give another scene."""
 NO_MOTION = "no prompt asks for motion"
 UNTRAINED_FILL = "the video model is not trained"
@@ -51,9 +51,9 @@ class RequestFacts:
     without: tuple[str, ...] = ()
     """Networks that stay out on request: ablations."""
 
-    def left_out(self, *parts: str) -> str:
+    def removed(self, *parts: str) -> str:
         """The reason, if any of ``parts`` stays out on request; else empty."""
-        return LEFT_OUT if set(parts) & set(self.without) else ""
+        return REMOVED if set(parts) & set(self.without) else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,7 @@ def plan_generation(
     reasons = {
         "monocular_depth": _depth_reason(trained, facts),
         "motion_unet": _untrained("motion_unet", trained)
-        or facts.left_out("motion_unet", "text_encoder")
+        or facts.removed("motion_unet", "text_encoder")
         or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
@@ -123,13 +123,13 @@ def plan_generation(
     reasons |= dict.fromkeys(FILL_PARTS, fill)
     if not fill:
         # Without the video model its condition is reconstructed as it is.
-        reasons["dit"] = facts.left_out("dit")
-        reasons["deformation"] = facts.left_out("deformation") or _deformation_reason(
+        reasons["dit"] = facts.removed("dit")
+        reasons["deformation"] = facts.removed("deformation") or _deformation_reason(
             config, trained, facts
         )
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
     unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
-    asked = unread or _untrained("text_encoder", trained) or facts.left_out("text_encoder")
+    asked = unread or _untrained("text_encoder", trained) or facts.removed("text_encoder")
     # Models that pad prompts attend to the empty one where there is none.
     padded = bool(config.dit.padded_text_tokens) and not reasons["dit"]
     reasons["text_encoder"] = asked if facts.prompt or padded else "no prompt"
@@ -151,7 +151,7 @@ def _untrained(part: str, trained: Collection[str]) -> str:
 def _depth_reason(trained: Collection[str], facts: RequestFacts) -> str:
     if facts.depth_given:
         return DEPTH_GIVEN
-    return _untrained("monocular_depth", trained) or facts.left_out("monocular_depth")
+    return _untrained("monocular_depth", trained) or facts.removed("monocular_depth")
 
 
 def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:
@@ -183,8 +183,8 @@ def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFa
         )
     if facts.fill == "none":
         return "--fill none"
-    if facts.left_out("vae", "ldrm"):
-        return LEFT_OUT
+    if facts.removed("vae", "ldrm"):
+        return REMOVED
     if not usable:
         return UNTRAINED_FILL
     wanted = facts.fill or config.default_fill

@@ -33,13 +33,13 @@ RADIUS_PX = 3.0
 class InpaintedViews(NoScene):
     """Renders of a scene that shows only what the image shows, with their holes filled."""
 
-    shown: Scene
+    visible_scene: Scene
     method: int
 
     def render(self, camera: Camera, time_s: float, frame: int) -> RenderedView:
         """The render; inpainted where less than half of a pixel is covered."""
         del frame
-        rendered = render(self.shown, camera, time_s, outputs=("rgb", "alpha"))
+        rendered = render(self.visible_scene, camera, time_s, outputs=("rgb", "alpha"))
         covered = rendered.alpha > MIN_COVERAGE
         rgb = rendered.rgb / rendered.alpha.clamp_min(MIN_COVERAGE)[..., None]
         return RenderedView(rgb=inpainted(rgb.clamp(0, 1), ~covered, self.method), depth=None)

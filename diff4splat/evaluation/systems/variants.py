@@ -12,7 +12,7 @@ from diff4splat.evaluation.systems.evaluated_system import Generator
 
 Network = Literal["depth", "motion", "text", "video", "ldrm", "deformation"]
 """Names of ablations, as on the command line."""
-LEFT_OUT: dict[Network, tuple[str, ...]] = {
+REMOVED_PARTS: dict[Network, tuple[str, ...]] = {
     "depth": ("monocular_depth",),
     "motion": ("motion_unet",),
     "text": ("text_encoder",),
@@ -47,7 +47,7 @@ def ablations(generator: Generator, networks: Iterable[Network]) -> tuple[Varian
     """One variant per network that is left out, in the order of the table."""
     wanted = set(networks)
     return tuple(
-        _variant(ABLATION_ROWS[name], generator, without=LEFT_OUT[name])
+        _variant(ABLATION_ROWS[name], generator, without=REMOVED_PARTS[name])
         for name in NETWORKS
         if name in wanted
     )

@@ -40,36 +40,36 @@ def read_tensors(file: Path) -> dict[str, Tensor]:
 
 
 def require_weights(
-    found: Mapping[str, Tensor], wanted: Mapping[str, tuple[int, ...]], what: str
+    tensors: Mapping[str, Tensor], wanted: Mapping[str, tuple[int, ...]], what: str
 ) -> dict[str, Tensor]:
     """The wanted weights in float32.
 
     Raises:
         CheckpointError: one is missing, has another shape or is not finite.
     """
-    refuse([key for key in wanted if key not in found], f"{what}: missing")
+    refuse([key for key in wanted if key not in tensors], f"{what}: missing")
     refuse(
         [
-            f"{key} {tuple(found[key].shape)} instead of {shape}"
+            f"{key} {tuple(tensors[key].shape)} instead of {shape}"
             for key, shape in wanted.items()
-            if tuple(found[key].shape) != shape
+            if tuple(tensors[key].shape) != shape
         ],
         f"{what}: wrong shape of",
     )
-    weights = {key: found[key].float() for key in wanted}
+    weights = {key: tensors[key].float() for key in wanted}
     refuse([key for key in wanted if not weights[key].isfinite().all()], f"{what}: not finite in")
     return weights
 
 
-def refuse(found: Sequence[str], what: str) -> None:
-    """Refuse weights for the reasons found, if any.
+def refuse(problems: Sequence[str], what: str) -> None:
+    """Refuse weights that have problems.
 
     Raises:
-        CheckpointError: there are reasons.
+        CheckpointError: there are problems.
     """
-    if found:
-        listed = ", ".join(found[:MAX_LISTED]) + (", …" if len(found) > MAX_LISTED else "")
-        raise CheckpointError(f"{what} {len(found)} ({listed}); choose files of that network")
+    if problems:
+        listed = ", ".join(problems[:MAX_LISTED]) + (", …" if len(problems) > MAX_LISTED else "")
+        raise CheckpointError(f"{what} {len(problems)} ({listed}); choose files of that network")
 
 
 def digest(weights: Mapping[str, Tensor]) -> str:
