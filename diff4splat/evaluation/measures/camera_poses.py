@@ -29,8 +29,6 @@ from diff4splat.scene.scene import Scene
 MIN_MATCHES = 12
 """Twice the six points that determine a pose, so that errors are detectable."""
 INLIER_PX = 1.5
-FARTHEST = 10.0
-"""Longest translation of a recovered pose, over the depth of its farthest point."""
 MIN_LENGTH = 0.1
 """Shortest translation that has a relative error, as a share of the longest of its path."""
 RANSAC_ROUNDS = 500
@@ -86,15 +84,16 @@ def path_errors(frames: list[RenderOutput], path: CameraPath) -> StepErrors:
 def _pose_errors(
     frames: list[RenderOutput], path: CameraPath, pairs: list[tuple[int, int]]
 ) -> StepErrors:
-    found, matches = [], []
+    found, matches, lengths = [], [], []
     for first, second in pairs:
         cameras = (path.cameras[first], path.cameras[second])
         step = recover_step(frames[first], frames[second], cameras)
         matches.append(0.0 if step is None else float(step.matches))
+        lengths.append(float((cameras[1].position - cameras[0].position).norm()))
         if step is not None:
-            length = float((cameras[1].position - cameras[0].position).norm())
-            found.append((_step_error(step.pose, cameras), length))
-    shortest = MIN_LENGTH * max((length for _, length in found), default=0.0)
+            found.append((_step_error(step.pose, cameras), lengths[-1]))
+    # Of the whole path: where a path returns, the length is rounding, and an error over it anything.
+    shortest = MIN_LENGTH * max(lengths)
     return StepErrors(
         translation=tuple(error.relative_translation for error, _ in found),
         rotation_deg=tuple(error.relative_rotation_deg for error, _ in found),
@@ -133,9 +132,6 @@ def recover_step(
     axis_angle, translation = cv2.solvePnPRefineLM(
         points[kept], pixels[kept], intrinsics, None, axis_angle, translation
     )
-    # Points on one line of sight determine no distance: least squares then leaves the scene.
-    if not float(np.linalg.norm(translation)) <= FARTHEST * float(points[kept, 2].max()):
-        return None
     rotation = torch.from_numpy(cv2.Rodrigues(axis_angle)[0])
     pose = rigid.from_parts(rotation, torch.from_numpy(translation[:, 0]))
     return RecoveredPose(pose=pose, matches=len(kept))
