@@ -92,7 +92,7 @@ def _pose_errors(
         lengths.append(float((cameras[1].position - cameras[0].position).norm()))
         if step is not None:
             found.append((_step_error(step.pose, cameras), lengths[-1]))
-    # Of the whole path: where a path returns, the length is rounding, and an error over it anything.
+    # Of the whole path: where it returns, a length is rounding, and an error over it anything.
     shortest = MIN_LENGTH * max(lengths)
     return StepErrors(
         translation=tuple(error.relative_translation for error, _ in found),
