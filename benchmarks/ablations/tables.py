@@ -9,7 +9,7 @@ from ablations.results import COLUMNS, KEYS, Row, difference, mean
 from ablations.variants import FULL, VARIANTS
 from diff4splat import __version__
 from diff4splat.evaluation.protocols.protocol import Protocol
-from diff4splat.evaluation.report.report_writer import DIRECTION_ARROWS, number
+from diff4splat.evaluation.report.cells import DIRECTION_ARROWS, number
 from diff4splat.evaluation.report.summary import Mean
 from diff4splat.progress.machine import this_machine
 from diff4splat.training.recipe.recipe import Recipe

@@ -8,13 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from diff4splat.cli.options.constraints import Number, OutFolder
+from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.models import FeatureFiles, ModelName
 from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
+    from diff4splat.evaluation.measures.videos import VideoNetworks
     from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
+    from diff4splat.evaluation.systems.variants import Variant
     from diff4splat.generation.settings import GenerationSettings
+
+Without = tuple[Literal["depth", "motion", "text", "video", "ldrm", "deformation", "all"], ...]
+"""Networks of ablations."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +40,14 @@ class Evaluate:
     """Measure only the first N clips; the table is then marked as a subset."""
     features: Annotated[str | None, FeatureFiles()] = None
     """LPIPS weights: `vgg:FILE` or `alex:BACKBONE,HEADS`. Default: a distance without weights."""
+    video_features: str | None = None
+    """I3D weights for FVD and KVD: `i3d:FILE`. Default: fixed features without weights."""
+    clip: Annotated[Path | None, InputPath(what="a folder of a CLIP", file=False)] = None
+    """Folder of a CLIP (Hugging Face layout) for the CLIP score and the consistency of frames."""
+    aesthetic: Annotated[
+        Path | None, InputPath(what="weights of an aesthetic predictor", folder=False)
+    ] = None
+    """Weights of an aesthetic predictor on that CLIP."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
     """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
     fill: Literal["none", "video"] | None = None
@@ -43,6 +56,11 @@ class Evaluate:
     """Where networks of generation run: cpu, cuda, or auto, which is cuda where there is one."""
     dtype: Literal["float32", "bfloat16", "float16"] = "float32"
     """What they compute in."""
+    without: Without = ()
+    """Also measure the same scenes without a network, in a row each: depth, motion, text, video,
+    ldrm (with the VAE), deformation; `all` is all of them."""
+    seeds: Annotated[int, Number(least=1, most=64)] = 1
+    """Generate each scene with this many seeds, and measure how much they differ."""
     fresh: bool = False
     """Ignore the results of an earlier run in the same folder."""
 
@@ -54,6 +72,13 @@ class Evaluate:
             raise ConfigError(
                 "--device, --dtype: expected without --task reconstruction, which runs on the CPU "
                 "in float32; leave them out"
+            )
+        if self.aesthetic is not None and self.clip is None:
+            raise ConfigError("--aesthetic: expected --clip, on which it works, got none; add it")
+        if self.task == "reconstruction" and self.without:
+            raise ConfigError(
+                "--without: expected without --task reconstruction, which has no networks to "
+                "choose from; leave it out"
             )
         load_protocol(self.protocol)
 
@@ -83,7 +108,10 @@ class Evaluate:
             task=self.task,
             system=system,
             features=features,
+            videos=self.video_networks(),
             captioner=grammar_caption,
+            variants=self.variants(system),
+            seeds=self.seeds,
         )
         precompile_renderer(single_gaussian("cpu"), phases)
         precompile_sources([protocol.source], phases)
@@ -121,6 +149,31 @@ class Evaluate:
             reconstruct=partial(reconstruct_clip, model),
             identity=model_identity(model, RECONSTRUCTION_PARTS, "reconstruction"),
         )
+
+    def video_networks(self) -> "VideoNetworks":
+        """What videos are measured with: fixed features, or networks whose weights are given."""
+        from diff4splat.evaluation.measures.videos import VideoNetworks
+        from diff4splat.metrics.features.aesthetic import read_aesthetic
+        from diff4splat.metrics.features.clip import read_clip
+        from diff4splat.metrics.features.fixed_features import FixedFeatures
+        from diff4splat.metrics.features.load_video import load_video_features
+
+        clip = None if self.clip is None else read_clip(self.clip)
+        judge = None if self.aesthetic is None else read_aesthetic(self.aesthetic, clip)
+        return VideoNetworks(
+            distribution=load_video_features(self.video_features),
+            frames=clip or FixedFeatures(),
+            text=clip,
+            aesthetic=judge,
+        )
+
+    def variants(self, system: "EvaluatedSystem") -> "tuple[Variant, ...]":
+        """The same system without the networks that ``--without`` names."""
+        from diff4splat.evaluation.systems.variants import NETWORKS, ablations
+
+        if not self.without:
+            return ()
+        return ablations(system, NETWORKS if "all" in self.without else self.without)
 
     def settings(self) -> "GenerationSettings":
         """Steps and filling as requested, the defaults elsewhere."""

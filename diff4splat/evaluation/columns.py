@@ -5,8 +5,11 @@ from typing import Literal
 
 from diff4splat.evaluation.protocols.protocol import Task
 
+Table = Literal["images", "hidden", "objects", "camera", "diversity", "videos"]
 SYSTEM = "system"
 """Row of the system in stored results."""
+TRUTH = "truth"
+"""Row of the true videos, with which distributions are compared."""
 PSNR_CAP_DB = 100.0
 """Value of identical images: an infinite PSNR would make every mean infinite."""
 
@@ -21,11 +24,47 @@ class Column:
     """``neither`` if the value depends on the clips alone."""
     meaning: str
     tasks: tuple[Task, ...] = ("generation", "reconstruction")
+    table: Table = "images"
+    """Part of the report that shows it."""
 
     @property
     def sign(self) -> int:
         """Factor that makes differences above 0 mean better; 0 for ``neither``."""
         return {"higher": 1, "lower": -1, "neither": 0}[self.better]
+
+
+HIDDEN_REGIONS = {
+    "hidden": "pixels with a true depth whose surface the input does not show",
+    "disoccluded": "hidden pixels that were behind what is static: the camera uncovers them",
+    "uncovered": "hidden pixels that were behind what moves",
+    "outside": "hidden pixels that were out of the frame",
+}
+"""What the input hides, and the three classes of it."""
+
+
+def _hidden_columns(region: str, what: str) -> tuple[Column, ...]:
+    share = Column(
+        key=f"{region}_share",
+        title=region,
+        better="neither",
+        table="hidden",
+        meaning=f"share of {what}; depends on the clips alone",
+    )
+    error = Column(
+        key=f"{region}_psnr",
+        title=f"PSNR {region} [dB]",
+        better="higher",
+        table="hidden",
+        meaning="PSNR over these pixels",
+    )
+    distance = Column(
+        key=f"{region}_perceptual",
+        title=f"perceptual {region}",
+        better="lower",
+        table="hidden",
+        meaning="perceptual distance where only these pixels differ from the true image",
+    )
+    return share, error, distance
 
 
 COLUMNS = (
@@ -46,18 +85,6 @@ COLUMNS = (
         title="seen",
         better="neither",
         meaning="fraction of such pixels in the target images; depends on the clips alone",
-    ),
-    Column(
-        key="hidden_psnr",
-        title="PSNR hidden [dB]",
-        better="higher",
-        meaning="PSNR over the other pixels that have a true depth: what the input hides",
-    ),
-    Column(
-        key="hidden_perceptual",
-        title="perceptual hidden",
-        better="lower",
-        meaning="perceptual distance where only the hidden pixels differ from the true image",
     ),
     Column(
         key="ssim",
@@ -112,19 +139,115 @@ COLUMNS = (
         key="pose_translation",
         title="RPE trans",
         better="lower",
+        table="camera",
         meaning="translation error of camera steps estimated from rendered images, scene units",
     ),
     Column(
         key="pose_rotation",
         title="RPE rot [°]",
         better="lower",
+        table="camera",
         meaning="rotation error of the same steps",
     ),
     Column(
         key="pose_failed",
         title="RPE failed",
         better="lower",
+        table="camera",
         meaning="fraction of steps whose estimation failed",
+    ),
+    Column(
+        key="object_iou",
+        title="overlap",
+        better="higher",
+        table="objects",
+        tasks=("generation", "reconstruction", "text"),
+        meaning="intersection over union of what moves in the first image with the objects that "
+        "are asked to",
+    ),
+    Column(
+        key="object_torn",
+        title="torn",
+        better="lower",
+        table="objects",
+        tasks=("generation", "reconstruction", "text"),
+        meaning="share of these objects that fall into parts, of those that move",
+    ),
+    Column(
+        key="text_object",
+        title="right object",
+        better="higher",
+        table="objects",
+        tasks=("text",),
+        meaning="share of captions whose named object moves farthest, where the image shows "
+        "several named objects",
+    ),
+    Column(
+        key="diversity",
+        title="spread over seeds",
+        better="neither",
+        table="diversity",
+        meaning="RMS difference of colours between two seeds, mean over pairs",
+    ),
+    Column(
+        key="diversity_hidden",
+        title="spread, hidden",
+        better="neither",
+        table="diversity",
+        meaning="the same over hidden pixels",
+    ),
+    Column(
+        key="frame_consistency",
+        title="consistency",
+        better="higher",
+        table="videos",
+        meaning="mean cosine of the features of every frame with those of the first frame and of "
+        "the frame before; 1 for an image that does not change",
+    ),
+    Column(
+        key="clip_score",
+        title="CLIP score",
+        better="higher",
+        table="videos",
+        meaning="100 times the cosine of frames and caption",
+    ),
+    Column(
+        key="aesthetic",
+        title="aesthetic",
+        better="higher",
+        table="videos",
+        meaning="score of an aesthetic predictor",
+    ),
+    *(column for item in HIDDEN_REGIONS.items() for column in _hidden_columns(*item)),
+    Column(
+        key="camera_translation",
+        title="path trans",
+        better="lower",
+        table="camera",
+        meaning="translation error of every frame of the path, recovered from its image and the "
+        "first one, over the length of the asked translation",
+    ),
+    Column(
+        key="camera_rotation",
+        title="path rot [°]",
+        better="lower",
+        table="camera",
+        meaning="rotation error of the same poses",
+    ),
+    Column(
+        key="camera_failed",
+        title="path failed",
+        better="lower",
+        table="camera",
+        meaning="fraction of these frames whose pose was not recovered",
+    ),
+    Column(
+        key="pose_matches",
+        title="matches",
+        better="higher",
+        table="camera",
+        meaning="points of a rendered image that are found in the next where its depth puts them "
+        "(SIFT)",
     ),
     Column(
         key="text_right",

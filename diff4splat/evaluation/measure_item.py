@@ -1,17 +1,22 @@
-"""Measure one item: the system and all baselines."""
+"""Measure one item: the system, all baselines, and variants of the system."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Bool
-from torch import Tensor
 
 from diff4splat.data.clip import Clip
-from diff4splat.errors import ConfigError, InputError
-from diff4splat.evaluation.columns import SYSTEM
+from diff4splat.errors import ConfigError
+from diff4splat.evaluation.columns import SYSTEM, TRUTH
+from diff4splat.evaluation.measure_rows import (
+    baseline_entries,
+    fill_entries,
+    prediction_entries,
+    prepare_item,
+    variant_entries,
+)
 from diff4splat.evaluation.measures.camera_poses import pose_entries
-from diff4splat.evaluation.measures.covisibility import covisible_masks
-from diff4splat.evaluation.measures.images import Entries, image_entries
+from diff4splat.evaluation.measures.diversity import diversity_entries
+from diff4splat.evaluation.measures.images import Entries, true_images
 from diff4splat.evaluation.measures.scenes import check_path, scene_entries
 from diff4splat.evaluation.measures.text import (
     Captioner,
@@ -19,14 +24,17 @@ from diff4splat.evaluation.measures.text import (
     text_entries,
     zero_motion_entries,
 )
-from diff4splat.evaluation.measures.tracks import TrackedPoints, track_entries, tracked_points
+from diff4splat.evaluation.measures.videos import VideoNetworks, video_entries
 from diff4splat.evaluation.protocols.protocol import Protocol, Task
 from diff4splat.evaluation.protocols.sample import EvalSample, clip_sha256, make_sample
-from diff4splat.evaluation.records import ItemResult, Score, Skip
-from diff4splat.evaluation.systems.baselines import BASELINES, ZERO_MOTION, make_baseline
-from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem
-from diff4splat.evaluation.systems.predictions import Prediction, ScenePrediction
+from diff4splat.evaluation.records import Embedding, ItemResult, Score, Skip
+from diff4splat.evaluation.systems.baselines import ZERO_MOTION
+from diff4splat.evaluation.systems.evaluated_system import EvaluatedSystem, Generator
+from diff4splat.evaluation.systems.predictions import ScenePrediction
+from diff4splat.evaluation.systems.variants import Variant
 from diff4splat.metrics.features.protocol import PerceptualFeatures
+
+NO_NETWORKS = VideoNetworks()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,8 +46,14 @@ class Setup:
     system: EvaluatedSystem
     features: PerceptualFeatures | None = None
     """None skips the perceptual column."""
+    videos: VideoNetworks = NO_NETWORKS
+    """What the target images are measured with as a video."""
     captioner: Captioner = plain_caption
     """Writes captions for the text task; its name is part of the run key."""
+    variants: tuple[Variant, ...] = ()
+    """The system with one thing changed: a row each, compared with the full system."""
+    seeds: int = 1
+    """Scenes per item whose spread is measured; 1 measures none."""
 
     def __post_init__(self) -> None:
         if self.task == "text" and not hasattr(self.system, "generate"):
@@ -47,15 +61,6 @@ class Setup:
                 "--task text: expected a system that reads captions, got one that does not; "
                 "choose another task"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Truth:
-    """Ground truth shared by all rows of an item."""
-
-    tracked: list[TrackedPoints]
-    covisible: Bool[Tensor, "p h w"] | None
-    """Pixels of the target images that are visible in the input."""
 
 
 @torch.no_grad()
@@ -74,34 +79,34 @@ def measure_item(item: int, clip: Clip, setup: Setup) -> ItemResult:
         clip_sha256=clip_sha256(clip),
         scores=tuple(entry for entry in entries if isinstance(entry, Score)),
         skips=tuple(entry for entry in entries if isinstance(entry, Skip)),
+        embeddings=tuple(entry for entry in entries if isinstance(entry, Embedding)),
     )
 
 
 def _measure_text(sample: EvalSample, setup: Setup) -> Entries:
     entries = text_entries(SYSTEM, sample, setup.system, setup.captioner, setup.protocol)
+    for variant in setup.variants:
+        if variant.same:
+            entries += [replace(e, row=variant.row) for e in entries if e.row == SYSTEM]
+            continue
+        system = variant.system
+        entries += text_entries(variant.row, sample, system, setup.captioner, setup.protocol)
     return entries + zero_motion_entries(ZERO_MOTION, sample)
 
 
 def _measure_images(sample: EvalSample, setup: Setup) -> Entries:
     scene = setup.system.predict(sample, setup.protocol.seed)
-    truth = _Truth(
-        tracked=tracked_points(sample, setup.protocol), covisible=covisible_masks(sample)
-    )
-    entries = _prediction_entries(SYSTEM, sample, ScenePrediction(scene), truth, setup)
-    entries += scene_entries(SYSTEM, sample, scene, setup.protocol)
+    item = prepare_item(sample, setup.protocol, setup.features, setup.videos)
+    truth = video_entries(TRUTH, sample, true_images(sample), setup.videos)
+    full = prediction_entries(SYSTEM, item, ScenePrediction(scene))
+    entries = truth + full + scene_entries(SYSTEM, sample, scene, setup.protocol)
     entries += pose_entries(SYSTEM, scene, check_path(setup.protocol.pose, sample))
-    for name in BASELINES:
-        try:
-            prediction = make_baseline(name, sample, setup.protocol.planes)
-        except InputError as error:
-            entries.append(Skip(row=name, key="psnr", why=str(error)))
-            continue
-        entries += _prediction_entries(name, sample, prediction, truth, setup)
+    later = range(setup.protocol.seed + 1, setup.protocol.seed + setup.seeds)
+    scenes = [scene, *(setup.system.predict(sample, seed) for seed in later)]
+    entries += diversity_entries(SYSTEM, sample, scenes, item.regions)
+    entries += baseline_entries(item)
+    if isinstance(setup.system, Generator):
+        entries += fill_entries(setup.system, item, full)
+    for variant in setup.variants:
+        entries += variant_entries(variant, item, full)
     return entries
-
-
-def _prediction_entries(
-    row: str, sample: EvalSample, prediction: Prediction, truth: _Truth, setup: Setup
-) -> Entries:
-    images = image_entries(row, sample, prediction, truth.covisible, setup.features)
-    return images + track_entries(row, sample, prediction, truth.tracked)

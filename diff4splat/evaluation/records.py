@@ -29,6 +29,14 @@ class Skip:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Embedding:
+    """Features of the video of one row, for distances of distributions."""
+
+    row: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ItemResult:
     """All results of one item."""
 
@@ -39,11 +47,16 @@ class ItemResult:
     """Hash of the images of the clip."""
     scores: tuple[Score, ...]
     skips: tuple[Skip, ...] = ()
+    embeddings: tuple[Embedding, ...] = ()
 
     def value(self, row: str, key: str) -> float | None:
         """One score; None if it is missing."""
         values = (s.value for s in self.scores if s.row == row and s.key == key)
         return next(values, None)
+
+    def embedding(self, row: str) -> tuple[float, ...] | None:
+        """Features of one row; None if it has no video."""
+        return next((e.values for e in self.embeddings if e.row == row), None)
 
     def to_json(self) -> dict[str, object]:
         """Plain values."""
@@ -80,11 +93,15 @@ def read_item(record: object, where: str) -> ItemResult:
     try:
         scores = tuple(Score(**{**s, "parts": tuple(s["parts"])}) for s in record["scores"])
         skips = tuple(Skip(**skip) for skip in record["skips"])
-        result = ItemResult(**{**record, "scores": scores, "skips": skips})
+        embeddings = tuple(
+            Embedding(row=e["row"], values=tuple(e["values"])) for e in record.get("embeddings", ())
+        )
+        parts = {"scores": scores, "skips": skips, "embeddings": embeddings}
+        result = ItemResult(**{**record, **parts})
         if not _is_plain(result):
             raise TypeError("values of other types")
         return result
-    except (KeyError, TypeError) as error:
+    except (AttributeError, KeyError, TypeError) as error:
         raise FileFormatError(
             f"{where}: expected results of an evaluation, got something else; run with --fresh"
         ) from error
@@ -95,7 +112,9 @@ def _is_plain(result: ItemResult) -> bool:
     texts = [result.clip, result.clip_sha256]
     texts += [text for score in result.scores for text in (score.row, score.key)]
     texts += [text for skip in result.skips for text in (skip.row, skip.key, skip.why)]
+    texts += [embedding.row for embedding in result.embeddings]
     numbers = [score.value for score in result.scores]
+    numbers += [value for embedding in result.embeddings for value in embedding.values]
     numbers += [part for score in result.scores for part in score.parts if part is not None]
     whole = type(result.item) is int and result.item >= 0
     finite = all(type(number) in (int, float) and abs(number) < math.inf for number in numbers)

@@ -183,6 +183,8 @@ class Diff4SplatPipeline:
             border_cells = self.model.config.refinement.border_cells
             infill = request.settings.subpixel_infill
             layered = build_layered_image(request.small, request.image, maps, border_cells, infill)
+            if not request.settings.extended_layers:
+                layered = layered.visible
             found = image_gaussians(layered, request.key_times_s)
         threshold_px, camera = request.settings.static_threshold_px, request.image.camera
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)

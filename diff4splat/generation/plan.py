@@ -26,7 +26,8 @@ RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
 """What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
 DEPTH_GIVEN = "depth is given"
-CHOICES = (WORSE_FILL, DEPTH_GIVEN)
+REMOVED = "it is left out on request"
+CHOICES = (WORSE_FILL, DEPTH_GIVEN, REMOVED)
 """Reasons that are choices: the part would give another scene."""
 NO_MOTION = "no prompt asks for motion"
 UNTRAINED_FILL = "the video model is not trained"
@@ -47,6 +48,12 @@ class RequestFacts:
     """Whether the request brings its depth along."""
     static_prompt: str = ""
     """Why a trained motion prior finds no motion in the prompt; empty where it may."""
+    without: tuple[str, ...] = ()
+    """Networks that stay out on request: ablations."""
+
+    def removed(self, *parts: str) -> str:
+        """The reason, if any of ``parts`` stays out on request; else empty."""
+        return REMOVED if set(parts) & set(self.without) else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,16 +115,21 @@ def plan_generation(
     reasons = {
         "monocular_depth": _depth_reason(trained, facts),
         "motion_unet": _untrained("motion_unet", trained)
+        or facts.removed("motion_unet", "text_encoder")
         or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
     fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:
-        reasons["deformation"] = _deformation_reason(config, trained, facts)
+        # Without the video model its condition is reconstructed as it is.
+        reasons["dit"] = facts.removed("dit")
+        reasons["deformation"] = facts.removed("deformation") or _deformation_reason(
+            config, trained, facts
+        )
     users = [part for part in ("motion_unet", "dit") if part in model_parts(config)]
     unread = "no network that runs takes text" if all(reasons[u] for u in users) else ""
-    asked = unread or _untrained("text_encoder", trained)
+    asked = unread or _untrained("text_encoder", trained) or facts.removed("text_encoder")
     # Models that pad prompts attend to the empty one where there is none.
     padded = bool(config.dit.padded_text_tokens) and not reasons["dit"]
     reasons["text_encoder"] = asked if facts.prompt or padded else "no prompt"
@@ -137,7 +149,9 @@ def _untrained(part: str, trained: Collection[str]) -> str:
 
 
 def _depth_reason(trained: Collection[str], facts: RequestFacts) -> str:
-    return DEPTH_GIVEN if facts.depth_given else _untrained("monocular_depth", trained)
+    if facts.depth_given:
+        return DEPTH_GIVEN
+    return _untrained("monocular_depth", trained) or facts.removed("monocular_depth")
 
 
 def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:
@@ -169,6 +183,8 @@ def _fill_reason(config: ModelConfig, trained: Collection[str], facts: RequestFa
         )
     if facts.fill == "none":
         return "--fill none"
+    if facts.removed("vae", "ldrm"):
+        return REMOVED
     if not usable:
         return UNTRAINED_FILL
     wanted = facts.fill or config.default_fill

@@ -16,6 +16,7 @@ from diff4splat.flow.levels import (
 from diff4splat.flow.solve import ADAPTIVE, FITTED, SolverPath, require_solver
 from diff4splat.generation.fitted_steps import find_steps
 from diff4splat.models.config.model import Fill
+from diff4splat.models.networks import PARTS
 from diff4splat.scene.edit import MIN_OPACITY
 
 MAX_STEPS = 1000
@@ -96,6 +97,10 @@ class GenerationSettings:
     """Times at which the scene keeps the image's motion; None is one per frame of the model."""
     fill_stride: int = 1
     """The video fill has a Gaussian for every n-th cell along both axes, n times as wide."""
+    extended_layers: bool = True
+    """False shows the image's own layers alone, and nothing where it hides what is there."""
+    without: tuple[str, ...] = ()
+    """Networks that stay out although the request needs them: ablations."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.steps <= MAX_STEPS:
@@ -114,6 +119,11 @@ class GenerationSettings:
         if not 1 <= self.fill_stride <= MAX_FILL_STRIDE:
             raise ConfigError(
                 f"fill_stride: expected 1 to {MAX_FILL_STRIDE}, got {self.fill_stride}"
+            )
+        unknown = sorted(set(self.without) - set(PARTS))
+        if unknown:
+            raise ConfigError(
+                f"without: expected names of networks ({', '.join(PARTS)}), got {unknown[0]!r}"
             )
         if not 0 <= self.min_opacity <= 1:
             raise ConfigError(f"--min-opacity: expected 0 to 1, got {self.min_opacity:g}")

@@ -55,12 +55,14 @@ CHOICES = {
         *("Fit.learn", "Fit.seed", "Fit.set", "Convert.time", "Convert.fps", "Convert.time_range"),
         *("Convert.target", "Convert.spz_version", "ExportOnnx.model", "ExportOnnx.shapes_only"),
         *("ExportOnnx.triton", "ExportOnnx.skip_parity", "Generate.video", "Generate.ply"),
+        "Generate.lora",
     ),
     WHERE: (
         *("Generate.images", "Generate.out", "Generate.depth", "Generate.device", "Render.scene"),
         *("Render.out", "Render.dataset", "Render.device", "Bake.scene", "Bake.out"),
         *("ExportHtml.scene", "ExportHtml.out", "ExportOnnx.out", "Fit.data", "Fit.out"),
         *("Fit.init", "Fit.renderer", "Fit.live", "Fit.restart", "Convert.scene", "Convert.out"),
+        "Fit.device",
     ),
     LIMITS: ("Generate.limits", "Render.limits", "Bake.limits", "ExportHtml.limits"),
 }

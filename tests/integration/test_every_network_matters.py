@@ -1,7 +1,7 @@
 """Every network that a generation runs changes the scene; the others are neither read nor run."""
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 
@@ -47,6 +47,7 @@ class Case:
     fill: Fill | None = None
     still: bool = False
     path: str = "left:0.3"
+    without: tuple[str, ...] = ()
 
     @property
     def idle(self) -> frozenset[str]:
@@ -88,7 +89,7 @@ def image() -> InputImage:
 
 
 def generate(model: Path | str, case: Case, log: RunLog | None = None) -> Scene:
-    settings = GenerationSettings(steps=2, fill=case.fill, still=case.still)
+    settings = GenerationSettings(steps=2, fill=case.fill, still=case.still, without=case.without)
     pipeline = Diff4SplatPipeline.from_pretrained(model)
     return pipeline(image(), case.path, case.prompt, settings=settings, log=log)
 
@@ -128,6 +129,16 @@ def test_noise_in_any_network_that_runs_changes_the_scene(
     changed = generate(folder, CASES[name])
     assert not same(changed, expected(CASES[name]))
     assert changed.provenance.weights_sha256 != expected(CASES[name]).provenance.weights_sha256
+
+
+@pytest.mark.parametrize("part", sorted(VIDEO | PRIORS))
+def test_any_network_can_be_left_out_and_changes_the_scene(part: str) -> None:
+    whole = CASES["video"]
+    log = RunLog()
+    scene = generate("small", replace(whole, without=(part,)), log)
+    assert part not in log.networks
+    assert not same(scene, expected(whole))
+    assert all(bool(value.isfinite().all()) for value in tensors(scene))
 
 
 @pytest.mark.parametrize(("name", "change"), UNREAD)

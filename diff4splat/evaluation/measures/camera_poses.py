@@ -4,6 +4,7 @@ Axes: ``h w`` pixels, ``t`` frames. SIFT points of one image, matched with cross
 unprojected with its rendered depth. The next camera pose is estimated from their pixels in the next
 image (PnP with RANSAC, then least squares). The paper compares the cameras of a scene with
 themselves, which gives 0 by construction; here images must have the parallax of their cameras.
+Steps compare neighbouring frames. The asked path compares every frame with the first one.
 """
 
 from dataclasses import dataclass
@@ -28,6 +29,8 @@ from diff4splat.scene.scene import Scene
 MIN_MATCHES = 12
 """Twice the six points that determine a pose, so that errors are detectable."""
 INLIER_PX = 1.5
+MIN_LENGTH = 0.1
+"""Shortest translation that has a relative error, as a share of the longest of its path."""
 RANSAC_ROUNDS = 500
 
 
@@ -39,41 +42,81 @@ class StepErrors:
     """Scene units."""
     rotation_deg: tuple[float, ...]
     failed: int
+    relative: tuple[float, ...] = ()
+    """Translation errors over the lengths of the true translations, where these are not short."""
+    matches: tuple[float, ...] = ()
+    """Points of the first image found where its depth puts them in the second; 0 if it failed."""
 
 
 def pose_entries(row: str, scene: Scene, path: CameraPath) -> Entries:
-    """Relative pose errors of a path, from its rendered images."""
-    errors = step_errors(scene, path)
-    failed = errors.failed / (len(path) - 1)
+    """Pose errors of a path, from its rendered images."""
+    frames = rendered_frames(scene, path)
+    steps, asked = step_errors(frames, path), path_errors(frames, path)
+    failed = [errors.failed / (len(path) - 1) for errors in (steps, asked)]
     return [
-        score(row, "pose_translation", errors.translation),
-        score(row, "pose_rotation", errors.rotation_deg),
-        Score(row=row, key="pose_failed", value=round(failed, 6)),
+        score(row, "pose_translation", steps.translation),
+        score(row, "pose_rotation", steps.rotation_deg),
+        Score(row=row, key="pose_failed", value=round(failed[0], 6)),
+        score(row, "camera_translation", asked.relative),
+        score(row, "camera_rotation", asked.rotation_deg),
+        Score(row=row, key="camera_failed", value=round(failed[1], 6)),
+        score(row, "pose_matches", steps.matches),
     ]
 
 
-def step_errors(scene: Scene, path: CameraPath) -> StepErrors:
-    """Compare every estimated step with the true one."""
-    translation, rotation, failed = [], [], 0
+def rendered_frames(scene: Scene, path: CameraPath) -> list[RenderOutput]:
+    """Images and depth along a path."""
     # Protocols measure larger images than the scene's own, without closing what lies between.
     settings = RenderSettings(dilation_px2=scene.dilation_px2)
-    frames = list(render_video(scene, path, outputs=("rgb", "depth"), settings=settings))
-    for index in range(len(path) - 1):
-        pair = (path.cameras[index], path.cameras[index + 1])
-        step = recover_step(frames[index], frames[index + 1], pair)
-        if step is None:
-            failed += 1
-            continue
-        error = _step_error(step, pair)
-        translation.append(error.relative_translation)
-        rotation.append(error.relative_rotation_deg)
-    return StepErrors(translation=tuple(translation), rotation_deg=tuple(rotation), failed=failed)
+    return list(render_video(scene, path, outputs=("rgb", "depth"), settings=settings))
+
+
+def step_errors(frames: list[RenderOutput], path: CameraPath) -> StepErrors:
+    """Compare every estimated step with the true one."""
+    return _pose_errors(frames, path, [(index, index + 1) for index in range(len(path) - 1)])
+
+
+def path_errors(frames: list[RenderOutput], path: CameraPath) -> StepErrors:
+    """Compare every estimated pose, relative to the first frame, with the asked one."""
+    return _pose_errors(frames, path, [(0, index) for index in range(1, len(path))])
+
+
+def _pose_errors(
+    frames: list[RenderOutput], path: CameraPath, pairs: list[tuple[int, int]]
+) -> StepErrors:
+    found, matches, lengths = [], [], []
+    for first, second in pairs:
+        cameras = (path.cameras[first], path.cameras[second])
+        step = recover_step(frames[first], frames[second], cameras)
+        matches.append(0.0 if step is None else float(step.matches))
+        lengths.append(float((cameras[1].position - cameras[0].position).norm()))
+        if step is not None:
+            found.append((_step_error(step.pose, cameras), lengths[-1]))
+    # Of the whole path: where it returns, a length is rounding, and an error over it anything.
+    shortest = MIN_LENGTH * max(lengths)
+    return StepErrors(
+        translation=tuple(error.relative_translation for error, _ in found),
+        rotation_deg=tuple(error.relative_rotation_deg for error, _ in found),
+        failed=len(pairs) - len(found),
+        relative=tuple(e.relative_translation / length for e, length in found if length > shortest),
+        matches=tuple(matches),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoveredPose:
+    """A pose from two images."""
+
+    pose: Float[Tensor, "4 4"]
+    """``second_from_first``"""
+    matches: int
+    """Points that agree with it."""
 
 
 def recover_step(
     first: RenderOutput, second: RenderOutput, cameras: tuple[Camera, Camera]
-) -> Float[Tensor, "4 4"] | None:
-    """Estimate ``second_from_first`` from two images and the first depth; None if it fails."""
+) -> RecoveredPose | None:
+    """Estimate a pose from two images and the first depth; None if it fails."""
     first_px, second_px = _matches(to_bytes(first.rgb), to_bytes(second.rgb))
     points, pixels = _unproject_matches(first.depth, cameras[0], first_px, second_px)
     if len(points) < MIN_MATCHES:
@@ -90,7 +133,8 @@ def recover_step(
         points[kept], pixels[kept], intrinsics, None, axis_angle, translation
     )
     rotation = torch.from_numpy(cv2.Rodrigues(axis_angle)[0])
-    return rigid.from_parts(rotation, torch.from_numpy(translation[:, 0]))
+    pose = rigid.from_parts(rotation, torch.from_numpy(translation[:, 0]))
+    return RecoveredPose(pose=pose, matches=len(kept))
 
 
 def _step_error(second_from_first: Float[Tensor, "4 4"], pair: tuple[Camera, Camera]) -> PathError:

@@ -43,12 +43,6 @@ def covisible_masks(sample: EvalSample) -> Bool[Tensor, "p h w"] | None:
     return torch.stack([_covisible_mask(sample, pair, is_static) for pair in sample.targets.pairs])
 
 
-def hidden_masks(sample: EvalSample, covisible: Bool[Tensor, "p h w"]) -> Bool[Tensor, "p h w"]:
-    """Pixels with a surface that is not covisible: disoccluded, uncovered, or out of the frame."""
-    depth = torch.stack([sample.true_depth(pair) for pair in sample.targets.pairs])
-    return valid_depth(depth) & ~covisible
-
-
 def static_instances(clip: Clip) -> Bool[Tensor, " 256"]:
     """Instance numbers that are static: those with tracked points, none of which moves."""
     is_static = torch.zeros(INSTANCE_COUNT, dtype=torch.bool)
@@ -74,7 +68,7 @@ def _covisible_mask(
     neighbours = sample.neighbouring_inputs(pair[1])
     covisible = torch.zeros_like(valid)
     for frame in sample.input_frames:
-        visible = _visible_in(sample.input_view, frame, points)
+        visible = visible_in(sample.input_view, frame, points)
         covisible |= visible if frame in neighbours else visible & static_mask
     # A pixel without depth has no surface point.
     return covisible & valid
@@ -87,7 +81,7 @@ def _static_pixels(view: View, frame: int, is_static: Bool[Tensor, " 256"]) -> B
     return is_static[view.instances[frame].long()]
 
 
-def _visible_in(view: View, frame: int, points: Float[Tensor, "h w 3"]) -> Bool[Tensor, "h w"]:
+def visible_in(view: View, frame: int, points: Float[Tensor, "h w 3"]) -> Bool[Tensor, "h w"]:
     """World points that are visible in a frame: in front, inside, and at the true depth."""
     height, width = view.cameras.size_px
     flat = project(view.cameras[frame].to(torch.float64), points.flatten(0, 1))

@@ -5,14 +5,13 @@ without true depth has no depth error: means skip and count both.
 """
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.evaluation.columns import PSNR_CAP_DB
-from diff4splat.evaluation.measures.covisibility import hidden_masks
-from diff4splat.evaluation.measures.regions import ComparedImages, region_entries
+from diff4splat.evaluation.measures.regions import ComparedImages, TrueRegions, region_entries
 from diff4splat.evaluation.protocols.sample import EvalSample
-from diff4splat.evaluation.records import Score, Skip, score
+from diff4splat.evaluation.records import Embedding, Score, Skip, score
 from diff4splat.evaluation.systems.predictions import Prediction, RenderedView
 from diff4splat.metrics.depth import depth_pearson, relative_error
 from diff4splat.metrics.features.protocol import PerceptualFeatures
@@ -21,28 +20,23 @@ from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.metrics.ssim import ssim
 from diff4splat.training.batches.normalise_scale import valid_depth
 
-Entries = list[Score | Skip]
+Entries = list[Score | Skip | Embedding]
 
 
 def image_entries(
     row: str,
     sample: EvalSample,
-    prediction: Prediction,
-    covisible: Bool[Tensor, "p h w"] | None,
+    views: list[RenderedView],
+    regions: TrueRegions | None,
     features: PerceptualFeatures | None,
 ) -> Entries:
-    """Colour and depth metrics of one prediction; empty if it has no images.
-
-    ``covisible`` marks the pixels that are visible in the input; None without true depth.
-    """
-    views = _rendered_views(sample, prediction)
+    """Colour and depth metrics of the target images of one prediction; empty without images."""
     if not views:
         return []
-    rgb = torch.stack([view.rgb.cpu().float() for view in views])
-    truth = torch.stack([sample.true_rgb(pair) for pair in sample.targets.pairs])
+    rgb, truth = stacked_rgb(views), true_images(sample)
     entries = [
         score(row, "psnr", psnr(rgb, truth).clamp_max(PSNR_CAP_DB).tolist()),
-        *region_entries(row, _compared(sample, rgb, truth, covisible), features),
+        *region_entries(row, ComparedImages(rgb=rgb, truth=truth, regions=regions), features),
         score(row, "ssim", ssim(rgb, truth).tolist()),
     ]
     if features is not None:
@@ -52,22 +46,23 @@ def image_entries(
     return entries + _depth_entries(row, sample, views)
 
 
-def _compared(
-    sample: EvalSample,
-    rgb: Float[Tensor, "p h w 3"],
-    truth: Float[Tensor, "p h w 3"],
-    covisible: Bool[Tensor, "p h w"] | None,
-) -> ComparedImages:
-    hidden = None if covisible is None else hidden_masks(sample, covisible)
-    return ComparedImages(rgb=rgb, truth=truth, covisible=covisible, hidden=hidden)
-
-
-def _rendered_views(sample: EvalSample, prediction: Prediction) -> list[RenderedView]:
+def target_views(sample: EvalSample, prediction: Prediction) -> list[RenderedView]:
+    """Every target image of a prediction; none if it has no images."""
     views = (
         prediction.render(sample.camera(pair), sample.time_s(pair[1]), pair[1])
         for pair in sample.targets.pairs
     )
     return [view for view in views if view is not None]
+
+
+def stacked_rgb(views: list[RenderedView]) -> Float[Tensor, "p h w 3"]:
+    """Colours of rendered views."""
+    return torch.stack([view.rgb.cpu().float() for view in views])
+
+
+def true_images(sample: EvalSample) -> Float[Tensor, "p h w 3"]:
+    """The target images."""
+    return torch.stack([sample.true_rgb(pair) for pair in sample.targets.pairs])
 
 
 def _depth_entries(row: str, sample: EvalSample, views: list[RenderedView]) -> Entries:

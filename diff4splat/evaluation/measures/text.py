@@ -16,6 +16,13 @@ from torch import Tensor
 
 from diff4splat.data.clip import Clip, ObjectNote
 from diff4splat.evaluation.measures.images import Entries
+from diff4splat.evaluation.measures.objects import (
+    image_displacement,
+    mask_iou,
+    moves_most,
+    object_masks,
+    torn_flags,
+)
 from diff4splat.evaluation.measures.scenes import moving_share
 from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.evaluation.protocols.sample import EvalSample
@@ -27,8 +34,8 @@ RequestedMotion = Literal["left", "right", "still"]
 Captioner = Callable[[Clip, ObjectNote, RequestedMotion], str]
 """Writes the caption of a clip with another motion of one object."""
 KEYS = ("text_right", "text_both", "text_still")
-MIN_AREA_FRACTION = 0.002
-"""Smallest image area of an evaluated object, as a fraction of the image."""
+OBJECT_KEYS = ("text_object", "object_iou", "object_torn")
+"""Measured where the first image shows a named object, too."""
 
 
 @runtime_checkable
@@ -59,11 +66,7 @@ def plain_caption(clip: Clip, note: ObjectNote, motion: RequestedMotion) -> str:
 
 def text_sample(sample: EvalSample) -> TextSample | None:
     """The largest named object of the first image, moving ones first; None if there is none."""
-    instances = sample.input_view.instances
-    if instances is None:
-        return None
-    masks = [(note, instances[0] == note.instance) for note in sample.clip.note.objects]
-    large = [(n, mask) for n, mask in masks if float(mask.double().mean()) >= MIN_AREA_FRACTION]
+    large = object_masks(sample)
     if not large:
         return None
     note, mask = max(large, key=lambda pair: (pair[0].motion != "", int(pair[1].sum())))
@@ -90,7 +93,30 @@ def text_entries(
     camera, times_s = sample.input_view.cameras[0], sample.clip.times_s
     still = 1 - moving_share(scenes["still"], camera, times_s, protocol.still_px)
     values = ((left + right) / 2, float(left and right), round(still, 6))
-    return [Score(row=row, key=key, value=v) for key, v in zip(KEYS, values, strict=True)]
+    scores: Entries = [
+        Score(row=row, key=key, value=v) for key, v in zip(KEYS, values, strict=True)
+    ]
+    moved = [scenes["left"], scenes["right"]]
+    return scores + _object_entries(row, target, moved, protocol.still_px)
+
+
+def _object_entries(row: str, target: TextSample, scenes: list[Scene], still_px: float) -> Entries:
+    """Whether the named object moves, alone and whole, in both scenes that ask it to."""
+    named = object_masks(target.sample)
+    masks, index = [mask for _, mask in named], [note for note, _ in named].index(target.note)
+    displacements = [image_displacement(scene, target.sample) for scene in scenes]
+    entries: Entries = []
+    if len(masks) < 2:
+        entries.append(Skip(row=row, key="text_object", why="the image shows one named object"))
+    else:
+        right = [moves_most(one, masks, index, still_px) for one in displacements]
+        entries.append(Score(row=row, key="text_object", value=sum(right) / 2))
+    overlaps = [mask_iou(one.norm(dim=-1) > still_px, target.mask) for one in displacements]
+    entries.append(Score(row=row, key="object_iou", value=round(sum(overlaps) / 2, 6)))
+    torn = [flag for one in displacements for flag in torn_flags(one, [target.mask], still_px)]
+    if not torn:
+        return [*entries, Skip(row=row, key="object_torn", why="the named object does not move")]
+    return [*entries, Score(row=row, key="object_torn", value=sum(torn) / len(torn))]
 
 
 def mean_rightward_flow(scene: Scene, target: TextSample) -> float:

@@ -16,7 +16,7 @@ from diff4splat.evaluation.measures.text import text_sample
 from diff4splat.evaluation.protocols.sample import EvalSample, make_sample
 from diff4splat.evaluation.protocols.sources import ClipSource
 from diff4splat.evaluation.records import ItemResult
-from diff4splat.evaluation.report.report_writer import number, system_name
+from diff4splat.evaluation.report.cells import number, system_name
 from diff4splat.evaluation.report.summary import Summary
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.evaluation.systems.baselines import make_baseline

@@ -8,15 +8,28 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from diff4splat import __version__
-from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, columns_of
+from diff4splat.evaluation.columns import PRIMARY, SYSTEM, Column, Table, columns_of
 from diff4splat.evaluation.records import ItemResult
-from diff4splat.evaluation.report.summary import Mean, Summary
+from diff4splat.evaluation.report.cells import head, line, mean_text, number, system_name, title
+from diff4splat.evaluation.report.comparison_tables import ablation_section, hidden_section
+from diff4splat.evaluation.report.distributions import (
+    distribution_distances,
+    distribution_section,
+)
+from diff4splat.evaluation.report.summary import Summary, row_names
 from diff4splat.evaluation.runner import Outcome
-from diff4splat.evaluation.systems.baselines import BASELINES
 from diff4splat.progress.machine import this_machine
 
+SECTIONS: dict[Table, str] = {
+    "objects": "Objects",
+    "camera": "Camera",
+    "diversity": "Spread over seeds",
+    "videos": "Videos",
+}
+"""Smaller tables and their titles."""
+VIDEO_COLUMNS = {"frames": "Consistency", "text": "CLIP score", "aesthetic": "Aesthetic"}
+"""Columns of videos by what their network is for."""
 FORMAT = "diff4splat-evaluation-results 1"
-DIRECTION_ARROWS = {"higher": "↑", "lower": "↓", "neither": ""}
 
 
 def to_json(outcome: Outcome, summary: Summary) -> str:
@@ -30,11 +43,14 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
         "protocol": setup.protocol.record() | {"digest": setup.protocol.digest},
         "subject": asdict(setup.system.identity),
         "features": None if setup.features is None else setup.features.name,
+        "videos": setup.videos.names,
         "asked": outcome.requested,
         "subset": outcome.is_subset,
         "columns": [asdict(column) for column in columns_of(setup.task)],
         "table": [asdict(cell) for cell in summary.cells],
         "differences": [asdict(difference) for difference in summary.differences],
+        "comparisons": [asdict(comparison) for comparison in summary.comparisons],
+        "distributions": [asdict(distance) for distance in distribution_distances(outcome)],
         "skipped": [asdict(skipped) for skipped in summary.skipped],
         "failures": [asdict(failure) for failure in outcome.failures],
         "items": [item.to_json() for item in outcome.items],
@@ -45,10 +61,17 @@ def to_json(outcome: Outcome, summary: Summary) -> str:
 def to_markdown(outcome: Outcome, summary: Summary) -> str:
     """Table, protocol, differences, and the best and worst items as Markdown."""
     columns = _filled(outcome, summary)
+    images = [column for column in columns if column.table == "images"]
+    names = {SYSTEM: f"**{system_name(outcome)}**"}
+    others = [_section(outcome, summary, columns, table) for table in SECTIONS]
     parts = [
         _head(outcome),
-        _table(outcome, summary, columns),
-        _differences(summary, columns),
+        _table(outcome, summary, images),
+        _differences(summary, images),
+        hidden_section(outcome, summary),
+        *others,
+        distribution_section(outcome, distribution_distances(outcome), names),
+        ablation_section(outcome, summary),
         _meanings(outcome, columns),
         _items(outcome, summary),
         _skipped(outcome, summary),
@@ -56,17 +79,32 @@ def to_markdown(outcome: Outcome, summary: Summary) -> str:
     return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
 
 
+def _section(
+    outcome: Outcome, summary: Summary, columns: Sequence[Column], table: Table
+) -> list[str]:
+    """One of the smaller tables; empty if nothing of it was measured."""
+    shown = [column for column in columns if column.table == table]
+    rows = _rows(outcome, summary, shown)
+    if not rows:
+        return []
+    return [f"## {SECTIONS[table]}", "", *head([title(column) for column in shown]), *rows]
+
+
+def _rows(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
+    """Rows that have a value in any column."""
+    lines = []
+    for row in row_names(outcome):
+        means = [summary.cell(row, column.key) for column in columns]
+        if any(mean is not None for mean in means):
+            name = f"**{system_name(outcome)}**" if row == SYSTEM else row
+            lines.append(line([name, *(mean_text(mean) for mean in means)]))
+    return lines
+
+
 def _filled(outcome: Outcome, summary: Summary) -> list[Column]:
     """Columns with at least one value."""
     keys = {cell.key for cell in summary.cells}
     return [column for column in columns_of(outcome.setup.task) if column.key in keys]
-
-
-def system_name(outcome: Outcome) -> str:
-    """Name of the system, marked if it is untrained."""
-    identity = outcome.setup.system.identity
-    marks = ["untrained"] if identity.untrained else []
-    return f"{identity.name} ({', '.join(marks)})" if marks else identity.name
 
 
 def _head(outcome: Outcome) -> list[str]:
@@ -84,6 +122,9 @@ def _head(outcome: Outcome) -> list[str]:
     ]
     if setup.features is not None and setup.task != "text":
         lines.append(f"Perceptual distance: {setup.features.name}.")
+    for purpose, name in VIDEO_COLUMNS.items():
+        if purpose in setup.videos.names and setup.task != "text":
+            lines.append(f"{name}: {setup.videos.names[purpose]}.")
     if identity.untrained:
         lines.append("**Untrained**: the weights are random; this row is a starting point.")
     return lines
@@ -91,19 +132,8 @@ def _head(outcome: Outcome) -> list[str]:
 
 def _table(outcome: Outcome, summary: Summary, columns: Sequence[Column]) -> list[str]:
     percent = f"{outcome.setup.protocol.bootstrap.coverage:.0%}"
-    titles = [f"{c.title} {DIRECTION_ARROWS[c.better]}".rstrip() for c in columns]
-    lines = [
-        f"Means over items with {percent} bootstrap intervals.",
-        "",
-        _line(["", *titles]),
-        _line(["---", *["---:"] * len(columns)]),
-    ]
-    for row in (SYSTEM, *BASELINES):
-        means = [summary.cell(row, column.key) for column in columns]
-        if any(mean is not None for mean in means):
-            name = f"**{system_name(outcome)}**" if row == SYSTEM else row
-            lines.append(_line([name, *(_mean(mean) for mean in means)]))
-    return lines
+    lines = [f"Means over items with {percent} bootstrap intervals.", ""]
+    return lines + head([title(column) for column in columns]) + _rows(outcome, summary, columns)
 
 
 def _differences(summary: Summary, columns: Sequence[Column]) -> list[str]:
@@ -113,12 +143,12 @@ def _differences(summary: Summary, columns: Sequence[Column]) -> list[str]:
     lines = [
         "Item by item against the best baseline of each measure; above 0 the system is better.",
         "",
-        _line(["measure", "best baseline", "difference", "items"]),
-        _line(["---", "---", "---:", "---:"]),
+        line(["measure", "best baseline", "difference", "items"]),
+        line(["---", "---", "---:", "---:"]),
     ]
     for column, row in rows:
-        cells = [column.title, row.baseline, _mean(row.mean, sign="+"), str(row.mean.count)]
-        lines.append(_line(cells))
+        cells = [column.title, row.baseline, mean_text(row.mean, sign="+"), str(row.mean.count)]
+        lines.append(line(cells))
     return lines
 
 
@@ -131,8 +161,8 @@ def _meanings(outcome: Outcome, columns: Sequence[Column]) -> list[str]:
 
 def _items(outcome: Outcome, summary: Summary) -> list[str]:
     key = PRIMARY[outcome.setup.task]
-    title = next(c.title for c in columns_of(outcome.setup.task) if c.key == key)
-    return [f"- {name}: {_item(item, key)} {title}" for name, item in summary.examples()]
+    ranked_by = next(c.title for c in columns_of(outcome.setup.task) if c.key == key)
+    return [f"- {name}: {_item(item, key)} {ranked_by}" for name, item in summary.examples()]
 
 
 def _item(item: ItemResult, key: str) -> str:
@@ -141,25 +171,10 @@ def _item(item: ItemResult, key: str) -> str:
 
 def _skipped(outcome: Outcome, summary: Summary) -> list[str]:
     failed = [f"- failed: item {f.item} ({f.clip}): {f.why}" for f in outcome.failures]
-    skipped = [
-        f"- not measured on {s.items} items: {s.key} of {s.row}: {s.why}" for s in summary.skipped
+    # What a clip lacks is missing in every row: once is enough.
+    of_system = {(s.key, s.why, s.items) for s in summary.skipped if s.row == SYSTEM}
+    told = [
+        s for s in summary.skipped if s.row == SYSTEM or (s.key, s.why, s.items) not in of_system
     ]
+    skipped = [f"- not measured on {s.items} items: {s.key} of {s.row}: {s.why}" for s in told]
     return failed + skipped
-
-
-def number(value: float, sign: str = "") -> str:
-    """Four significant digits, in fixed notation where possible."""
-    return f"{value:{sign}.4g}"
-
-
-def _mean(mean: Mean | None, sign: str = "") -> str:
-    if mean is None:
-        return ""
-    if mean.low is None or mean.high is None:
-        return number(mean.value, sign)
-    low, high = number(mean.low, sign), number(mean.high, sign)
-    return f"{number(mean.value, sign)} [{low}, {high}]"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"

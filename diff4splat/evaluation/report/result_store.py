@@ -28,7 +28,10 @@ def run_key(setup: Setup) -> str:
         "protocol": setup.protocol.digest,
         "task": setup.task,
         "subject": asdict(setup.system.identity),
+        "variants": [asdict(v.system.identity) | {"row": v.row} for v in setup.variants],
+        "seeds": setup.seeds,
         "features": None if setup.features is None else setup.features.name,
+        "videos": setup.videos.names,
         "captioner": setup.captioner.__qualname__,
         # Items that were stored before a column existed have no value for it.
         "columns": [column.key for column in columns_of(setup.task)],

@@ -14,7 +14,12 @@ from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.evaluation.records import ItemResult
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.evaluation.systems.baselines import BASELINES
+from diff4splat.evaluation.systems.inpainting import METHODS
+from diff4splat.evaluation.systems.variants import EXTENSION
 from diff4splat.metrics.bootstrap import bootstrap_interval
+
+FILLS = (EXTENSION, *METHODS)
+"""Baselines that fill what the image hides, on the depth and the motion of the system."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +44,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """Mean improvement over the best baseline of a column; above 0 is better."""
+    """Mean improvement of the system over another row in a column; above 0 is better."""
 
     key: str
     baseline: str
@@ -63,6 +68,8 @@ class Summary:
     cells: tuple[Cell, ...]
     differences: tuple[Difference, ...]
     skipped: tuple[Skipped, ...]
+    comparisons: tuple[Difference, ...]
+    """Of every row but the system's: how much better the system is."""
     ranking: tuple[ItemResult, ...]
     """Items sorted by the primary metric of the system, best first."""
 
@@ -73,6 +80,11 @@ class Summary:
     def difference(self, key: str) -> Difference | None:
         """The difference to the best baseline of a column, if any."""
         return next((d for d in self.differences if d.key == key), None)
+
+    def comparison(self, row: str, key: str) -> Mean | None:
+        """How much better the system is than a row; None without both values."""
+        rows = (d.mean for d in self.comparisons if (d.baseline, d.key) == (row, key))
+        return next(rows, None)
 
     def examples(self) -> tuple[tuple[str, ItemResult], ...]:
         """Best, median and worst item; fewer if there are fewer items."""
@@ -92,7 +104,7 @@ def summarize(outcome: Outcome) -> Summary:
     columns = columns_of(outcome.setup.task)
     cells = tuple(
         Cell(row=row, key=column.key, mean=interval(values, protocol))
-        for row in (SYSTEM, *BASELINES)
+        for row in row_names(outcome)
         for column in columns
         if (values := collect_values(items, row, column.key))
     )
@@ -100,9 +112,16 @@ def summarize(outcome: Outcome) -> Summary:
     return Summary(
         cells=cells,
         differences=tuple(row for row in differences if row is not None),
+        comparisons=_comparisons(outcome),
         skipped=_skipped(items),
         ranking=sort_items(items, next(c for c in columns if c.key == PRIMARY[outcome.setup.task])),
     )
+
+
+def row_names(outcome: Outcome) -> tuple[str, ...]:
+    """Rows of the table in order: system, baselines, fills, variants."""
+    variants = [variant.row for variant in outcome.setup.variants]
+    return (SYSTEM, *BASELINES, *FILLS, *variants)
 
 
 def collect_values(items: tuple[ItemResult, ...], row: str, key: str) -> list[float]:
@@ -135,7 +154,7 @@ def interval(values: list[float], protocol: Protocol) -> Mean:
 def _difference(
     items: tuple[ItemResult, ...], column: Column, cells: tuple[Cell, ...], protocol: Protocol
 ) -> Difference | None:
-    candidates = [cell for cell in cells if cell.key == column.key and cell.row != SYSTEM]
+    candidates = [cell for cell in cells if cell.key == column.key and cell.row in BASELINES]
     if not candidates or column.better == "neither":
         return None
     best = max(candidates, key=lambda cell: column.sign * cell.mean.value).row
@@ -143,6 +162,17 @@ def _difference(
     if not values:
         return None
     return Difference(key=column.key, baseline=best, mean=interval(values, protocol))
+
+
+def _comparisons(outcome: Outcome) -> tuple[Difference, ...]:
+    """The system against every other row, in all columns that have a direction."""
+    protocol, items = outcome.setup.protocol, outcome.items
+    return tuple(
+        Difference(key=column.key, baseline=row, mean=interval(values, protocol))
+        for row in row_names(outcome)[1:]
+        for column in columns_of(outcome.setup.task)
+        if column.better != "neither" and (values := paired_differences(items, column, row))
+    )
 
 
 def _skipped(items: tuple[ItemResult, ...]) -> tuple[Skipped, ...]:

@@ -29,7 +29,7 @@ BASELINES = (NEAREST, BEST_PLANE, MEAN_PLANE, ZERO_MOTION)
 """Rows of the table, in order."""
 
 
-class _NoScene:
+class NoScene:
     """No scene, and by default no motion."""
 
     @property
@@ -43,7 +43,7 @@ class _NoScene:
 
 
 @dataclass(frozen=True)
-class NearestFrame(_NoScene):
+class NearestFrame(NoScene):
     """The input image nearest in time, for any camera."""
 
     sample: EvalSample
@@ -55,7 +55,7 @@ class NearestFrame(_NoScene):
 
 
 @dataclass(frozen=True)
-class PlanarImage(_NoScene):
+class PlanarImage(NoScene):
     """The input image nearest in time, on a plane in front of its camera."""
 
     sample: EvalSample
@@ -76,7 +76,7 @@ class PlanarImage(_NoScene):
 
 
 @dataclass(frozen=True)
-class ZeroMotion(_NoScene):
+class ZeroMotion(NoScene):
     """Static points; no images."""
 
     def render(self, camera: Camera, time_s: float, frame: int) -> RenderedView | None:

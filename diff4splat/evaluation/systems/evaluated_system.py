@@ -61,10 +61,16 @@ class Generator:
     @property
     def identity(self) -> Identity:
         """Model and sampling settings."""
-        model = self.pipeline.model
-        facts = RequestFacts(prompt=True, fill=self.settings.fill, still=self.settings.still)
-        plan = plan_generation(model.config, model.trained, facts)
-        return model_identity(model, plan.parts, repr(self.settings))
+        return model_identity(self.pipeline.model, self.parts, repr(self.settings))
+
+    @property
+    def parts(self) -> frozenset[str]:
+        """Networks that run for an image with a prompt."""
+        model, settings = self.pipeline.model, self.settings
+        facts = RequestFacts(
+            prompt=True, fill=settings.fill, still=settings.still, without=settings.without
+        )
+        return plan_generation(model.config, model.trained, facts).parts
 
     def predict(self, sample: EvalSample, seed: int) -> Scene:
         """Generate along the cameras of the input view, with the clip's caption if any."""

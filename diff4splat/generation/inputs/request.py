@@ -93,6 +93,7 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         frames=config.frames,
         depth_given=user.depth is not None,
         static_prompt="" if user.prompt is None else why_static(user.prompt),
+        without=settings.without,
     )
     plan = plan_generation(config, model.trained, facts)
     image = image.to(device)

@@ -59,3 +59,8 @@ class LayeredImage:
     def visible_count(self) -> int:
         """Cells of the layers that the image shows."""
         return sum(int(layer.mask.sum()) for layer in self.layers if layer.in_image)
+
+    @property
+    def visible(self) -> "LayeredImage":
+        """The layers that the image shows, alone."""
+        return LayeredImage(layers=tuple(layer for layer in self.layers if layer.in_image))

@@ -137,6 +137,8 @@ def fill_hidden(model: Model, request: FillRequest, log: RunLog) -> VideoFill | 
 
 def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
     settings = request.settings
+    if model.networks.dit is None:
+        return _condition_as_video(model, request, log)
     rendered, conditions = _conditions(model, request, log)
     with log.phases.phase("sample video", settings.expected_steps) as advance:
         sample = sample_video(model.networks.dit, conditions, settings, request.seed, advance)
@@ -147,6 +149,16 @@ def _sample(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
         latent=sample.latent, first_frame=request.image, cameras=request.path.cameras
     )
     return _FilledVideo(latent=latent, rendered=rendered)
+
+
+def _condition_as_video(model: Model, request: FillRequest, log: RunLog) -> _FilledVideo:
+    """Without a video model: what it would be conditioned on, in place of what it would make."""
+    with log.phases.phase("render condition"):
+        rendered = render_layered_image(request.layered, request.path, request.key_times_s)
+    with log.phases.phase("encode image"):
+        latent = encode_condition(model, rendered).latent
+    video = VideoLatent(latent=latent, first_frame=request.image, cameras=request.path.cameras)
+    return _FilledVideo(latent=video, rendered=rendered)
 
 
 def _conditions(

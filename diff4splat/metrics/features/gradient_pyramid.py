@@ -62,17 +62,19 @@ class GradientPyramidFeatures:
             raise ShapeError(f"image: expected a pixel, got {tuple(image.shape)}")
         images = torch.cat(promote(image, reference))
         with no_autocast(images):
-            scales = _pyramid(_opponent(images))
+            scales = pyramid(opponent(images))
             structure = torch.stack([_structure(colors) for colors in scales]).mean(0)
         one, other = scales[-1].chunk(2)
         return structure + (one - other).square().mean((1, 2, 3))
 
 
-def _opponent(images: Tensor) -> Tensor:
+def opponent(images: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n 3 h w"]:
+    """Opponent colours."""
     return torch.einsum("oc,nchw->nohw", images.new_tensor(OPPONENT), images)
 
 
-def _pyramid(colors: Tensor) -> list[Tensor]:
+def pyramid(colors: Float[Tensor, "n c h w"]) -> list[Tensor]:
+    """The colours on all scales, the finest first."""
     scales = [colors]
     while len(scales) < SCALES and min(scales[-1].shape[-2:]) >= 2 * LEAST_PX:
         scales.append(_halved(scales[-1]))
@@ -81,12 +83,12 @@ def _pyramid(colors: Tensor) -> list[Tensor]:
 
 def _structure(colors: Tensor) -> Tensor:
     """Contrast-normalised difference of the first and second half of ``n``, mean over pixels."""
-    one, other = _edges(colors).chunk(2)
+    one, other = edges(colors).chunk(2)
     contrast = (one.square() + other.square()).sum(1) + LEAST_CONTRAST**2
     return ((one - other).square().sum(1) / contrast).mean((-2, -1))
 
 
-def _edges(colors: Tensor) -> Tensor:
+def edges(colors: Tensor) -> Tensor:
     """Pooled strength of edges, ``n (c o) h w`` at every second pixel."""
     filters = _derivatives(colors).repeat(colors.shape[1], 1, 1, 1)
     padded = torch.nn.functional.pad(colors, (1, 1, 1, 1), mode="replicate")

@@ -9,8 +9,6 @@ as the ``lpips`` package with ``normalize=True``; what it multiplies by during t
 is left out, because nothing is trained here.
 """
 
-import hashlib
-
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -18,6 +16,7 @@ from torch import Tensor
 from diff4splat.errors import ShapeError
 from diff4splat.metrics.checks import no_autocast, promote, require_alike
 from diff4splat.metrics.features.backbones import Backbone
+from diff4splat.metrics.features.tensor_files import digest
 
 SHIFT = (-0.030, -0.088, -0.188)
 SCALE = (0.458, 0.448, 0.450)
@@ -32,7 +31,7 @@ class Lpips:
         """``weights`` by the names of ``lpips_weights.expected_shapes``."""
         self._trunk = trunk
         self._weights = {key: value.detach() for key, value in weights.items()}
-        self._digest = _digest(self._weights)
+        self._digest = digest(self._weights)
 
     @property
     def name(self) -> str:
@@ -87,11 +86,3 @@ def _slice_distance(output: Tensor, head: Tensor) -> Tensor:
     norm = torch.linalg.vector_norm(output, dim=1, keepdim=True)
     image, reference = (output / (norm + NORM_FLOOR)).chunk(2)
     return ((image - reference).square() * head.flatten()[:, None, None]).sum(1).mean((-2, -1))
-
-
-def _digest(weights: dict[str, Tensor]) -> str:
-    digest = hashlib.sha256()
-    for key in sorted(weights):
-        digest.update(key.encode())
-        digest.update(weights[key].cpu().contiguous().numpy().data)
-    return digest.hexdigest()

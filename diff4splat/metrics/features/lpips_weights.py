@@ -14,16 +14,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import torch
-from safetensors.torch import load_file
 from torch import Tensor
 
-from diff4splat.errors import CheckpointError, FileFormatError
+from diff4splat.errors import CheckpointError
 from diff4splat.metrics.features.backbones import Backbone
 from diff4splat.metrics.features.lpips import SCALE, SHIFT
+from diff4splat.metrics.features.tensor_files import read_tensors, refuse, require_weights
 
 SCALING = {"scaling_layer.shift": SHIFT, "scaling_layer.scale": SCALE}
-MAX_LISTED = 4
-"""Names listed in an error message before "and so on"."""
 
 
 def read_lpips_weights(files: Sequence[Path], trunk: Backbone) -> dict[str, Tensor]:
@@ -35,24 +33,12 @@ def read_lpips_weights(files: Sequence[Path], trunk: Backbone) -> dict[str, Tens
     """
     found: dict[str, Tensor] = {}
     for file in files:
-        named = _by_package_names(_read(file), trunk)
-        _refuse(sorted(named.keys() & found.keys()), f"{file}: given by the other file too")
+        named = _by_package_names(read_tensors(file), trunk)
+        refuse(sorted(named.keys() & found.keys()), f"{file}: given by the other file too")
         found |= named
-    wanted = expected_shapes(trunk)
-    what = f"LPIPS-{trunk.name} weights"
-    _refuse([key for key in wanted if key not in found], f"{what}: missing")
-    _refuse([key for key in found if key not in wanted], f"{what}: unexpected")
-    _refuse(
-        [
-            f"{key} {tuple(found[key].shape)} instead of {shape}"
-            for key, shape in wanted.items()
-            if tuple(found[key].shape) != shape
-        ],
-        f"{what}: wrong shape of",
-    )
-    weights = {key: found[key].float() for key in wanted}
-    _refuse([key for key in wanted if not weights[key].isfinite().all()], f"{what}: not finite in")
-    return weights
+    wanted, what = expected_shapes(trunk), f"LPIPS-{trunk.name} weights"
+    refuse([key for key in found if key not in wanted], f"{what}: unexpected")
+    return require_weights(found, wanted, what)
 
 
 def expected_shapes(trunk: Backbone) -> dict[str, tuple[int, ...]]:
@@ -92,28 +78,3 @@ def _require_scaling(key: str, value: Tensor) -> None:
             f"LPIPS weights: expected {key} of version 0.1, {SCALING[key]}, got {got.tolist()}; "
             "use weights of version 0.1"
         )
-
-
-def _read(file: Path) -> dict[str, Tensor]:
-    if not file.is_file():
-        raise CheckpointError(f"{file}: expected a weight file, got none; check the path")
-    try:
-        if file.suffix == ".safetensors":
-            return load_file(file)
-        tensors = torch.load(file, map_location="cpu", weights_only=True)
-    except Exception as error:  # what damaged bytes make the two readers raise is not documented
-        raise FileFormatError(
-            f"{file}: expected safetensors or a torch file of tensors, got something else; "
-            "fetch the weights again"
-        ) from error
-    if not isinstance(tensors, dict) or not all(isinstance(v, Tensor) for v in tensors.values()):
-        raise FileFormatError(
-            f"{file}: expected tensors by name, got {type(tensors).__name__}; save a state_dict"
-        )
-    return tensors
-
-
-def _refuse(found: list[str], what: str) -> None:
-    if found:
-        listed = ", ".join(found[:MAX_LISTED]) + (", …" if len(found) > MAX_LISTED else "")
-        raise CheckpointError(f"{what} {len(found)} ({listed}); choose files of that network")

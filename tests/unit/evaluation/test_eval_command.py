@@ -11,6 +11,7 @@ from listed_clips import ListedClips
 from oracles_clips import make_clip
 from oracles_evaluation import FRAMES, tiny_protocol, wall_and_patch
 from PIL import Image
+from small_clip import write_clip
 
 from diff4splat.cli.evaluate import Evaluate
 from diff4splat.errors import ConfigError, InputError
@@ -73,7 +74,9 @@ def test_text_is_asked_of_the_same_model(protocol_file: Path, tmp_path: Path) ->
         model="test", protocol=str(protocol_file), task="text", out=tmp_path / "out", steps=2
     ).run()
     stored = json.loads((tmp_path / "out" / "results.json").read_text())
-    assert {cell["key"] for cell in stored["table"]} == {"text_right", "text_both", "text_still"}
+    keys = {"text_right", "text_both", "text_still"}
+    # A random model moves nothing, so nothing can be torn.
+    assert {cell["key"] for cell in stored["table"]} == keys | {"object_iou", "text_object"}
 
 
 def test_the_newest_protocol_of_all_tasks_is_the_default() -> None:
@@ -167,3 +170,42 @@ def test_settings_tell_results_apart() -> None:
     assert two == also_two
     assert two != three
     assert two.untrained
+
+
+def test_networks_of_a_user_and_rows_without_a_network(protocol_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    Evaluate(
+        model="test",
+        protocol=str(protocol_file),
+        out=out,
+        items=1,
+        steps=1,
+        seeds=2,
+        clip=write_clip(tmp_path / "clip"),
+        without=("video", "text"),
+    ).run()
+    stored = json.loads((out / "results.json").read_text())
+    assert stored["videos"]["text"].startswith("CLIP (weights")
+    keys = {cell["key"] for cell in stored["table"] if cell["row"] == "system"}
+    assert {"clip_score", "frame_consistency", "diversity", "hidden_psnr"} <= keys
+    page = (out / "results.md").read_text()
+    assert page.index("| without text encoder |") < page.index("| without video model |")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"aesthetic": Path("head.pt")}, "--aesthetic: expected --clip"),
+        ({"task": "reconstruction", "without": ("depth",)}, "--without: expected without --task"),
+    ],
+)
+def test_options_that_need_others_are_refused(change: dict[str, object], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        Evaluate(**change).check()
+
+
+def test_the_command_line_reads_the_options() -> None:
+    from diff4splat.cli.common.parser import parse
+
+    command = parse(["eval", "--without", "depth", "all", "--seeds", "3"])
+    assert (command.without, command.seeds) == (("depth", "all"), 3)

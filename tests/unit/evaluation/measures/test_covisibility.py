@@ -14,16 +14,21 @@ from diff4splat.evaluation.columns import SYSTEM
 from diff4splat.evaluation.measure_item import Setup, measure_item
 from diff4splat.evaluation.measures.covisibility import (
     covisible_masks,
-    hidden_masks,
     static_instances,
 )
-from diff4splat.evaluation.measures.regions import ComparedImages, masked_psnr, region_entries
+from diff4splat.evaluation.measures.hidden_classes import HiddenPixels, hidden_pixels
+from diff4splat.evaluation.measures.regions import (
+    KEYS,
+    ComparedImages,
+    TrueRegions,
+    masked_psnr,
+    region_entries,
+)
 from diff4splat.evaluation.protocols.protocol import Targets, Task
 from diff4splat.evaluation.protocols.sample import EvalSample, make_sample
+from diff4splat.evaluation.records import Score
 from diff4splat.evaluation.systems.baselines import BEST_PLANE, MEAN_PLANE, NEAREST, ZERO_MOTION
 from diff4splat.metrics.features.load import load_features
-
-KEYS = ("covisible_psnr", "covisible_share", "hidden_psnr")
 
 
 def made_case(task: Task, stride: int, **changes: object) -> EvalSample:
@@ -33,6 +38,18 @@ def made_case(task: Task, stride: int, **changes: object) -> EvalSample:
         reconstruction=Targets(pairs=((1, 1), (1, 3), (0, 3)), source_frames=(0,)),
     )
     return make_sample(replace(make_clip(FRAMES, SIZE, tracks=64), **changes), protocol, task)
+
+
+def disoccluded(covisible: torch.Tensor) -> TrueRegions:
+    """All that is not covisible is disoccluded."""
+    none = torch.zeros_like(covisible)
+    hidden = HiddenPixels(disoccluded=~covisible, uncovered=none, outside=none)
+    return TrueRegions(covisible=covisible, hidden=hidden)
+
+
+def region_values(images: ComparedImages) -> dict[str, float]:
+    entries = region_entries("row", images, load_features())
+    return {one.key: one.value for one in entries if isinstance(one, Score)}
 
 
 def count(case: EvalSample) -> int:
@@ -201,7 +218,7 @@ def test_clips_without_depth_are_counted() -> None:
 def test_hidden_pixels_have_a_surface_that_the_input_does_not_show() -> None:
     case = flat_case()
     covisible = covisible_masks(case)
-    hidden = hidden_masks(case, covisible)
+    hidden = hidden_pixels(case, covisible).regions["hidden"]
     assert not (hidden & covisible).any()
     depth = torch.stack([case.true_depth(pair) for pair in case.targets.pairs])
     assert torch.equal(hidden | covisible, depth > 0)
@@ -212,13 +229,12 @@ def test_errors_of_seen_pixels_leave_the_hidden_ones_alone() -> None:
     covisible = torch.zeros(1, 16, 16, dtype=torch.bool)
     covisible[:, :8] = True
     rgb = torch.where(covisible[..., None], 1 - truth, truth)
-    images = ComparedImages(rgb=rgb, truth=truth, covisible=covisible, hidden=~covisible)
-    features = load_features()
-    values = {one.key: one.value for one in region_entries("row", images, features)}
+    images = ComparedImages(rgb=rgb, truth=truth, regions=disoccluded(covisible))
+    values = region_values(images)
     assert values["hidden_psnr"] == 100
     assert values["hidden_perceptual"] == pytest.approx(0, abs=1e-6)
     assert values["covisible_psnr"] < 20
-    swapped = replace(images, covisible=~covisible, hidden=covisible)
-    values = {one.key: one.value for one in region_entries("row", swapped, features)}
+    swapped = replace(images, regions=disoccluded(~covisible))
+    values = region_values(swapped)
     assert values["hidden_psnr"] < 20 < values["covisible_psnr"]
     assert values["hidden_perceptual"] > 0.01

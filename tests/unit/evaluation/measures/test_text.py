@@ -101,3 +101,21 @@ def test_chance_is_a_half() -> None:
     assert float((sides == torch.tensor([True, False])).double().mean()) == pytest.approx(
         0.5, abs=0.06
     )
+
+
+def test_the_named_object_is_the_right_one_and_whole(clip: Clip) -> None:
+    result = measure(clip, obedient)
+    assert result.value(SYSTEM, "text_object") == 1
+    assert result.value(SYSTEM, "object_iou") > 0.75
+    assert result.value(SYSTEM, "object_torn") == 0
+    still = measure(clip, lambda caption: wall_and_patch())
+    assert still.value(SYSTEM, "text_object") == 0
+    assert still.value(SYSTEM, "object_iou") == 0
+    assert still.value(SYSTEM, "object_torn") is None
+
+
+def test_with_one_named_object_none_could_be_mistaken_for_it(clip: Clip) -> None:
+    one = replace(clip, note=replace(clip.note, objects=clip.note.objects[1:]))
+    result = measure(one, obedient)
+    assert result.value(SYSTEM, "text_object") is None
+    assert any(skip.key == "text_object" for skip in result.skips)
