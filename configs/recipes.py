@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
+from diff4splat.configs.distil import distil_recipe
 from diff4splat.configs.paper import paper_recipe
 from diff4splat.configs.small import small_recipe
 from diff4splat.configs.test import test_recipe
@@ -16,7 +17,7 @@ from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.recipe_json import recipe_from_json
 
 RECIPES: Mapping[str, Callable[[], Recipe]] = MappingProxyType(
-    {"test": test_recipe, "small": small_recipe, "paper": paper_recipe}
+    {"test": test_recipe, "small": small_recipe, "paper": paper_recipe, "distil": distil_recipe}
 )
 
 
@@ -89,7 +90,7 @@ def for_commercial_use(recipe: Recipe) -> Recipe:
 
 
 def with_latents(recipe: Recipe, stage: str, folders: Sequence[Path]) -> Recipe:
-    """The recipe whose video diffusion ``stage`` learns from folders of encoded clips."""
+    """The recipe whose video ``stage`` learns from folders of encoded clips."""
     before = recipe.stage(stage)
     share = before.data.sources[0].still_share
     sources = tuple(

@@ -19,8 +19,8 @@ class Train:
     """Train one stage; the same command resumes it. Works under torchrun."""
 
     config: str
-    """Recipe: test, small, paper, or backbone for an imported model (with --from-model); or a JSON
-    file such as the recipe.json of a run."""
+    """Recipe: test, small, paper, distil (few steps of the video model), or backbone for an
+    imported model (with --from-model); or a JSON file such as the recipe.json of a run."""
     stage: str
     """Stage to train, such as vae; another name is refused with a list of the recipe's stages."""
     out: OutFolder = Path("training-run")
@@ -33,8 +33,8 @@ class Train:
     latents: Annotated[
         tuple[Path, ...], InputPath(what="a folder of encoded clips", file=False)
     ] = ()
-    """Folders of encoded clips (prepare latents) for a video_diffusion stage, instead of
-    clips."""
+    """Folders of encoded clips (prepare latents) for a video_diffusion or video_distillation
+    stage, instead of clips."""
     set: Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction] = ()
     """Recipe overrides such as stages.vae.steps=2000 or trainer.parallel=ddp; repeatable."""
     from_model: Annotated[str | None, ModelName()] = None

@@ -11,6 +11,7 @@ StageKind = Literal[
     "monocular_depth",
     "motion_diffusion",
     "video_diffusion",
+    "video_distillation",
     "joint",
 ]
 KINDS: tuple[StageKind, ...] = get_args(StageKind)
@@ -23,5 +24,7 @@ RECONSTRUCTION_KINDS = (
     "joint",
 )
 """Kinds whose samples have depth at the key frames that carry Gaussians."""
-CAPTION_KINDS = ("video_diffusion", "motion_diffusion", "joint")
+CAPTION_KINDS = ("video_diffusion", "video_distillation", "motion_diffusion", "joint")
 """Kinds that read captions, which name left and right."""
+LATENT_KINDS = ("video_diffusion", "video_distillation")
+"""Kinds that can learn from encoded clips."""

@@ -4,10 +4,12 @@
 "ours" is a choice made here.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from diff4splat.training.recipe.checks import require
 from diff4splat.training.recipe.kinds import StageKind
 
 
@@ -94,6 +96,29 @@ class FlowLosses:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DistillationLosses:
+    """Of the velocity of a video model of few steps, and how its teacher integrates."""
+
+    flow: FlowLosses = field(default_factory=FlowLosses)
+    segments: int = 4
+    """Steps of the student: Euler with even levels."""
+    teacher_steps: int = 6
+    """Of the teacher in each of them, so that four take 24 (ours)."""
+    guidance: float = 1.0
+    """Of the teacher; the student has it built in and runs without. 1 is none."""
+    guidance_low: float = 0.2
+    """Level below which the teacher runs without."""
+
+    def __post_init__(self) -> None:
+        counts = {"segments": self.segments, "teacher_steps": self.teacher_steps}
+        for name, count in counts.items():
+            require(count >= 1, f"losses: {name}", "at least 1", count)
+        require(math.isfinite(self.guidance), "losses: guidance", "a number", self.guidance)
+        low = self.guidance_low
+        require(0 <= low <= 1, "losses: guidance_low", "0 to 1", low)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionDiffusionLosses:
     """Of the velocity and the mask of the motion network."""
 
@@ -122,6 +147,7 @@ Losses = (
     | DynamicLosses
     | DepthLosses
     | FlowLosses
+    | DistillationLosses
     | MotionDiffusionLosses
     | JointLosses
 )
@@ -135,6 +161,7 @@ LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
         "monocular_depth": DepthLosses,
         "motion_diffusion": MotionDiffusionLosses,
         "video_diffusion": FlowLosses,
+        "video_distillation": DistillationLosses,
         "joint": JointLosses,
     }
 )

@@ -6,7 +6,7 @@ All that recipes ask of a model configuration is here.
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.training.recipe.checks import require
-from diff4splat.training.recipe.kinds import CAPTION_KINDS, RECONSTRUCTION_KINDS
+from diff4splat.training.recipe.kinds import CAPTION_KINDS, LATENT_KINDS, RECONSTRUCTION_KINDS
 from diff4splat.training.recipe.stage import StageRecipe
 
 
@@ -34,8 +34,10 @@ def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
 def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     what, data = f"stage {stage.name}: data", stage.data
     encoded = any(source.kind == "latents" for source in data.sources)
-    fits = not encoded or stage.kind == "video_diffusion"
-    require(fits, f"{what}.sources", "latents for a video_diffusion stage alone", stage.kind)
+    fits = not encoded or stage.kind in LATENT_KINDS
+    require(
+        fits, f"{what}.sources", f"latents for {' or '.join(LATENT_KINDS)} stages alone", stage.kind
+    )
     fits = not (data.augment and stage.kind in CAPTION_KINDS)
     require(fits, f"{what}.augment", "false where captions are read", "true")
     fits = not data.keyframes_only or stage.kind == "motion_diffusion"

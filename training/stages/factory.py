@@ -14,6 +14,7 @@ from diff4splat.training.stages.kinds.posed_video_pretrain import PosedVideoPret
 from diff4splat.training.stages.kinds.static import StaticStage
 from diff4splat.training.stages.kinds.vae import AutoencoderStage
 from diff4splat.training.stages.kinds.video_diffusion import VideoDiffusionStage
+from diff4splat.training.stages.kinds.video_distillation import VideoDistillationStage
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan
 
 STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
@@ -26,6 +27,7 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "monocular_depth": MonocularDepthStage,
         "motion_diffusion": MotionDiffusionStage,
         "video_diffusion": VideoDiffusionStage,
+        "video_distillation": VideoDistillationStage,
         "joint": JointStage,
     }
 )

@@ -76,7 +76,7 @@ class VideoFlow:
                 LossTerm(
                     name="flow",
                     weight=losses.flow,
-                    compute=lambda: self._error(velocity, video, weights, self._cells(batch)),
+                    compute=lambda: self.error(velocity, video, weights, self.cells(batch)),
                 )
             ]
         )
@@ -103,7 +103,7 @@ class VideoFlow:
         cells: Float[Tensor, "b t h w"] | None = None,
     ) -> Float[Tensor, " b"]:
         """The mean error of predicted velocities."""
-        errors = [self._error(velocity, video, cells=cells) for velocity, video in pairs]
+        errors = [self.error(velocity, video, cells=cells) for velocity, video in pairs]
         return torch.stack(errors).mean(0)
 
     def noisy(self, batch: LatentBatch) -> NoisyVideo:
@@ -145,13 +145,14 @@ class VideoFlow:
         rays = camera_rays(batch.cameras)
         return self._networks.dit(latent, levels, rays, *text, batch.render_condition)
 
-    def _error(
+    def error(
         self,
         velocity: Tensor,
         video: NoisyVideo,
         weights: Float[Tensor, " b"] | None = None,
         cells: Float[Tensor, "b t h w"] | None = None,
     ) -> Float[Tensor, " b"]:
+        """Squared error of a velocity, with the weights of channels, and of cells where given."""
         return flow_matching(
             velocity,
             video.clean,
@@ -162,7 +163,7 @@ class VideoFlow:
             cells=cells,
         )
 
-    def _cells(self, batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:
+    def cells(self, batch: LatentBatch) -> Float[Tensor, "b t h w"] | None:
         """Weight of each latent cell: hidden ones count more."""
         share, weight = hidden_share(batch), self._losses.hidden_weight
         return None if share is None or weight == 1 else 1 + (weight - 1) * share

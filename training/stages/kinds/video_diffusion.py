@@ -17,6 +17,7 @@ from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.latents.video_latents import encode_batch, image_video
+from diff4splat.training.recipe.losses import FlowLosses
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import Row, preview
 from diff4splat.training.stages.video_flow import EVAL_LEVELS, VideoFlow, condition_parts
@@ -35,7 +36,11 @@ class VideoDiffusionStage(ModelStage):
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)
         self._model = Model(config=plan.model, networks=networks)
-        self.flow = VideoFlow(networks, plan, plan.recipe.losses)
+        self.flow = VideoFlow(networks, plan, self.flow_losses(plan))
+
+    def flow_losses(self, plan: StagePlan) -> FlowLosses:
+        """Weights of the error of a velocity."""
+        return plan.recipe.losses
 
     def forward(self, batch: ClipBatch | LatentBatch) -> Terms:
         """The term ``flow``."""

@@ -24,8 +24,10 @@ def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     # Small has one size, so one static stage. The motion network reads the text encoder that
     # the stage before it trains.
     small = ["posed_video_pretrain", "static-low", "motion", "dynamic", "monocular_depth"]
-    middle = small if name == "small" else ["static-low", "static-high", "dynamic"]
-    last = ["motion_diffusion"] if name == "small" else ["joint"]
+    is_small = name in ("small", "distil")
+    middle = small if is_small else ["static-low", "static-high", "dynamic"]
+    last = ["motion_diffusion"] if is_small else ["joint"]
+    last += ["video_distillation"] if name == "distil" else []
     assert names == ["vae", *middle, "video_diffusion", *last]
 
 
