@@ -54,11 +54,18 @@ SMALL_BUILDS_ON = {
     "monocular_depth": {},
     "video_diffusion": {"vae": "vae", "monocular_depth": "monocular_depth"},
     "motion_diffusion": {"text_encoder": "video_diffusion"},
+    "video_distillation": {
+        "vae": "vae",
+        "monocular_depth": "monocular_depth",
+        "text_encoder": "video_diffusion",
+        "dit": "video_diffusion",
+    },
 }
 """What differs in ``small``: LDRM starts without an autoencoder, and has motion and priors."""
 SMALL_CONTINUES = {
     "static-low": "posed_video_pretrain",
     "dynamic": "motion",
+    "video_distillation": "video_diffusion",
 }
 
 

@@ -62,7 +62,7 @@ def test_latents_take_the_place_of_clips(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("stage", ["vae", "dynamic", "joint"])
 def test_only_generators_read_latents(stage: str, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="expected latents for a video_diffusion stage alone"):
+    with pytest.raises(ConfigError, match="latents for video_diffusion or video_distillation"):
         with_latents(recipe_by_name("test"), stage, [tmp_path])
 
 
