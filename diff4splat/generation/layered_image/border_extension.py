@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.generation.layered_image.border_colors import continue_colors
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera, stack_cameras
@@ -34,11 +35,12 @@ def border_extension(
     grid = extended_camera(camera, margin)
     distance = distance_from_depth(camera, depth)
     maps = torch.cat([rgb.movedim(-1, 0), distance[None]])[None]
-    cells = replicate_border(torch.nn.functional.avg_pool2d(maps, CELL_PX), margin)[0]
+    cells = torch.nn.functional.avg_pool2d(maps, CELL_PX)
+    extended = replicate_border(cells[:, 3:], margin)[0, 0]
     return ImageLayer(
         camera=grid,
-        rgb=cells[:3].movedim(0, -1),
-        depth=depth_from_distance(stack_cameras([grid]), BEHIND * cells[3][None])[0],
+        rgb=continue_colors(cells[0, :3].movedim(0, -1), margin),
+        depth=depth_from_distance(stack_cameras([grid]), BEHIND * extended[None])[0],
         mask=is_drawable(grid),
         opacity=OPACITY,
         footprint_px=FOOTPRINT_CELLS,

@@ -67,13 +67,14 @@ def test_a_cell_has_the_mean_colour_and_distance_of_its_pixels() -> None:
             torch.testing.assert_close(cells.depth[own], wanted)
 
 
-def test_beyond_the_border_the_nearest_cell_continues() -> None:
-    rgb = random_rgb(*SIZE_PX)
-    cells = extension(rgb, torch.full(SIZE_PX, 4.0))
+def test_beyond_the_border_the_distance_of_the_nearest_cell_continues() -> None:
+    rgb, depth = random_rgb(*SIZE_PX), random_depth(*SIZE_PX, (3.0, 30.0))
+    cells = border_extension(rgb, depth, input_image(rgb).camera, MARGIN)
+    distance = cells.depth * camera_rays(cells.camera).norm(dim=-1)
     for row in range(GRID[0]):
         for column in range(GRID[1]):
             inner = (min(max(row, MARGIN), 3 + MARGIN), min(max(column, MARGIN), 5 + MARGIN))
-            torch.testing.assert_close(cells.rgb[row, column], cells.rgb[inner])
+            torch.testing.assert_close(distance[row, column], distance[inner])
 
 
 def test_its_camera_extends_the_view_by_whole_cells() -> None:
