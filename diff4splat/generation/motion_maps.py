@@ -39,15 +39,27 @@ def with_displacement(
     return replace(maps, displacement=small, fine=replace(fine, displacement=at_fine))
 
 
+def with_majority_displacement(
+    maps: ImageMaps, depth: Float[Tensor, "y x"], displacement: Float[Tensor, "t y x 3"]
+) -> ImageMaps:
+    """``maps`` whose pixels move as most of their pixels do in an enlarged copy of that depth."""
+    found = reduced_displacement(displacement, depth, maps.depth, least_share=0.5)
+    return replace(maps, displacement=found) if found.any() else maps
+
+
 def reduced_displacement(
     displacement: Float[Tensor, "t y x 3"],
     depth: Float[Tensor, "y x"],
     small_depth: Float[Tensor, "h w"],
+    least_share: float = 0.0,
 ) -> Float[Tensor, "t h w 3"]:
-    """Of a smaller copy: a cell moves, as far in the image, as those of its pixels that move."""
+    """Of a smaller copy: a cell moves, as far in the image, as those of its pixels that move.
+
+    It is static where less than ``least_share`` of them move.
+    """
     factor = depth.shape[0] // small_depth.shape[0]
     relative = (displacement / depth[..., None]).movedim(-1, 1)
     moving = displacement.any(-1).any(0).to(depth)[None, None]
     share = torch.nn.functional.avg_pool2d(moving, factor)
     means = torch.nn.functional.avg_pool2d(relative, factor) / share.clamp_min(0.5 / factor**2)
-    return means.movedim(1, -1) * small_depth[..., None]
+    return (means * (share >= least_share)).movedim(1, -1) * small_depth[..., None]

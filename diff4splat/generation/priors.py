@@ -13,10 +13,14 @@ from torch import Tensor
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.given_depth.source import DepthSource
-from diff4splat.generation.inputs.input_image import InputImage, downsample
+from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
 from diff4splat.generation.layered_image.build import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
-from diff4splat.generation.motion_maps import depth_at, with_displacement
+from diff4splat.generation.motion_maps import (
+    depth_at,
+    with_displacement,
+    with_majority_displacement,
+)
 from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import why_unguided
 from diff4splat.models.hub.model import Model
@@ -43,13 +47,17 @@ def image_maps(
     maps = ImageMaps(depth=depth, displacement=None, fine=fine)
     if model.networks.motion_unet is None or frames < 2:
         return maps
-    image = larger_copy(images, model.config.motion_unet.photo_scale)
+    image = motion_copy(images, model.config.motion_unet.input_scale)
     motion = _sample_motion(model, image, frames, request, log)
     mask = motion.mask(request.settings.motion.threshold)
     mean = motion.field if request.settings.motion.steps == 1 else motion.mean_field
     depth = depth_at(maps, images.small, image)
     displacement = rigid_component_offsets(motion.field, mask, depth, mean)
-    return with_displacement(maps, image, depth, displacement) if displacement.any() else maps
+    if not displacement.any():
+        return maps
+    if image.reduction < images.small.reduction or image is images.small:
+        return with_displacement(maps, image, depth, displacement)
+    return with_majority_displacement(maps, depth, displacement)
 
 
 def larger_copy(images: Copies, scale: int) -> InputImage:
@@ -58,6 +66,12 @@ def larger_copy(images: Copies, scale: int) -> InputImage:
     if scale == 1 or reduction % scale:
         return images.small
     return downsample(images.image, reduction // scale)
+
+
+def motion_copy(images: Copies, scale: int) -> InputImage:
+    """The copy with ``scale`` times the small side: of the photograph's pixels, or enlarged."""
+    larger = larger_copy(images, scale)
+    return larger if scale == 1 or larger is not images.small else enlarged(larger, scale)
 
 
 def _depths(

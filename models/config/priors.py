@@ -34,11 +34,12 @@ class MotionUNetConfig:
     """Of text cross-attention; twice as many must divide the width."""
     mask_refiner_width: int = 0
     """Channels of the network that refines the mask at pixels (ADR 25); 0 leaves it out."""
-    photo_scale: int = 1
-    """Sides of the copy of a photograph that it sees, against the copy of the other networks."""
+    input_scale: int = 1
+    """Sides of the copy that it sees, against that of the other networks: with the photograph's own
+    pixels, or enlarged."""
 
     def __post_init__(self) -> None:
-        require_counts(self, "heads", "photo_scale")
+        require_counts(self, "heads", "input_scale")
         for name in ("width", "mask_refiner_width"):
             require_optional_width(self, name)
         fits = self.width % (2 * self.heads) == 0

@@ -63,7 +63,7 @@ def small_size() -> ModelConfig:
         ),
         activation=ActivationConfig(),
         refinement=RefinementConfig(channels=48),
-        monocular_depth=MonocularDepthConfig(channels=32),
+        monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32),
         default_fill="none",
     )

@@ -55,7 +55,8 @@ class DataSettings:
     """Random crop (height, width) of images of ``size_px``; 0 takes the whole image."""
     view_sides_px: tuple[int, ...] = ()
     """Sides, drawn from at each step. Stage ``monocular_depth``: random views (window, zoom, roll,
-    noise) of every image. Stage ``motion_diffusion``: widths to which images are reduced."""
+    noise) of every image. Stage ``motion_diffusion``: widths to which images are reduced and
+    enlarged again."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4

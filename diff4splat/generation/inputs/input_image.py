@@ -74,6 +74,16 @@ def downsample(image: InputImage, factor: int) -> InputImage:
     return replace(image, rgb=rgb.movedim(0, -1), camera=camera, reduction=reduction)
 
 
+def enlarged(image: InputImage, factor: int) -> InputImage:
+    """The image with ``factor`` times the sides, interpolated: networks of larger images see it."""
+    rgb = torch.nn.functional.interpolate(
+        image.rgb.movedim(-1, 0)[None], scale_factor=factor, mode="bicubic", align_corners=False
+    )[0]
+    height, width = image.camera.size_px
+    camera = image.camera.resized((height * factor, width * factor))
+    return replace(image, rgb=rgb.clamp(0, 1).movedim(0, -1), camera=camera)
+
+
 def load_image(
     file: Path,
     side_px: int,

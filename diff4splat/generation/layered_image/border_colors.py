@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 DECAY = 5
-"""Measured in docs/log/generation.md: less takes over far colours, more leaves streaks."""
+"""Less takes over far colours, more leaves streaks (docs/log/appearance-and-depth.md)."""
 
 
 def continue_colors(rgb: Float[Tensor, "h w 3"], margin: int) -> Float[Tensor, "hs ws 3"]:

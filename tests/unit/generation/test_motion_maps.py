@@ -8,7 +8,12 @@ from image_layers import input_image, random_rgb
 
 from diff4splat.generation.inputs.input_image import downsample
 from diff4splat.generation.layered_image.build import FineMaps, ImageMaps, pixel_layer
-from diff4splat.generation.motion_maps import depth_at, reduced_displacement, with_displacement
+from diff4splat.generation.motion_maps import (
+    depth_at,
+    reduced_displacement,
+    with_displacement,
+    with_majority_displacement,
+)
 
 SIDE_PX = 16
 PHOTO = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
@@ -31,6 +36,19 @@ def test_a_cell_moves_as_far_as_those_of_its_pixels_that_move() -> None:
     small = reduced_displacement(displacement, depth, torch.full((SIDE_PX, SIDE_PX), 8.0))
     assert int(small.any(-1).any(0).sum()) == 1
     torch.testing.assert_close(small[1, 1, 2], torch.tensor([1.0, 0.0, -0.5]))
+
+
+@pytest.mark.parametrize(("moving", "moves"), [(1, False), (2, True), (4, True)])
+def test_the_majority_of_an_enlarged_copy_decides(moving: int, moves: bool) -> None:
+    depth, displacement = one_pixel()
+    for pixel in range(moving):
+        displacement[1, 2 + pixel // 2, 4 + pixel % 2] = torch.tensor([0.5, 0.0, -0.25])
+    maps = with_majority_displacement(plane_maps(8.0), depth, displacement)
+    if not moves:
+        assert maps.displacement is None
+        return
+    assert int(maps.displacement.any(-1).any(0).sum()) == 1
+    torch.testing.assert_close(maps.displacement[1, 1, 2], torch.tensor([1.0, 0.0, -0.5]))
 
 
 def test_pixels_move_as_the_larger_copy_does() -> None:

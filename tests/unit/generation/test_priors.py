@@ -12,7 +12,7 @@ from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
 from diff4splat.generation.motion_sampling import MotionRequest
-from diff4splat.generation.priors import Copies, image_depth, image_maps
+from diff4splat.generation.priors import Copies, image_depth, image_maps, motion_copy
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
@@ -95,7 +95,7 @@ def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
 @torch.no_grad()
 def test_the_motion_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     model = moves_right(model_of("motion_unet"), 0.25)
-    priors = replace(model.config.motion_unet, photo_scale=2)
+    priors = replace(model.config.motion_unet, input_scale=2)
     model = replace(model, config=replace(model.config, motion_unet=priors))
     photo = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
     request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
@@ -106,8 +106,24 @@ def test_the_motion_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     for found in (maps.displacement, maps.fine.displacement):
         expected = torch.full_like(found[1, ..., 0], 0.25 * PLANE_DEPTH)
         torch.testing.assert_close(found[1, ..., 0], expected)
-    whole = Copies(image=copies.small, small=replace(copies.small, reduction=1))
-    assert image_maps(model, whole, 2, request, RunLog()).fine is None
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("reduction", [1, 3])
+def test_the_motion_prior_sees_an_enlarged_copy_of_an_image_without_more_pixels(
+    reduction: int,
+) -> None:
+    model = moves_right(model_of("motion_unet"), 0.25)
+    priors = replace(model.config.motion_unet, input_scale=2)
+    model = replace(model, config=replace(model.config, motion_unet=priors))
+    photo = input_image(random_rgb(reduction * SIDE_PX, reduction * SIDE_PX))
+    copies = Copies(image=photo, small=downsample(photo, reduction))
+    assert motion_copy(copies, 2).rgb.shape == (2 * SIDE_PX, 2 * SIDE_PX, 3)
+    request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
+    maps = image_maps(model, copies, 2, request, RunLog())
+    assert maps.fine is None and maps.displacement.shape == (2, SIDE_PX, SIDE_PX, 3)
+    expected = torch.full((SIDE_PX, SIDE_PX), 0.25 * PLANE_DEPTH)
+    torch.testing.assert_close(maps.displacement[1, ..., 0], expected)
 
 
 def test_displacement_is_a_share_of_depth_from_zero_on() -> None:

@@ -17,8 +17,8 @@ from diff4splat.flow.path import add_noise, velocity_from_clean
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.batches.coarse_images import with_coarse_images
 from diff4splat.training.batches.random_flip import flip_samples
-from diff4splat.training.batches.reduced_size import reduced
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.timestep_sampling import (
     LevelDistribution,
@@ -88,12 +88,14 @@ class MotionDiffusionStage(ModelStage):
         )
 
     def _augmented(self, batch: ClipBatch) -> ClipBatch:
-        """Half of the samples mirrored, at one of the recipe's sides if it names any."""
+        """Half of the samples mirrored, with images as sharp as one of the recipe's sides."""
         batch, sides = self.randomly_flipped(batch), self.plan.recipe.data.view_sides_px
         if not sides:
             return batch
         generator = self.random.per_step(batch, "view size")
-        return reduced(batch, sides[int(torch.randint(len(sides), (), generator=generator))])
+        return with_coarse_images(
+            batch, sides[int(torch.randint(len(sides), (), generator=generator))]
+        )
 
     def randomly_flipped(self, batch: ClipBatch) -> ClipBatch:
         """Half of the samples mirrored."""
