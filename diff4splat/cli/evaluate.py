@@ -49,7 +49,7 @@ class Evaluate:
     ] = None
     """Weights of an aesthetic predictor on that CLIP."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
-    """Sampling steps of motion and video. Default: 1 for motion, 8 for video."""
+    """Sampling steps of motion and video. Default: 1 for motion, 4 for video."""
     fill: Literal["none", "video"] | None = None
     """What fills hidden regions, as in `generate`. Default: that of the model."""
     device: str = "cpu"

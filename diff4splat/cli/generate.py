@@ -91,7 +91,7 @@ class Generate:
     still: bool = False
     """Nothing moves, with or without a prompt."""
     steps: Annotated[int | None, Number(least=1, most=1000)] = None
-    """Steps of the sampler. Default: 1 for motion, 8 for video."""
+    """Steps of the sampler. Default: 1 for motion, 4 for video."""
     sampler: Literal[
         "euler",
         "midpoint",
@@ -111,7 +111,8 @@ class Generate:
     shift: Annotated[float | None, Number(above=0)] = None
     """Above 1 spends more steps on noisy levels. Default: 16 for motion, 1 for video."""
     guidance: Annotated[float | None, Number(least=0)] = None
-    """Classifier-free guidance weight, 1 is off. Default: 1 for motion, 5 for video."""
+    """Classifier-free guidance weight, 1 is off. Default: 1 for motion; for
+    video that of the model, 1 for small."""
     negative_prompt: str = ""
     """Text that the video model keeps away from, beside --prompt. Default: none."""
     color_matching_steps: Annotated[int | None, Number(least=0, most=100)] = None

@@ -50,7 +50,7 @@ REFERENCE = Sampling(sampler="piecewise2", steps=160)
 """80 steps are among the values, so that the report shows how converged it is."""
 SAMPLINGS = (
     *(Sampling(sampler="euler", steps=n, schedule="uniform") for n in (8, 50)),
-    *(Sampling(sampler=name, steps=4) for name in ("midpoint", "heun")),
+    *(Sampling(sampler=name, steps=4) for name in ("midpoint", "heun", "multistep2")),
     Sampling(sampler="dpmpp2m", steps=12),
     *(
         Sampling(sampler=name, steps=n)
@@ -85,7 +85,7 @@ APPROXIMATIONS = (
     Approximation(
         name="video-shift",
         subject="video",
-        summary="shifting the noise levels of the video model, 8 steps",
+        summary="shifting the noise levels of the video model",
         fields=("GenerationSettings.shift",),
         values=(0.5, 0.7, 1.0, 2.0, 3.0, 5.0),
         default=1.0,

@@ -63,7 +63,7 @@ class GenerationSettings:
     ``steps``, ``sampler``, ``schedule``, ``shift`` and ``guidance`` are those of the video model.
     """
 
-    steps: int = 8
+    steps: int = 4
     sampler: str = "multistep2"
     schedule: Schedule | None = None
     """None takes the better one for the number of steps (docs/results/samplers.md)."""
@@ -73,8 +73,8 @@ class GenerationSettings:
     """More steps end no nearer to clean latents: what the network predicts there has no limit."""
     latent_tolerance: float = 0.1
     """Error per step of the sampler ``adaptive``, in units of the latent; it sets the steps."""
-    guidance: Guidance = DEFAULT_GUIDANCE
-    """Used only when there is a prompt."""
+    guidance: Guidance | None = None
+    """Used only when there is a prompt; None takes the model's default."""
     negative_prompt: str = ""
     """What guidance of the video model leads away from."""
     motion: MotionSettings = MotionSettings()
@@ -139,7 +139,7 @@ class GenerationSettings:
             return (*self.fitted.levels, 0.0)
         enough = self.steps >= ENOUGH_STEPS
         if self.sampler == PIECEWISE and self.schedule is None and enough:
-            jumps = self.guidance.jumps
+            jumps = (self.guidance or DEFAULT_GUIDANCE).jumps
             return shift_levels(piecewise_levels(self.steps, jumps, self.last_level), self.shift)
         measured: Schedule = "log_snr" if enough else "uniform"
         return make_levels(self.schedule or measured, self.steps, self.shift, self.last_level)

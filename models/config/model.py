@@ -5,6 +5,7 @@ The JSON form lists every field, so that a stored model never changes when a def
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields, is_dataclass
 from typing import Any, Literal, TypeVar
@@ -77,6 +78,8 @@ class ModelConfig:
     default_fill: Fill = "video"
     """What fills hidden regions by default; the paper uses the video model. ``none`` where that
     model makes hidden regions worse."""
+    default_guidance: float = 5.0
+    """Weight of the video model's guidance where a prompt does not come with one; 1 is none."""
 
     def __post_init__(self) -> None:
         named = isinstance(self.name, str) and self.name != ""
@@ -91,6 +94,8 @@ class ModelConfig:
             raise ConfigError(f"ModelConfig {error}") from error
         known = self.default_fill in ("none", "video")
         require(known, "ModelConfig.default_fill", "none or video", self.default_fill)
+        known = math.isfinite(self.default_guidance) and self.default_guidance >= 0
+        require(known, "ModelConfig.default_guidance", "at least 0", self.default_guidance)
         self._require_fitting_refinement()
         self._require_fitting_joint()
         self._require_fitting_image_encoder()

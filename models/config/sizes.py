@@ -66,6 +66,7 @@ def small_size() -> ModelConfig:
         monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32),
         default_fill="none",
+        default_guidance=1.0,
     )
 
 

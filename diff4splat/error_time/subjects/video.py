@@ -17,7 +17,7 @@ from torch import Tensor
 from diff4splat.error_time.subjects.errors import mean_psnr_db
 from diff4splat.error_time.subjects.inputs import Inputs
 from diff4splat.error_time.subjects.model import request, shipped_model
-from diff4splat.flow.guidance import CallCount, Guidance
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE, CallCount, Guidance
 from diff4splat.flow.sampler_types import VelocityFn
 from diff4splat.flow.solve import ADAPTIVE, solve
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
@@ -50,7 +50,7 @@ def sampled(
     dit: VideoVelocity | None = None,
 ) -> Latents:
     """Latents of conditions and seeds, as one batch; by the shipped network, or by ``dit``."""
-    velocity, noise = batch(every, settings.guidance, dit)
+    velocity, noise = batch(every, settings.guidance or DEFAULT_GUIDANCE, dit)
     return solve(settings.sampler, velocity, noise, settings.solver_path)
 
 

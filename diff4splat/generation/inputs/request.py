@@ -8,6 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.captions.known_words import why_static
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.image_size import (
     default_side_px,
@@ -105,10 +106,17 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         small_path=_network_path(path, config.frames, small).to(device),
         prompt=user.prompt,
         seed=require_seed(user.seed),
-        settings=settings,
+        settings=_with_guidance(settings, config),
         plan=plan,
         depth=user.depth,
     )
+
+
+def _with_guidance(settings: GenerationSettings, config: ModelConfig) -> GenerationSettings:
+    """The model's own where none is asked for."""
+    if settings.guidance is not None:
+        return settings
+    return replace(settings, guidance=replace(DEFAULT_GUIDANCE, weight=config.default_guidance))
 
 
 def negative_prompt(request: Request, config: ModelConfig) -> str | None:

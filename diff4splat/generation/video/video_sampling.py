@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.flow.guidance import UNGUIDED, CallCount, Guidance, guided
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE, UNGUIDED, CallCount, Guidance, guided
 from diff4splat.flow.samplers import VelocityFn
 from diff4splat.flow.solve import solve
 from diff4splat.generation.settings import GenerationSettings
@@ -72,7 +72,7 @@ def sample_video(
     calls = CallCount()
     latent = solve(
         settings.sampler,
-        video_velocity(dit, conditions, settings.guidance, calls),
+        video_velocity(dit, conditions, settings.guidance or DEFAULT_GUIDANCE, calls),
         initial_noise(conditions, seed),
         settings.solver_path,
         advance,

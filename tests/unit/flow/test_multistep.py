@@ -6,7 +6,7 @@ from oracles_flow import linear_clean, linear_clean_solution, seeded_normal, slo
 
 from diff4splat.errors import ShapeError
 from diff4splat.flow.analytic_mixture import random_mixture
-from diff4splat.flow.guidance import CallCount, Guidance, guided
+from diff4splat.flow.guidance import DEFAULT_GUIDANCE, CallCount, Guidance, guided
 from diff4splat.flow.levels import piecewise_levels
 from diff4splat.flow.samplers import SAMPLERS, integrate
 from diff4splat.generation.settings import GenerationSettings
@@ -129,4 +129,4 @@ def test_is_never_worse_than_euler_under_strong_guidance(deviation: float) -> No
 
 def test_levels_of_settings_reach_the_ends_of_the_interval() -> None:
     settings = GenerationSettings(sampler="piecewise2", steps=12)
-    assert settings.guidance.low in settings.levels
+    assert DEFAULT_GUIDANCE.low in settings.levels

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import math
 import re
 
 import pytest
@@ -102,6 +103,12 @@ def test_the_mask_refiner_changes_the_fingerprint() -> None:
     assert len({config.fingerprint() for config in (*configs, test_size())}) == 3
 
 
+@pytest.mark.parametrize("weight", [-0.1, math.nan, math.inf])
+def test_a_guidance_that_no_model_can_have_is_refused(weight: float) -> None:
+    with pytest.raises(ConfigError, match=r"ModelConfig\.default_guidance: expected at least 0"):
+        dataclasses.replace(test_size(), default_guidance=weight)
+
+
 @pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize("fill", ["", None, True, "image"])
 def test_an_unknown_fill_is_refused(fill: object) -> None:
@@ -126,6 +133,7 @@ def test_parts_that_a_stored_model_does_not_name_are_left_out() -> None:
         "joint",
         "image_encoder",
         "default_fill",
+        "default_guidance",
     ):
         del data[later]
     assert ModelConfig.from_json(json.dumps(data)) == test_size()
