@@ -100,9 +100,10 @@ APPROXIMATIONS = (
         subject="video",
         summary="ending at a level above 0, 32 steps",
         fields=("GenerationSettings.last_level", "StepControl.last_level"),
-        values=(0.1, 0.05, DEFAULTS.last_level, 0.01, 0.005),
+        values=(0.1, 0.05, DEFAULTS.last_level, 0.01),
         default=DEFAULTS.last_level,
-        reference=0.002,
+        # Levels even in log signal-to-noise ratio go no lower.
+        reference=0.005,
         apply=lambda settings, value: replace(
             settings, sampler="unipc", steps=32, last_level=value
         ),
