@@ -1,5 +1,7 @@
 """LDRM learns on the latents of an imported model; the public weights stay as they are."""
 
+import json
+import statistics
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from diff4splat.training.train_stage import MODEL_FOLDER, StageRequest, train_st
 from diff4splat.training.trainer.checkpoints.export import load_parts
 
 __all__ = ["cogvideox_source", "imported", "imported_cogvideox", "wan_source"]
+STEPS = 60
 PUBLIC = ("vae.safetensors", "dit.safetensors", "text_encoder.safetensors", "tokenizer.json")
 
 
@@ -47,6 +50,24 @@ def test_reconstruction_trains_on_public_latents(folder: Path, tmp_path: Path) -
     assert model.trained >= {"vae", "dit", "text_encoder"}
     after = model.networks.ldrm.state_dict()["to_gaussians.weight"]
     assert not torch.equal(before, after)
+
+
+@pytest.mark.slow
+def test_the_loss_falls_on_public_latents(folder: Path, tmp_path: Path) -> None:
+    recipe = backbone_recipe(find_config(folder))
+    stages = [replace(stage, steps=STEPS, gates=()) for stage in recipe.stages]
+    request = StageRequest(
+        recipe=replace(recipe, stages=tuple(stages)),
+        stage="static-low",
+        folder=tmp_path,
+        start=load_model(folder),
+    )
+    train_stage(request)
+    lines = (tmp_path / "static-low" / "log.jsonl").read_text().splitlines()
+    events = [json.loads(line) for line in lines]
+    losses = [event["loss/total"] for event in events if event["event"] == "step"]
+    first, last = (statistics.fmean(part) for part in (losses[:10], losses[-10:]))
+    assert len(losses) == STEPS and last < 0.9 * first, f"{first} to {last}"
 
 
 def test_only_adapters_of_the_video_model_learn(folder: Path, tmp_path: Path) -> None:
