@@ -17,7 +17,7 @@ from diff4splat.flow.path import add_noise, velocity_from_clean
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.batches.coarse_images import with_coarse_images
+from diff4splat.training.batches.coarse_images import enlarged, with_coarse_images
 from diff4splat.training.batches.random_flip import flip_samples
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.timestep_sampling import (
@@ -65,7 +65,7 @@ class MotionDiffusionStage(ModelStage):
 
     def forward(self, batch: ClipBatch) -> Terms:
         """The terms ``flow`` and ``motion_mask``."""
-        batch, losses = self._augmented(batch), self.plan.recipe.losses
+        batch, losses = self._augmented(self._enlarged(batch)), self.plan.recipe.losses
         uniform = self.random.uniform(batch, "level")
         level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
         noisy = self._noisy(batch, level.to(batch.field), "noise")
@@ -86,6 +86,12 @@ class MotionDiffusionStage(ModelStage):
                 ),
             ]
         )
+
+    def _enlarged(self, batch: ClipBatch) -> ClipBatch:
+        """At the side that the network sees, where clips have the model's own."""
+        model = self.plan.model
+        side = model.size_px[1] * model.motion_unet.input_scale
+        return enlarged(batch, max(side // batch.video.shape[3], 1))
 
     def _augmented(self, batch: ClipBatch) -> ClipBatch:
         """Half of the samples mirrored, with images as sharp as one of the recipe's sides."""
@@ -109,6 +115,7 @@ class MotionDiffusionStage(ModelStage):
         ``motion_share`` is the squared error of the motion predicted from noise alone, over that of
         no motion; NaN where nothing moves.
         """
+        batch = self._enlarged(batch)
         level = batch.field.new_ones(len(batch))
         noisy = [self._noisy(batch, fixed * level, EVAL_NOISE) for fixed in EVAL_LEVELS]
         errors = [one.error(self._clean(batch, one)) for one in noisy]
@@ -123,6 +130,7 @@ class MotionDiffusionStage(ModelStage):
     @torch.no_grad()
     def panel(self, batch: ClipBatch) -> Float[Tensor, "h w 3"]:
         """First images, true motion, and the motion predicted from noise alone."""
+        batch = self._enlarged(batch)
         return motion_preview(batch.field[:, :, 1:], self._from_noise(batch), batch)
 
     def _noisy(self, batch: ClipBatch, level: Float[Tensor, " b"], purpose: str) -> NoisyMotion:

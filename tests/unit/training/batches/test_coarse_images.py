@@ -1,12 +1,14 @@
 """Images reduced and enlarged again: only the video changes, and only its sharpness."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from stage_fixtures import make_batch, stage_recipe
 
 from diff4splat.errors import ShapeError
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.batches.coarse_images import with_coarse_images
+from diff4splat.training.batches.coarse_images import enlarged, with_coarse_images
 
 
 def batch() -> ClipBatch:
@@ -29,6 +31,20 @@ def test_nothing_but_the_video_changes() -> None:
     for name in ("field", "moving", "depth", "target_rgb", "track_cell"):
         assert getattr(soft, name) is getattr(sharp, name)
     assert soft.cameras is sharp.cameras
+
+
+def test_an_enlarged_batch_has_the_same_image_motion_and_mask() -> None:
+    small = replace(batch(), moving=torch.rand(batch().moving.shape) > 0.5)
+    large = enlarged(small, 2)
+    for name, axes in (("video", (2, 3)), ("field", (3, 4)), ("moving", (-2, -1))):
+        before, after = (getattr(one, name) for one in (small, large))
+        expected = list(before.shape)
+        for axis in axes:
+            expected[axis] *= 2
+        assert list(after.shape) == expected and after.dtype == before.dtype
+    torch.testing.assert_close(large.field.mean((-2, -1)), small.field.mean((-2, -1)))
+    assert torch.equal(large.moving[..., ::2, 1::2], small.moving)
+    assert enlarged(small, 1) is small
 
 
 def test_one_colour_stays_that_colour() -> None:

@@ -109,3 +109,15 @@ def test_only_the_text_encoder_runs_beside_the_motion_network() -> None:
 def test_the_kind_needs_a_motion_network() -> None:
     with pytest.raises(ConfigError, match=r"motion_unet\.width: expected a motion network"):
         Recipe(name="x", seed=0, model=BASE, stages=(motion_recipe(),))
+
+
+@torch.no_grad()
+def test_clips_of_the_models_size_are_enlarged_to_what_the_network_sees() -> None:
+    recipe = motion_recipe()
+    wide = replace(MODEL, motion_unet=replace(MODEL.motion_unet, input_scale=2))
+    stage, batch = make_stage(recipe, model=wide), moving_batch(recipe)
+    seen = []
+    stage.motion_unet.register_forward_pre_hook(lambda _, given: seen.append(given[0].shape[-1]))
+    assert all(bool(value.isfinite().all()) for value in stage.measure(batch).values())
+    assert set(seen) == {2 * batch.video.shape[3]}
+    assert bool(stage(batch)[TOTAL].isfinite().all())
