@@ -64,7 +64,7 @@ def small_size() -> ModelConfig:
         activation=ActivationConfig(),
         refinement=RefinementConfig(channels=48),
         monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2),
-        motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32),
+        motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
         default_fill="none",
         default_guidance=1.0,
     )

@@ -11,6 +11,7 @@ from torch import Tensor
 from diff4splat.error_time.subjects.inputs import Inputs
 from diff4splat.error_time.subjects.model import request, shipped_model
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
+from diff4splat.generation.priors import Copies, motion_copy
 from diff4splat.generation.settings import GenerationSettings
 
 
@@ -22,7 +23,9 @@ def run(settings: GenerationSettings, inputs: Inputs) -> Tensor:
         asked = request(index)
         frames = model.config.latent_grid(len(asked.small_path), asked.small.camera.size_px)[0]
         motion = MotionRequest(text=prompt(index), seed=0, settings=settings)
-        sample = sample_motion(model.networks.motion_unet, asked.small, frames, motion)
+        copies = Copies(image=asked.image, small=asked.small)
+        image = motion_copy(copies, model.config.motion_unet.input_scale)
+        sample = sample_motion(model.networks.motion_unet, image, frames, motion)
         fields.append(sample.field)
     return torch.stack(fields)
 

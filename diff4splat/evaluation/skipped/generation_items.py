@@ -25,6 +25,7 @@ from diff4splat.generation.inputs.input_image import InputImage, downsample, loa
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import FILL_PARTS
+from diff4splat.generation.priors import Copies, motion_copy
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.models.hub.model import load_model
 from diff4splat.paths.build import build_path
@@ -154,7 +155,9 @@ def run_motion_prior(source: Source) -> None:
     text = model.networks.text_encoder.encode_prompt(PROMPT)
     settings = GenerationSettings(motion=MotionSettings(guidance=FORCED))
     request = MotionRequest(text=text, seed=0, settings=settings)
-    sample_motion(model.networks.motion_unet, small, frames, request)
+    copies = Copies(image=source.image, small=small)
+    image = motion_copy(copies, model.config.motion_unet.input_scale)
+    sample_motion(model.networks.motion_unet, image, frames, request)
 
 
 def _with_text(source: Source) -> Frames:
