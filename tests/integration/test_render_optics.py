@@ -53,6 +53,18 @@ def test_a_camera_without_effects_gives_the_same_bytes_as_none(
     )
 
 
+def test_double_precision_is_the_reference_and_nothing_else(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert render(scene_file, tmp_path / "a.exr") == 0
+    assert render(scene_file, tmp_path / "b.exr", "--dtype", "float64") == 0
+    single, double = (read_depth_exr(tmp_path / f"{name}.exr")[0] for name in "ab")
+    torch.testing.assert_close(single, double, equal_nan=True, atol=1e-4, rtol=1e-5)
+    for flags in (("--f-stop", "2"), ("--budget", "10s"), ("--dataset",), ("--device", "auto")):
+        assert render(scene_file, tmp_path / "c.png", "--dtype", "float64", *flags) == 2
+        assert "--dtype float64: expected a pinhole camera on the CPU" in said(capsys)
+
+
 def test_an_image_is_what_the_library_takes(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -51,6 +51,8 @@ class Render:
     device: str = "cpu"
     """Where frames are rendered: cpu, cuda (by gsplat), or auto, which is cuda where there is one.
     Optics are traced on the CPU."""
+    dtype: Literal["float32", "float64"] = "float32"
+    """float64: frames of the exact reference renderer, which is many times as slow."""
     options: Annotated[CameraOptions, tyro.conf.arg(name="")] = field(default_factory=CameraOptions)
     optics: Annotated[OpticsOptions, tyro.conf.arg(name="")] = field(default_factory=OpticsOptions)
     limits: Annotated[LimitOptions, tyro.conf.arg(name="")] = field(default_factory=LimitOptions)
@@ -64,6 +66,12 @@ class Render:
             raise ConfigError(
                 "--tolerance, --budget: expected a pinhole camera, got optics or --dataset; set "
                 "--tolerance-px, --aperture-samples and so on instead"
+            )
+        special = self.dataset or self.optics != OpticsOptions() or self.limits.limits.given
+        if self.dtype != "float32" and (special or self.device != "cpu"):
+            raise ConfigError(
+                f"--dtype {self.dtype}: expected a pinhole camera on the CPU without --tolerance "
+                "or --budget; leave out --dtype"
             )
         if self.camera is not None:
             require_camera(self.camera, self.options)
@@ -94,10 +102,10 @@ class Render:
 
         promised, watch = promise(self), Stopwatch.of_process()
         device = render_device(self.device)
-        for line in promised.lines():
+        for line in promised.lines() if self.dtype == "float32" else ():
             note(line)
         imported = import_scene(self.scene)
-        scene = imported.scene
+        scene = in_dtype(imported.scene, self.dtype)
         for line in imported.notes:
             note(line)
         require_scene_time(scene, self.time)
@@ -123,7 +131,7 @@ class Render:
         measured = watch.read()
         if promised.limits.tolerance_db is not None:
             measured["loss_db"] = measured_loss_db(scene, (full, path), settings)
-        for line in promised.after(measured):
+        for line in promised.after(measured) if self.dtype == "float32" else ():
             note(line)
         note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
 
@@ -153,6 +161,13 @@ class Render:
         depths = depth_range(scene)
         view = PathFrame(camera=path.cameras[0], near_depth=depths.near, focus_depth=depths.focus)
         return choose_path(self.camera, view, self.options)
+
+
+def in_dtype(scene: "Scene", dtype: str) -> "Scene":
+    """The scene as it is, or in double precision, which only the reference renders."""
+    import torch
+
+    return scene if dtype == "float32" else scene.to(torch.float64)
 
 
 def longer_side(size_px: tuple[int, int], pixels: int) -> tuple[int, int]:
