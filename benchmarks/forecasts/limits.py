@@ -1,8 +1,8 @@
 """Random requests with a tolerance or a budget: how many hold, and by how much the others miss.
 
-Run ``python benchmarks/limits.py FOLDER`` (needs scikit-image's photographs); prints Markdown. A
-second call goes on where the first was stopped. Requests come from a seed. Inputs are none of those
-that the calibration that ships was measured on.
+Run ``python -m benchmarks.forecasts.limits FOLDER`` (needs scikit-image's photographs); prints
+Markdown. A second call goes on where the first was stopped. Requests come from a seed. Inputs are
+none of those that the calibration that ships was measured on.
 
     tolerance   frames of the chosen setting against those of the reference setting, as a loss in dB
     budget      a process of its own, its processor seconds and its peak memory

@@ -1,7 +1,7 @@
 """Forecasts of five commands against what they take, on inputs that no rate was fitted to.
 
-Run ``python -m benchmarks.forecasts FOLDER`` (needs scikit-image's photographs); prints Markdown.
-The folder is the one of ``benchmarks/limits.py``, or a new one that gets the same inputs. Compared
+Run ``python -m benchmarks.forecasts.forecasts FOLDER`` (needs scikit-image's photographs); prints
+Markdown. The folder is the one of ``limits.py``, or a new one that gets the same inputs. Compared
 are processor seconds and peak memory, so that other programs on the machine do not count.
 """
 
@@ -9,7 +9,7 @@ import argparse
 import os
 from pathlib import Path
 
-from benchmarks.limits import make_photos, make_scenes
+from benchmarks.forecasts.limits import make_photos, make_scenes
 from diff4splat.cli.calibration.measured_process import measure_process
 from diff4splat.cli.limits.command_work import command_work
 from diff4splat.cli.limits.costing import Costing

@@ -1,0 +1,1 @@
+"""Forecasts and limits against what commands take."""
