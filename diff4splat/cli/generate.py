@@ -24,7 +24,12 @@ from diff4splat.cli.options.depth import (
 )
 from diff4splat.cli.options.device import render_device, require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
-from diff4splat.cli.options.models import ModelName, require_prompt_for, require_runtime
+from diff4splat.cli.options.models import (
+    ModelName,
+    prompt_notes,
+    require_prompt_for,
+    require_runtime,
+)
 from diff4splat.io.file_digest import file_sha256
 
 if TYPE_CHECKING:
@@ -319,7 +324,7 @@ class Generate:
         from diff4splat.paths.summary import summarize
 
         note("; ".join((f"focal length: {input_image.focal_source}", *input_image.notes)))
-        for line in self.prompt_notes():
+        for line in prompt_notes(self.prompt, self.model):
             note(line)
         for warning in summarize(path, PLANE_DEPTH).warnings:
             note(f"camera path: {warning}")
@@ -366,18 +371,6 @@ class Generate:
             **matching,
             **given,
         )
-
-    def prompt_notes(self) -> list[str]:
-        """What a trained motion prior does not know of the prompt."""
-        from diff4splat.captions.known_words import read_prompt, why_static
-        from diff4splat.models.hub.folders import find_provenance
-
-        if self.prompt is None or "motion_unet" not in find_provenance(self.model).trained:
-            return []
-        if reason := why_static(self.prompt):
-            return [f"nothing moves: {reason}; diff4splat inspect words lists what it knows"]
-        unknown = ", ".join(read_prompt(self.prompt).unknown)
-        return [f"words of the prompt that the model does not know: {unknown}"] if unknown else []
 
     def read_image(self) -> "InputImage":
         """The photograph at the model's size."""

@@ -35,31 +35,32 @@ class Column:
 
 HIDDEN_REGIONS = {
     "hidden": "pixels with a true depth whose surface the input does not show",
-    "disoccluded": "hidden pixels that were behind what is static: the camera uncovers them",
-    "uncovered": "hidden pixels that were behind what moves",
+    "disoccluded": "hidden pixels that were behind what is static: the camera has moved",
+    "disoccluded_by_motion": "hidden pixels that were behind what moves",
     "outside": "hidden pixels that were out of the frame",
 }
 """What the input hides, and the three classes of it."""
 
 
 def _hidden_columns(region: str, what: str) -> tuple[Column, ...]:
+    title = region.replace("_", " ")
     share = Column(
         key=f"{region}_share",
-        title=region,
+        title=title,
         better="neither",
         table="hidden",
         meaning=f"share of {what}; depends on the clips alone",
     )
     error = Column(
         key=f"{region}_psnr",
-        title=f"PSNR {region} [dB]",
+        title=f"PSNR {title} [dB]",
         better="higher",
         table="hidden",
         meaning="PSNR over these pixels",
     )
     distance = Column(
         key=f"{region}_perceptual",
-        title=f"perceptual {region}",
+        title=f"perceptual {title}",
         better="lower",
         table="hidden",
         meaning="perceptual distance where only these pixels differ from the true image",

@@ -60,6 +60,7 @@ def test_double_precision_is_the_reference_and_nothing_else(
     assert render(scene_file, tmp_path / "b.exr", "--dtype", "float64") == 0
     single, double = (read_depth_exr(tmp_path / f"{name}.exr")[0] for name in "ab")
     torch.testing.assert_close(single, double, equal_nan=True, atol=1e-4, rtol=1e-5)
+    assert not torch.equal(single.nan_to_num(), double.nan_to_num())  # another renderer
     for flags in (("--f-stop", "2"), ("--budget", "10s"), ("--dataset",), ("--device", "auto")):
         assert render(scene_file, tmp_path / "c.png", "--dtype", "float64", *flags) == 2
         assert "--dtype float64: expected a pinhole camera on the CPU" in said(capsys)

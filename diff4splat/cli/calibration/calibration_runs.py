@@ -90,8 +90,7 @@ def scene_runs(folder: Path, wide: Path) -> list[Run]:
         runs.append(["export", "html", str(scene), "--out", str(folder / f"page-{n}.html")])
     longer = ("--camera", "orbit:0.05", "--frames", "40", "--resolution", "320")
     runs.append(["render", str(field), *longer, "--out", str(folder / "long.webm")])
-    fields = ((field, "1"), (field, "0.1"), (wide, "1"), (wide, "0.1"))
-    baked = (*fields, (moving, "0.1"), (native, "0.1"))
+    baked = ((field, "0.1"), (wide, "1"), (wide, "0.1"), (moving, "0.1"), (native, "0.1"))
     for n, (scene, px) in enumerate(baked):
         out = str(folder / f"baked-{n}.safetensors")
         runs.append(["bake", str(scene), "--tolerance-px", px, "--out", out])

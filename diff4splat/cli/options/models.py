@@ -56,6 +56,19 @@ def require_prompt_for(model: str, prompt: str) -> None:
     require_prompt(prompt, SIZES[model]().text.max_bytes if model in SIZES else sys.maxsize)
 
 
+def prompt_notes(prompt: str | None, model: str) -> list[str]:
+    """What a trained motion prior does not know of the prompt."""
+    from diff4splat.captions.known_words import read_prompt, why_static
+    from diff4splat.models.hub.folders import find_provenance
+
+    if prompt is None or "motion_unet" not in find_provenance(model).trained:
+        return []
+    if reason := why_static(prompt):
+        return [f"nothing moves: {reason}; diff4splat inspect words lists what it knows"]
+    unknown = ", ".join(read_prompt(prompt).unknown)
+    return [f"words of the prompt that the model does not know: {unknown}"] if unknown else []
+
+
 def require_runtime(model: str, runtime: str | None, device: str) -> None:
     """Check that the model folder holds what the runtime runs.
 

@@ -102,7 +102,9 @@ class Render:
 
         promised, watch = promise(self), Stopwatch.of_process()
         device = render_device(self.device)
-        for line in promised.lines() if self.dtype == "float32" else ():
+        # Costs are those of the rasteriser; the reference has no forecast.
+        has_forecast = self.dtype == "float32"
+        for line in promised.lines() if has_forecast else ():
             note(line)
         imported = import_scene(self.scene)
         scene = in_dtype(imported.scene, self.dtype)
@@ -131,7 +133,7 @@ class Render:
         measured = watch.read()
         if promised.limits.tolerance_db is not None:
             measured["loss_db"] = measured_loss_db(scene, (full, path), settings)
-        for line in promised.after(measured) if self.dtype == "float32" else ():
+        for line in promised.after(measured) if has_forecast else ():
             note(line)
         note(f"wrote {self.out} ({len(path)} frame{'s' if len(path) > 1 else ''})")
 

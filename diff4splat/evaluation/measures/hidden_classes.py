@@ -3,10 +3,10 @@
 Axes: ``p`` target images, ``h w`` pixels. The surface of a pixel that is not covisible is carried
 back to the time of an input frame with its object. It was
 
-    shown        visible there after all: its object has moved since. Then the pixel is not hidden
-    outside      out of the frame of every input image, or behind its camera
-    uncovered    inside, and behind something that moves, itself included: motion uncovers it
-    disoccluded  inside, and behind what is static: the camera's motion uncovers it
+    shown          visible there after all: its object has moved since. Then the pixel is not hidden
+    outside        out of the frame of every input image, or behind its camera
+    disoccluded    inside, and behind what is static: it is in view because the camera has moved
+    disoccluded_by_motion    inside, and behind something that moves, itself included
 
 Nothing of it depends on a prediction: a system cannot choose which pixels it is judged by.
 """
@@ -25,7 +25,7 @@ from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
 from diff4splat.training.batches.normalise_scale import valid_depth
 
-CLASSES = ("disoccluded", "uncovered", "outside")
+CLASSES = ("disoccluded", "disoccluded_by_motion", "outside")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,14 +33,14 @@ class HiddenPixels:
     """Pixels of the target images that the input hides, each in one class."""
 
     disoccluded: Bool[Tensor, "p h w"]
-    uncovered: Bool[Tensor, "p h w"]
+    disoccluded_by_motion: Bool[Tensor, "p h w"]
     outside: Bool[Tensor, "p h w"]
 
     @property
     def regions(self) -> dict[str, Bool[Tensor, "p h w"]]:
         """The three classes, and before them their union ``hidden``."""
         classes = {name: getattr(self, name) for name in CLASSES}
-        return {"hidden": self.disoccluded | self.uncovered | self.outside, **classes}
+        return {"hidden": self.disoccluded | self.disoccluded_by_motion | self.outside, **classes}
 
 
 def hidden_pixels(sample: EvalSample, covisible: Bool[Tensor, "p h w"]) -> HiddenPixels:
@@ -55,17 +55,17 @@ def _classes(
 ) -> dict[str, Bool[Tensor, "h w"]]:
     depth = sample.true_depth(pair).double()
     unseen = valid_depth(depth) & ~covisible
-    shown, inside, uncovered = (torch.zeros_like(unseen) for _ in range(3))
+    shown, inside, disoccluded_by_motion = (torch.zeros_like(unseen) for _ in range(3))
     for frame in sample.input_frames:
         points = _carried(sample, pair, frame, depth)
         covers = _inside(sample, frame, points)
         shown |= visible_in(sample.input_view, frame, points)
         inside |= covers.any_pixel
-        uncovered |= covers.moving
+        disoccluded_by_motion |= covers.moving
     hidden = unseen & ~shown
     return {
-        "disoccluded": hidden & inside & ~uncovered,
-        "uncovered": hidden & uncovered,
+        "disoccluded": hidden & inside & ~disoccluded_by_motion,
+        "disoccluded_by_motion": hidden & disoccluded_by_motion,
         "outside": hidden & ~inside,
     }
 

@@ -1,6 +1,6 @@
 """Prompts with and without words that the motion prior knows, and what the plan makes of them."""
 
-from pathlib import Path
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -18,8 +18,8 @@ from diff4splat.captions.known_words import (
     why_static,
 )
 from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
-from diff4splat.cli.generate import Generate
 from diff4splat.cli.main import run
+from diff4splat.cli.options.models import prompt_notes
 
 OBJECTS = st.tuples(st.sampled_from(COLOR_NAMES), st.sampled_from(NOUNS))
 EVENTS = st.tuples(OBJECTS, st.sampled_from(sorted(VERBS)), st.sampled_from(["", *DIRECTIONS]))
@@ -74,8 +74,7 @@ def test_endings_do_not_count(forms: str) -> None:
 
 
 def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
-    def notes(prompt: str | None, model: str = "small") -> list[str]:
-        return Generate(images=(Path("photo.jpg"),), prompt=prompt, model=model).prompt_notes()
+    notes = partial(prompt_notes, model="small")
 
     (line,) = notes("a cat purrs")
     assert "nothing moves: the prompt names no object" in line
@@ -85,7 +84,7 @@ def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     unknown = "words of the prompt that the model does not know: quickly"
     assert notes("the red car moves quickly") == [unknown]
     assert notes("the red car moves to the left") == notes(None) == []
-    assert notes("a cat purrs", "test") == []
+    assert notes("a cat purrs", model="test") == []
 
 
 def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:

@@ -43,7 +43,7 @@ def made_case(task: Task, stride: int, **changes: object) -> EvalSample:
 def disoccluded(covisible: torch.Tensor) -> TrueRegions:
     """All that is not covisible is disoccluded."""
     none = torch.zeros_like(covisible)
-    hidden = HiddenPixels(disoccluded=~covisible, uncovered=none, outside=none)
+    hidden = HiddenPixels(disoccluded=~covisible, disoccluded_by_motion=none, outside=none)
     return TrueRegions(covisible=covisible, hidden=hidden)
 
 

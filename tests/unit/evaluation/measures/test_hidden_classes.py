@@ -30,9 +30,9 @@ def classes(case: EvalSample) -> HiddenPixels:
 def test_behind_where_an_object_was_pixels_are_uncovered() -> None:
     found = classes(case_of((0.9, 0.0, 0.0), (0, 4)))
     # Wall points from x = -0.8 were behind the patch; it now covers those from x = 0.36 on.
-    assert bool(found.uncovered[0, 16, 14:21].all())
-    assert not bool(found.uncovered[0, :, 26:].any())
-    assert not bool(found.uncovered[0, :7].any())
+    assert bool(found.disoccluded_by_motion[0, 16, 14:21].all())
+    assert not bool(found.disoccluded_by_motion[0, :, 26:].any())
+    assert not bool(found.disoccluded_by_motion[0, :7].any())
 
 
 def test_an_object_that_moved_is_not_hidden_where_it_is_now() -> None:
@@ -47,7 +47,7 @@ def test_an_object_that_moved_is_not_hidden_where_it_is_now() -> None:
 
 def test_the_camera_uncovers_what_was_behind_a_static_object() -> None:
     found = classes(case_of((0.0, 0.0, 0.0), (1, 4)))
-    assert not bool(found.uncovered.any())
+    assert not bool(found.disoccluded_by_motion.any())
     # Wall points from x = 0.7 to 0.9, right beside the patch with its footprints.
     assert bool(found.disoccluded[0, 14:18, 24].all())
     assert not bool(found.disoccluded[0, :, 8:20].any())
@@ -83,7 +83,7 @@ def test_without_tracks_surfaces_stay_where_they_are() -> None:
     untracked = replace(case, clip=replace(case.clip, tracks=None))
     patch = case.clip.views[0].instances[4] == PATCH
     found = classes(untracked)
-    assert not bool(found.uncovered.any())
+    assert not bool(found.disoccluded_by_motion.any())
     assert int((found.regions["hidden"][0] & patch).sum()) > 0.3 * int(patch.sum())
 
 

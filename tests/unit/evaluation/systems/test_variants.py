@@ -118,9 +118,9 @@ def test_ablations_show_what_helps_and_a_bypass_as_zero(monkeypatch: pytest.Monk
 def test_the_truth_beats_every_fill_on_hidden_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
     run = measured(monkeypatch, generator(fill="none"), wall_and_patch(SHIFT))
     item: ItemResult = run.items[0]
-    for region in ("hidden", "uncovered", "outside"):
+    for region in ("hidden", "disoccluded_by_motion", "outside"):
         assert item.value(SYSTEM, f"{region}_psnr") > 45
-    assert item.value("best plane (oracle)", "uncovered_psnr") < 25
+    assert item.value("best plane (oracle)", "disoccluded_by_motion_psnr") < 25
     text = "\n".join(hidden_section(run, summarize(run)))
     assert all(row in text for row in FILLS)
     assert "Of the target pixels: hidden" in text
