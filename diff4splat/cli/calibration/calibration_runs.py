@@ -42,12 +42,16 @@ FITS = (
     ("capture", "hexplane", "1500", "50", "300", ()),
     ("capture", "spacetime", "1500", "50", "250", ()),
     ("large-capture", "static", "1500", "50", "100", ()),
+    ("large-capture", "hexplane", "24000", "50", "150", ()),
+    ("large-capture", "spacetime", "24000", "50", "150", ()),
 )
 """(capture, motion, budget, coarse steps, fine steps, options); without a smallest score all may
-move. Of each motion three: steps, Gaussians and moving ones have rates of their own."""
+move. Of each motion at least three: steps, Gaussians and moving ones have rates of their own. Two
+have as many Gaussians as a fit starts with by default: many need more than one thread."""
 FIELD, NATIVE = 1, 3
 ONNX = (("--shapes-only",), ())
-SCENE_COMMANDS = frozenset({"render", "bake", "export html"})
+SAME_START = frozenset({"bake", "export html"})
+"""Both load the same code and read a scene; a renderer for frames starts threads besides."""
 TRAIN_STAGES = (("test", "vae"), ("test", "static-low"), ("test", "video_diffusion"))
 TRAIN_STEPS = ("4", "16")
 MEMORY_AMOUNTS = frozenset(
@@ -57,6 +61,9 @@ MEMORY_AMOUNTS = frozenset(
     )
 )
 """What is held at once; other frames are written as they come, and steps leave nothing behind."""
+NO_TIME = KNOWN_BYTES | {"held_gaussians"}
+"""A step works on every Gaussian, so their time is that of ``fitted_gaussians``. Fits of few steps
+cannot tell rates of both apart."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,15 +194,15 @@ def _measure(arguments: Run) -> dict[str, float]:
 def rates_together(
     measured: Mapping[str, Sequence[tuple[Work, float, float]]],
 ) -> dict[str, CostRates]:
-    """Rates of several commands; the start of those that read a scene is one and the same."""
-    apart = {name: rates(runs) for name, runs in measured.items() if name not in SCENE_COMMANDS}
+    """Rates of several commands; ``SAME_START`` share that of the start."""
+    apart = {name: rates(runs) for name, runs in measured.items() if name not in SAME_START}
     joint = [
         ({_own(name, amount): value for amount, value in work.items()}, seconds, memory)
-        for name in SCENE_COMMANDS
+        for name in SAME_START
         for work, seconds, memory in measured.get(name, ())
     ]
     seconds = rates(joint).seconds if joint else {}
-    for name in SCENE_COMMANDS & measured.keys():
+    for name in SAME_START & measured.keys():
         amounts = {amount for work, _, _ in measured[name] for amount in work}
         owned = {amount: seconds.get(_own(name, amount)) for amount in amounts}
         kept = {amount: rate for amount, rate in owned.items() if rate is not None}
@@ -210,7 +217,7 @@ def _own(command: str, amount: str) -> str:
 def rates(measured: Sequence[tuple[Work, float, float]]) -> CostRates:
     """Rates of time and memory from (work, processor seconds, bytes) of several runs."""
     work = [one for one, _, _ in measured]
-    timed = [{name: one[name] for name in one.keys() - KNOWN_BYTES} for one in work]
+    timed = [{name: one[name] for name in one.keys() - NO_TIME} for one in work]
     held = [{name: one[name] for name in MEMORY_AMOUNTS & one.keys()} for one in work]
     known = [sum(one.get(name, 0.0) for name in KNOWN_BYTES) for one in work]
     memory = [peak - part for (_, _, peak), part in zip(measured, known, strict=True)]

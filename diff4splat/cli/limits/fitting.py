@@ -45,8 +45,8 @@ def work(
     return {
         "start": 1,
         f"stage {settings.motion}": 0 if static else 1,
+        **({} if static else {f"fit_steps {settings.motion}": fine_steps}),
         "fit_steps static": steps - fine_steps,
-        f"fit_steps {settings.motion}": settings.fine_steps,
         "fitted_gaussians": views * (coarse.summed + fine.summed),
         f"moved_gaussians {settings.motion}": 0 if static else share * fine.summed,
         "fitted_pixels": pixels * views * steps,

@@ -88,8 +88,10 @@ def test_a_calibration_that_stopped_goes_on_and_ends(machine: Machine, tmp_path:
     table = read_table(file)
     assert table.speed_s == pytest.approx(0.01)
     for name in ("generate", "render", "bake", "export html", "fit"):
-        seconds = table.rates[name].seconds
-        assert seconds["start"] + 10 * seconds["filmed_pixels"] == pytest.approx(12, rel=0.02)
+        seconds, words = table.rates[name].seconds, name.split()
+        count = next(len(run) for run in machine.runs if run[: len(words)] == words)
+        expected = seconds["start"] + count * seconds["filmed_pixels"]
+        assert expected == pytest.approx(2 + count, rel=0.02)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["mine.json"]
 
 
@@ -100,6 +102,32 @@ def test_rates_that_were_not_measured_are_scaled(machine: Machine, tmp_path: Pat
     for name, rate in shipped.rates["train"].seconds.items():
         assert made.rates["train"].seconds[name] == pytest.approx(times * rate)
     assert made.settings == shipped.settings
+
+
+def test_scene_commands_start_alike_but_renders_do_not() -> None:
+    def runs(start_s: float) -> list[tuple[dict[str, float], float, float]]:
+        return [({"start": 1, "work": n}, start_s + n, 1e8) for n in (0, 1, 5)]
+
+    measured = {"render": runs(3.0), "bake": runs(1.5), "export html": runs(1.5)[1:]}
+    found = calibration_runs.rates_together(measured)
+    starts = {name: rates.seconds["start"] for name, rates in found.items()}
+    assert starts == pytest.approx({"render": 3.0, "bake": 1.5, "export html": 1.5}, rel=1e-3)
+
+
+def test_gaussians_of_a_fit_cost_time_in_its_steps_alone() -> None:
+    """Fits of few steps, where what is held grows with the sum over the steps."""
+    work = [
+        {"start": 1.0, "fit_steps static": steps, "fitted_gaussians": steps * held}
+        | {"held_gaussians": held}
+        for steps, held in ((100, 10), (100, 100), (150, 50))
+    ]
+    seconds = [3 + 0.01 * one["fit_steps static"] + 1e-3 * one["fitted_gaussians"] for one in work]
+    found = calibration_runs.rates(
+        [(one, s, 1e8 + 1e6 * one["held_gaussians"]) for one, s in zip(work, seconds, strict=True)]
+    )
+    assert found.seconds["fitted_gaussians"] == pytest.approx(1e-3, rel=1e-3)
+    assert "held_gaussians" not in found.seconds
+    assert found.memory_bytes["held_gaussians"] == pytest.approx(1e6, rel=1e-2)
 
 
 @pytest.fixture

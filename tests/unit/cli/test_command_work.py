@@ -6,13 +6,14 @@ from pathlib import Path
 import coded_scenes
 import pytest
 import torch
+from small_fits import ball_capture
 
 from diff4splat.cli.common.parser import parse
 from diff4splat.cli.limits import baking, fitting, looking, rendering, tracing, training
 from diff4splat.cli.limits.costing import Costing, Promise
 from diff4splat.cli.limits.scene_header import SceneHeader, read_scene_header
 from diff4splat.errors import ConfigError
-from diff4splat.fitting.settings import DensitySettings
+from diff4splat.fitting.settings import DensitySettings, FitSettings
 from diff4splat.io.scene_files.scene_file import save_scene
 from diff4splat.outputs.budgets.costs import FREE_CORES, CostRates, Forecast, free_cores
 from diff4splat.outputs.budgets.limits import Limits, loss_from_error
@@ -67,6 +68,18 @@ def test_gaussians_of_a_stage_grow_as_its_splits_allow() -> None:
     assert grown.summed == pytest.approx(summed)
     assert fitting.grow(400, 1000, density).last == 400
     assert fitting.grow(100, 0, density).summed == 0
+
+
+@pytest.mark.parametrize(
+    ("motion", "steps"),
+    [("static", (150, None)), ("hexplane", (50, 100)), ("spacetime", (50, 100))],
+)
+def test_steps_of_a_fit_are_counted_by_stage(motion: str, steps: tuple[int, int | None]) -> None:
+    settings = FitSettings(motion=motion, coarse_steps=50, fine_steps=100)
+    counted = fitting.work(settings, ball_capture(), 10, settings.coarse_steps)
+    assert counted["fit_steps static"] == steps[0]
+    assert counted.get(f"fit_steps {motion}" if steps[1] else "none") == steps[1]
+    assert counted["fitted_gaussians"] == 150 * 10 * settings.views_per_step
 
 
 def test_work_of_an_export_follows_what_it_does() -> None:
