@@ -48,7 +48,8 @@ FITS = (
 """(capture, motion, budget, coarse steps, fine steps, options); without a smallest score all may
 move. Of each motion at least three: steps, Gaussians and moving ones have rates of their own. Two
 have as many Gaussians as a fit starts with by default: many need more than one thread."""
-FIELD, NATIVE = 1, 3
+FIELD, NATIVE, SPARSE = 1, 3, 6
+"""The same among ``FITS``; in the last one few Gaussians move."""
 ONNX = (("--shapes-only",), ())
 SAME_START = frozenset({"bake", "export html"})
 """Both load the same code and read a scene; a renderer for frames starts threads besides."""
@@ -89,7 +90,7 @@ def generation_runs(photo: Path, folder: Path) -> list[Run]:
 def scene_runs(folder: Path, wide: Path) -> list[Run]:
     """Commands that read what the generations and fits wrote; in ``wide`` everything moves."""
     static, moving, large = (scene_file(folder, "scene", n) for n in (STATIC, PROMPTED, LARGE))
-    field, native = (scene_file(folder, "fit", n) for n in (FIELD, NATIVE))
+    field, native, sparse = (scene_file(folder, "fit", n) for n in (FIELD, NATIVE, SPARSE))
     runs = [["render", str(large), "--out", str(folder / "view.png")]]
     for n, scene in enumerate((static, moving, wide, native)):
         runs.append(["render", str(scene), "--out", str(folder / f"view-{n}.webm")])
@@ -97,7 +98,8 @@ def scene_runs(folder: Path, wide: Path) -> list[Run]:
         runs.append(["export", "html", str(scene), "--out", str(folder / f"page-{n}.html")])
     longer = ("--camera", "orbit:0.05", "--frames", "40", "--resolution", "320")
     runs.append(["render", str(field), *longer, "--out", str(folder / "long.webm")])
-    baked = ((field, "0.1"), (wide, "1"), (wide, "0.1"), (moving, "0.1"), (native, "0.1"))
+    baked = ((field, "0.1"), (sparse, "0.1"), (wide, "1"), (wide, "0.1"))
+    baked += ((moving, "0.1"), (native, "0.1"))
     for n, (scene, px) in enumerate(baked):
         out = str(folder / f"baked-{n}.safetensors")
         runs.append(["bake", str(scene), "--tolerance-px", px, "--out", out])
