@@ -71,7 +71,10 @@ class Fit:
     """Renderer; auto traces rays if cameras differ from pinholes, and rasterises otherwise."""
     device: str = "cpu"
     """Where frames are rasterised: cpu, cuda (by gsplat), or auto, which is cuda where there is
-    one. Rays are traced on the CPU, and everything is fitted in float32."""
+    one. Rays are traced on the CPU."""
+    dtype: Literal["float32", "float64"] = "float32"
+    """Precision of the fit. float64 is the reference to check float32 against: slower, on the CPU,
+    with the reference renderers."""
     learn: tuple[Literal["lens", "focus", "aperture", "readout", "focal"], ...] = ()
     """Camera parameters to optimise together with the scene, from an initial guess in the data:
     lens coefficients, focus distance, aperture radius, read-out time, focal length."""
@@ -88,12 +91,22 @@ class Fit:
     """Start again instead of resuming from the folder."""
 
     def check(self) -> None:
-        """Check what the live view needs."""
+        """Check what float64 and the live view need."""
+        self._check_dtype()
         if self.live is not None and len(self.live) > 1:
             raise ConfigError(f"--live: expected one port, got {len(self.live)}")
         if self.live is not None and find_spec("viser") is None:
             raise MissingExtraError(
                 "--live: expected viser, got none installed; pip install 'diff4splat[live]'"
+            )
+
+    def _check_dtype(self) -> None:
+        """Compiled renderers, GPUs and forecasts are for float32."""
+        exact = self.renderer in ("auto", "trace", "reference") and self.device == "cpu"
+        if self.dtype == "float64" and not exact:
+            raise ConfigError(
+                "--dtype float64: expected --renderer auto, trace or reference and the CPU, got "
+                f"--renderer {self.renderer} --device {self.device}; leave out --dtype"
             )
 
     def run(self) -> None:
@@ -125,16 +138,18 @@ class Fit:
         capture, initial = self.capture(), self.initial_scene()
         for line in capture.notes:
             note(line)
-        if self.renderer in ("auto", "raster"):
+        usual = self.dtype == "float32"
+        if usual and self.renderer in ("auto", "raster"):
             precompile_renderer(single_gaussian("cpu"), log.phases)
-        promised, watch = promise(self, settings, capture), Stopwatch.of_process()
+        promised = promise(self, settings, capture) if usual else None
+        watch = Stopwatch.of_process()
         if promised and (self.restart or not (self.out / CHECKPOINT_FILE).is_file()):
             for line in promised.lines():
                 note(line)
         renderer = FrameRenderer(
             capture=capture, backend=self.renderer, settings=settings.camera, device=device
         )
-        if renderer.traced:
+        if usual and renderer.traced:
             precompile_tracer(log.phases)
         if self.restart:
             (self.out / CHECKPOINT_FILE).unlink(missing_ok=True)
@@ -192,7 +207,9 @@ class Fit:
         from diff4splat.fitting.settings import FitSettings
         from diff4splat.fitting.settings_json import apply_changes
 
-        start = FitSettings(motion=self.motion, seed=self.seed, use_depth=not self.no_depth)
+        start = FitSettings(
+            motion=self.motion, dtype=self.dtype, seed=self.seed, use_depth=not self.no_depth
+        )
         start = replace(
             start,
             density=replace(start.density, budget=self.budget),

@@ -84,6 +84,7 @@ APPROXIMATIONS = (
 USER_CHOICES: UserChoices = {
     "FitSettings.motion": "the kind of motion: another model, not a coarser one",
     "FitSettings.seed": "which of equally good fits",
+    "FitSettings.dtype": "float64 is the reference; report stability measures what float32 changes",
     "FitSettings.views_per_step": OPTIMISER,
     "FitSettings.harmonics": "how colour depends on the view: asked for; `sh-degree` measures it",
     "FitSettings.harmonics_every": OPTIMISER,

@@ -16,12 +16,18 @@ MOMENTS = ("exp_avg", "exp_avg_sq")
 class ParameterTable:
     """Leaf tensors by name, each with a separate learning rate."""
 
-    def __init__(self, columns: Mapping[str, Tensor], shared: Mapping[str, Tensor]) -> None:
+    def __init__(
+        self,
+        columns: Mapping[str, Tensor],
+        shared: Mapping[str, Tensor],
+        dtype: torch.dtype = torch.float32,
+    ) -> None:
         """``columns`` have one row per Gaussian; ``shared`` tensors have any shape."""
+        self.dtype = dtype
         self._columns = tuple(columns)
         self._leaves: dict[str, Tensor] = {}
         for name, value in {**columns, **shared}.items():
-            self._leaves[name] = value.detach().clone().requires_grad_()
+            self._leaves[name] = value.detach().to(dtype, copy=True).requires_grad_()
         groups = [{"params": [leaf], "name": name} for name, leaf in self._leaves.items()]
         # The published value; the default of 1e-8 would damp the small gradients of means.
         self.optimizer = torch.optim.Adam(groups, lr=0.0, eps=1e-15, fused=True)
@@ -89,7 +95,7 @@ class ParameterTable:
             state_dict[name] = leaf.detach()
             state = self.optimizer.state.get(leaf, {})
             for key, value in state.items():
-                state_dict[f"{name}/{key}"] = value.detach().float()
+                state_dict[f"{name}/{key}"] = value.detach()
         return state_dict
 
     def load(self, tensors: Mapping[str, Tensor]) -> None:

@@ -117,7 +117,10 @@ def _comparison(report: FitReport, scene: Scene) -> Float[Tensor, "h w 3"]:
         torch.linspace(0, len(qualities) - 1, min(COMPARISON_FRAMES, len(qualities))).round().long()
     )
     selected = [qualities[i] for i in at.tolist()]
-    evaluator = Evaluator(renderer=report.result.renderer, store=FrameStore(report.capture))
+    evaluator = Evaluator(
+        renderer=report.result.renderer,
+        store=FrameStore(report.capture, dtype=report.settings.torch_dtype),
+    )
     truths = [evaluator.store.read(quality.frame).rgb for quality in selected]
     renderings = [evaluator.image(scene, report.result.cameras, q.frame)[0] for q in selected]
     labels = [f"camera {q.camera}, {q.time_s:.2f} s: {q.psnr_db:.1f} dB" for q in selected]

@@ -45,7 +45,9 @@ class FitSession:
             device=request.device,
         )
         self.optics = LearnedOptics(self.capture, self.settings.camera.learn)
-        self.store = FrameStore(self.capture, self.settings.picture_memory_mb << 20)
+        self.store = FrameStore(
+            self.capture, self.settings.picture_memory_mb << 20, self.settings.torch_dtype
+        )
         self.bounds = scene_bounds(self.capture)
         self.schedule = FrameSchedule(
             self.capture, self.settings.views_per_step, self.settings.seed
@@ -110,11 +112,12 @@ class FitSession:
         Raises:
             CheckpointError: a tensor is missing, or of another shape or dtype.
         """
-        require_tensors(state, motion, self.optics, self.settings.harmonics)
+        require_tensors(state, motion, self.optics, self.settings)
         rows = {name: state.tensors[name] for name in state.tensors if "/" not in name}
         shared = {*motion.shared(), *self.optics.names}
         columns = {name: value for name, value in rows.items() if name not in shared}
         self.optics.resume(rows)
-        model = SceneModel(columns, motion, state.moving_mask, self.optics)
+        dtype = self.settings.torch_dtype
+        model = SceneModel(columns, motion, state.moving_mask, self.optics, dtype=dtype)
         model.table.load(state.tensors)
         return model

@@ -8,11 +8,14 @@ scene.
 from dataclasses import dataclass, field
 from typing import Literal
 
+import torch
+
 from diff4splat.errors import ConfigError
 from diff4splat.scene.motion.hexplane.decoder import DecoderSize
 from diff4splat.scene.motion.hexplane.planes import HexPlaneSize
 
 MotionName = Literal["hexplane", "spacetime", "static"]
+DtypeName = Literal["float32", "float64"]
 CameraPart = Literal["lens", "focus", "aperture", "readout", "focal"]
 
 
@@ -117,6 +120,8 @@ class FitSettings:
     """All settings of one fit."""
 
     motion: MotionName = "hexplane"
+    dtype: DtypeName = "float32"
+    """Of parameters, optimiser, images and losses."""
     seed: int = 0
     coarse_steps: int = 1000
     """Steps without motion, over frames of all times."""
@@ -147,6 +152,11 @@ class FitSettings:
     """Cache for frames; others are read again when needed."""
     checkpoint_every: int = 1000
     judge_every: int = 500
+
+    @property
+    def torch_dtype(self) -> torch.dtype:
+        """``dtype`` as PyTorch has it."""
+        return torch.float64 if self.dtype == "float64" else torch.float32
 
     def __post_init__(self) -> None:
         counts = {

@@ -53,7 +53,7 @@ class StageLoop:
 
     def __init__(self, stage: StageSchedule, model: SceneModel, step: int = 0) -> None:
         self.stage, self.model, self.step = stage, model, step
-        self.gradients = GradientStatistics(len(model))
+        self.gradients = GradientStatistics(len(model), model.table.dtype)
         self.guard = DivergenceGuard(model)
         self._start_s = time.perf_counter()
         self._loss = 0.0
@@ -172,4 +172,4 @@ class StageLoop:
             return
         generator = torch.Generator().manual_seed(self.stage.first_step + self.step)
         densify_and_prune(self.model, self.gradients.mean(), density, generator)
-        self.gradients = GradientStatistics(len(self.model))
+        self.gradients.reset(len(self.model))

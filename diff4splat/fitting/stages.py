@@ -48,7 +48,7 @@ def fine_stage(session: FitSession, state: FitState | None, coarse: SceneModel |
     """The fine stage, from the ``coarse`` model or from a checkpoint ``state``."""
     settings = session.settings
     if state is not None:
-        bounds = stored_bounds(state)
+        bounds = stored_bounds(state, settings.torch_dtype)
         motion = create_motion(session.capture, settings, bounds)
         model = session.restored_model(state, motion)
     else:
@@ -64,7 +64,10 @@ def fine_stage(session: FitSession, state: FitState | None, coarse: SceneModel |
             cameras=coarse.cameras(learning=False),
         )
         start = init_fine_stage(coarse, moving_mask, motion, context)
-        model = SceneModel(start.rows, motion, start.moving_mask, session.optics, coarse.table)
+        model = SceneModel(
+            *(start.rows, motion, start.moving_mask, session.optics, coarse.table),
+            dtype=settings.torch_dtype,
+        )
         session.request.note(
             f"{int(moving_mask.sum()):,} of {len(moving_mask):,} Gaussians may move"
         )

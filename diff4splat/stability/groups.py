@@ -23,8 +23,8 @@ GROUPS = {
     "motion": "Nothing moves, everything moves, and rotations by half a turn.",
     "gaussians": "Degenerate Gaussians, rasterised and ray traced.",
     "losses": "Training losses of degenerate depth maps.",
-    "fits": "A few steps of per-scene fits on tiny captures; then positions in float32 against "
-    "float64.",
+    "fits": "A few steps of per-scene fits on tiny captures: positions in float32 against float64, "
+    "and whole fits in float32 against fits in float64.",
     "onnx": "ONNX Runtime against PyTorch, both in float32, on ordinary and extreme inputs.",
     "thresholds": "How many Gaussians change sides when a threshold or the image changes a little.",
 }

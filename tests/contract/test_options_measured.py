@@ -55,7 +55,7 @@ CHOICES = {
         *("Fit.learn", "Fit.seed", "Fit.set", "Convert.time", "Convert.fps", "Convert.time_range"),
         *("Convert.target", "Convert.spz_version", "ExportOnnx.model", "ExportOnnx.shapes_only"),
         *("ExportOnnx.triton", "ExportOnnx.skip_parity", "Generate.video", "Generate.ply"),
-        *("Generate.lora", "Render.dtype"),
+        *("Generate.lora", "Render.dtype", "Fit.dtype"),
     ),
     WHERE: (
         *("Generate.images", "Generate.out", "Generate.depth", "Generate.device", "Render.scene"),

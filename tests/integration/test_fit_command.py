@@ -68,6 +68,19 @@ def test_a_fitted_field_bakes_to_key_frames(
     )
 
 
+def test_a_fit_in_float64_keeps_every_bit(data: Path, tmp_path: Path) -> None:
+    out, exact = tmp_path / "fit", ("--dtype", "float64", "--compression", "lossless")
+    assert fit(data, out, *exact, "--set", "coarse_steps=5", "points=40") == 0
+    scene = load_scene(out / "scene.safetensors")
+    assert scene.gaussians.means.dtype == torch.float64
+    assert not torch.equal(scene.gaussians.means, scene.gaussians.means.float().double())
+    card = json.loads((out / "card.json").read_text())
+    assert card["settings"]["dtype"] == card["inputs"]["dtype"] == "float64"
+    assert card["finished"] and card["forecast"] is None
+    with Image.open(out / "comparison.png") as image:
+        assert image.size[0] > 1000
+
+
 def test_stopped_by_the_clock_it_goes_on(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture):
     out = tmp_path / "fit"
     assert fit(data, out, "--minutes", "0.0001") == 0
@@ -98,6 +111,8 @@ def test_another_fit_in_the_folder_is_refused_until_restart(
         (["--set", "points=none"], "expected int"),
         (["--set", "points=0"], "expected at least 1"),
         (["--format", "tape"], "tape"),
+        (["--dtype", "float64", "--renderer", "raster"], "--renderer auto, trace or reference"),
+        (["--dtype", "float64", "--device", "auto"], "and the CPU, got --renderer auto --device"),
     ],
 )
 def test_bad_options_end_in_one_line(

@@ -15,6 +15,7 @@ from diff4splat.fitting.model.canonical import COLUMNS, params_from_gaussians
 from diff4splat.fitting.motions.protocol import LearnedMotion
 from diff4splat.fitting.optics.learned import LearnedOptics
 from diff4splat.fitting.parameter_table import MOMENTS
+from diff4splat.fitting.settings import FitSettings
 from diff4splat.scene.gaussians import Gaussians
 
 STATISTICS = ("pull_total", "pull_seen")
@@ -22,7 +23,10 @@ STATISTICS = ("pull_total", "pull_seen")
 
 
 def require_tensors(
-    state: FitState, motion: LearnedMotion, optics: LearnedOptics, degree: int
+    state: FitState,
+    motion: LearnedMotion,
+    optics: LearnedOptics,
+    settings: FitSettings,
 ) -> None:
     """Require every parameter, its Adam state and the statistics, in the shapes of this fit.
 
@@ -30,34 +34,35 @@ def require_tensors(
         CheckpointError: names the first that is missing or different.
     """
     count = len(state.moving_mask)
-    for name, start in _parameters(count, motion, optics, degree).items():
+    for name, start in _parameters(count, motion, optics, settings).items():
         _require(name, state.tensors.get(name), start)
         kept = {key: state.tensors.get(f"{name}/{key}") for key in ("step", *MOMENTS)}
         if any(value is not None for value in kept.values()):
             _require(f"{name}/step", kept["step"], torch.zeros(()))
             for moment in MOMENTS:
-                _require(f"{name}/{moment}", kept[moment], start.float())
+                _require(f"{name}/{moment}", kept[moment], start)
     for name in STATISTICS:
-        _require(name, state.fixed.get(name), torch.zeros(count))
+        _require(name, state.fixed.get(name), torch.zeros(count, dtype=settings.torch_dtype))
 
 
-def stored_bounds(state: FitState) -> Float[Tensor, "2 3"]:
+def stored_bounds(state: FitState, dtype: torch.dtype) -> Float[Tensor, "2 3"]:
     """Bounds of the planes of the fine stage.
 
     Raises:
         CheckpointError: missing or of another shape.
     """
-    _require("bounds", state.fixed.get("bounds"), torch.zeros(2, 3))
+    _require("bounds", state.fixed.get("bounds"), torch.zeros(2, 3, dtype=dtype))
     return state.fixed["bounds"]
 
 
 def _parameters(
-    count: int, motion: LearnedMotion, optics: LearnedOptics, degree: int
+    count: int, motion: LearnedMotion, optics: LearnedOptics, settings: FitSettings
 ) -> Mapping[str, Tensor]:
-    """Tensors in the shapes of all parameters."""
-    rows = params_from_gaussians(_blank(count), degree)
+    """Tensors in the shapes and the dtype of all parameters."""
+    rows = params_from_gaussians(_blank(count), settings.harmonics)
     columns = {name: rows[name] for name in COLUMNS} | dict(motion.columns(count))
-    return columns | dict(motion.shared()) | optics.shared()
+    all_of = columns | dict(motion.shared()) | optics.shared()
+    return {name: value.to(settings.torch_dtype) for name, value in all_of.items()}
 
 
 def _blank(count: int) -> Gaussians:

@@ -27,11 +27,11 @@ def params_from_points(points: PointCloud, degree: int) -> dict[str, Tensor]:
     size = mean_neighbour_distance(points.positions).clamp_min(1e-6)
     identity = torch.tensor([1.0, 0.0, 0.0, 0.0]).repeat(count, 1)
     return {
-        "means": points.positions.float(),
+        "means": points.positions,
         "log_scales": size.log()[:, None].repeat(1, 3),
         "quats": identity,
         "opacity_logits": torch.full((count,), INITIAL_OPACITY).logit(),
-        "sh_dc": dc_from_color(points.rgb.float())[:, None],
+        "sh_dc": dc_from_color(points.rgb)[:, None],
         "sh_rest": torch.zeros(count, BAND_SIZES[degree] - 1, 3),
     }
 
@@ -39,13 +39,13 @@ def params_from_points(points: PointCloud, degree: int) -> dict[str, Tensor]:
 def params_from_gaussians(gaussians: Gaussians, degree: int) -> dict[str, Tensor]:
     """Parameters of existing Gaussians, with harmonics up to ``degree``."""
     count, rest = len(gaussians), BAND_SIZES[degree] - 1
-    sh = gaussians.sh.float()
+    sh = gaussians.sh
     padded = torch.cat([sh[:, 1:], sh.new_zeros(count, max(rest - sh.shape[1] + 1, 0), 3)], 1)
     return {
-        "means": gaussians.means.float(),
-        "log_scales": gaussians.scales.float().clamp(MIN_SCALE, MAX_SCALE).log(),
-        "quats": gaussians.quats.float(),
-        "opacity_logits": gaussians.opacities.float().logit(1e-6),
+        "means": gaussians.means,
+        "log_scales": gaussians.scales.clamp(MIN_SCALE, MAX_SCALE).log(),
+        "quats": gaussians.quats,
+        "opacity_logits": gaussians.opacities.logit(1e-6),
         "sh_dc": sh[:, :1],
         "sh_rest": padded[:, :rest],
     }

@@ -36,13 +36,14 @@ def static_model(
     points = initial_points(capture, bounds, count, settings.use_depth, settings.seed)
     moving_mask = torch.zeros(len(points.positions), dtype=torch.bool)
     rows = params_from_points(points, settings.harmonics)
-    return SceneModel(rows, NoMotion(capture.time_range_s), moving_mask, optics)
+    motion = NoMotion(capture.time_range_s)
+    return SceneModel(rows, motion, moving_mask, optics, dtype=settings.torch_dtype)
 
 
 def field_bounds(means: Float[Tensor, "n 3"]) -> Float[Tensor, "2 3"]:
     """Bounding box (low, high) between quantiles, so that outliers do not stretch the planes."""
     if len(means) == 0:
-        return torch.tensor([[-1.0] * 3, [1.0] * 3])
+        return means.new_tensor([[-1.0] * 3, [1.0] * 3])
     low = torch.quantile(means, BOUNDS_QUANTILE, 0)
     high = torch.quantile(means, 1 - BOUNDS_QUANTILE, 0)
     margin = BOUNDS_MARGIN * (high - low).clamp_min(1e-3 * float((high - low).max()) + 1e-9)
@@ -82,4 +83,5 @@ def model_from_scene(
     state = scene.state_at(sum(scene.motion.time_range_s) / 2)
     rows = params_from_gaussians(transform_gaussians(state, similarity), settings.harmonics)
     moving_mask = torch.zeros(len(state), dtype=torch.bool)
-    return SceneModel(rows, NoMotion(capture.time_range_s), moving_mask, optics)
+    motion = NoMotion(capture.time_range_s)
+    return SceneModel(rows, motion, moving_mask, optics, dtype=settings.torch_dtype)

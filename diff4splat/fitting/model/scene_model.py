@@ -33,16 +33,18 @@ class SceneModel:
         moving_mask: Bool[Tensor, " n"],
         optics: LearnedOptics | None = None,
         before: ParameterTable | None = None,
+        dtype: torch.dtype = torch.float32,
     ) -> None:
         """Columns of the motion that ``rows`` lacks get their initial values.
 
-        The parameters of ``optics`` continue from ``before``, the table of an earlier stage.
+        The parameters of ``optics`` continue from ``before``, the table of an earlier stage. All
+        parameters become ``dtype``.
         """
         count = len(moving_mask)
         columns = {**motion.columns(count), **rows}
         names = (*COLUMNS, *motion.columns(0))
         shared = dict(motion.shared()) | ({} if optics is None else optics.shared(before))
-        self.table = ParameterTable({name: columns[name] for name in names}, shared)
+        self.table = ParameterTable({name: columns[name] for name in names}, shared, dtype)
         self.learned_motion, self.moving_mask, self.optics = motion, moving_mask, optics
 
     def __len__(self) -> int:

@@ -66,11 +66,11 @@ def _errors(
     The gradient of Σ_pixels w · f with respect to a blended feature f is Σ_pixels w · weight. With
     w the colour error it is the error that a Gaussian takes part in.
     """
-    error_sum = torch.zeros(len(gaussians))
-    weight_sum = torch.zeros(len(gaussians))
+    error_sum = gaussians.means.new_zeros(len(gaussians))
+    weight_sum = torch.zeros_like(error_sum)
     for index in frames:
         frame = store.read(index)
-        probe = torch.zeros(len(gaussians), 2, requires_grad=True)
+        probe = gaussians.means.new_zeros(len(gaussians), 2).requires_grad_()
         if renderer.traced:
             blended = _blend_traced(gaussians, probe, renderer, index, cameras)
         else:

@@ -25,11 +25,14 @@ class HexPlaneField:
         time_range_s: tuple[float, float],
         seed: int,
     ) -> None:
+        """A field in the dtype of ``bounds``."""
         generator = torch.Generator().manual_seed(seed)
         planes = make_planes(size[0], bounds, time_range_s, generator)
         decoder = make_decoder(planes.feature_count, size[1], generator)
         self._start = HexPlaneMotion(
-            planes=planes, decoder=decoder, moving_index=torch.zeros(0, dtype=torch.long)
+            planes=replace(planes.to(bounds.dtype), bounds=bounds),
+            decoder=decoder.to(bounds.dtype),
+            moving_index=torch.zeros(0, dtype=torch.long),
         )
         self._names = tuple(self._start.tensors())
 

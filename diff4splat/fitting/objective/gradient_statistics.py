@@ -19,8 +19,9 @@ from diff4splat.render.physical.view_cone import view_cone
 class GradientStatistics:
     """Mean gradient of each Gaussian over the steps in which it is visible."""
 
-    def __init__(self, count: int) -> None:
-        self.total, self.visible_steps = torch.zeros(count), torch.zeros(count)
+    def __init__(self, count: int, dtype: torch.dtype = torch.float32) -> None:
+        self.total = torch.zeros(count, dtype=dtype)
+        self.visible_steps = torch.zeros_like(self.total)
 
     def add(self, means: Float[Tensor, "n 3"], ndc_scale: Float[Tensor, " n"]) -> None:
         """Accumulate the gradient of one step at ``means``, converted by ``ndc_scale``."""
@@ -33,7 +34,7 @@ class GradientStatistics:
 
     def reset(self, count: int | None = None) -> None:
         """Start again, for ``count`` Gaussians if their number changed."""
-        self.__init__(len(self.total) if count is None else count)
+        self.__init__(len(self.total) if count is None else count, self.total.dtype)
 
     def mean(self) -> Float[Tensor, " n"]:
         """Mean per visible step; 0 for Gaussians that were never visible."""

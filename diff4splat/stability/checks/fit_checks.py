@@ -1,4 +1,4 @@
-"""A few steps of per-scene fits on tiny captures, then the fitted motion in float64."""
+"""A few steps of per-scene fits on tiny captures; then their motion, and whole fits, in float64."""
 
 import tempfile
 from collections.abc import Callable, Iterator
@@ -11,7 +11,12 @@ import torch
 from diff4splat.data.capture.capture import Capture
 from diff4splat.fitting.fit import fit_scene
 from diff4splat.fitting.fit_types import FitRequest, FitResult
-from diff4splat.fitting.settings import FitSettings, MotionName, StaticDetectionSettings
+from diff4splat.fitting.settings import (
+    DtypeName,
+    FitSettings,
+    MotionName,
+    StaticDetectionSettings,
+)
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.hexplane.decoder import DecoderSize
 from diff4splat.scene.motion.hexplane.planes import HexPlaneSize
@@ -20,7 +25,9 @@ from diff4splat.stability.compare import all_finite, finite_gradients, relative_
 from diff4splat.stability.subjects.tiny_captures import tiny_captures
 
 GROUP = "fits"
-LIMIT = 1e-4
+LIMIT, PRECISION_LIMIT = 1e-4, 1e-3
+FLOAT64_FITS = ("moving balls", "noise")
+"""Captures that are also fitted in float64 from the first step."""
 MOTIONS: dict[MotionName, str] = {"hexplane": "HexPlane", "spacetime": "native 4D"}
 SETTINGS = FitSettings(
     coarse_steps=15,
@@ -39,7 +46,7 @@ SETTINGS = FitSettings(
 
 
 def fit_checks() -> Iterator[Check]:
-    """Each capture with each motion."""
+    """Each capture with each motion, and some in both precisions."""
     for motion, name in MOTIONS.items():
         for capture_name, build in tiny_captures().items():
             yield Check(
@@ -50,14 +57,19 @@ def fit_checks() -> Iterator[Check]:
                 error_unit="relative, worst parameter at three times",
                 quick=capture_name == "black images",
             )
+        for capture_name in FLOAT64_FITS:
+            yield Check(
+                group=GROUP,
+                name=f"{name}, {capture_name}, whole fit",
+                run=partial(measure_precision, motion, tiny_captures()[capture_name]),
+                limit=PRECISION_LIMIT,
+                error_unit="root mean square of frames, fit in float32 against fit in float64",
+            )
 
 
 def measure_fit(motion: MotionName, build: Callable[[], Capture]) -> Outcome:
     """Whether a fit ends with finite numbers, and the error of its states in float32."""
-    settings = replace(SETTINGS, motion=motion)
-    with tempfile.TemporaryDirectory() as folder:
-        request = FitRequest(capture=build(), settings=settings, folder=Path(folder))
-        result = fit_scene(request)
+    result = _fitted(motion, build(), "float32")
     states = [_states(result, time_s) for time_s in (0.0, 0.37, 1.0)]
     numbers = [value for got, _ in states for value in _values(got)]
     errors = [
@@ -74,6 +86,34 @@ def measure_fit(motion: MotionName, build: Callable[[], Capture]) -> Outcome:
         f"training frames "
         f"{sum(quality) / max(len(quality), 1):.1f} dB",
     )
+
+
+def measure_precision(motion: MotionName, build: Callable[[], Capture]) -> Outcome:
+    """How far rounding takes a whole fit: frames of the fits in float32 and in float64."""
+    capture = build()
+    usual, exact = (_fitted(motion, capture, dtype) for dtype in ("float32", "float64"))
+    errors = [
+        (one.double() - other).square().mean()
+        for one, other in zip(_frames(usual, capture), _frames(exact, capture), strict=True)
+    ]
+    numbers = [*_values(usual.gaussians), *_values(exact.gaussians)]
+    return Outcome(error=float(torch.stack(errors).mean().sqrt()), value_finite=all_finite(numbers))
+
+
+def _fitted(motion: MotionName, capture: Capture, dtype: DtypeName) -> FitResult:
+    settings = replace(SETTINGS, motion=motion, dtype=dtype)
+    with tempfile.TemporaryDirectory() as folder:
+        return fit_scene(FitRequest(capture=capture, settings=settings, folder=Path(folder)))
+
+
+@torch.no_grad()
+def _frames(result: FitResult, capture: Capture) -> list[torch.Tensor]:
+    times_s = capture.times_s.tolist()
+    states = [result.motion.state_at(result.gaussians, time_s) for time_s in times_s]
+    return [
+        result.renderer.rasterize(state, index).rgb.clamp(0, 1)
+        for index, state in enumerate(states)
+    ]
 
 
 @torch.no_grad()
