@@ -15,6 +15,9 @@ def main() -> None:
         from diff4splat.progress.interrupts import handle_stop_signals
 
         handle_stop_signals()
+        from diff4splat.io.silence_stderr import separate_python_stderr
+
+        separate_python_stderr()
         # Threads that wait must sleep: with a core busy elsewhere, spinning ones make small
         # parallel loops up to fifty times slower. Read once, when torch is loaded.
         os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -1,6 +1,7 @@
 """Bytes and levels, PNG, silence, and the first look at a path."""
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from diff4splat.errors import FileFormatError, InputError
 from diff4splat.io.photos.images import read_photo, write_png
 from diff4splat.io.pixels import from_bytes, to_bytes
 from diff4splat.io.require_file import require_file
-from diff4splat.io.silence_stderr import silence_native_stderr
+from diff4splat.io.silence_stderr import separate_python_stderr, silence_native_stderr
 
 
 def test_every_level_survives() -> None:
@@ -44,6 +45,18 @@ def test_png_is_exact_and_always_the_same(tmp_path: Path) -> None:
     with Image.open(tmp_path / "a.png") as image:
         assert (image.format, image.mode, image.size, image.info) == ("PNG", "RGB", (30, 20), {})
     assert bool((read_photo(tmp_path / "a.png").rgb - rgb).abs().max() <= 0.5 / 255 + 1e-6)
+
+
+def test_lines_of_python_pass_through_a_silenced_block(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stderr", sys.stderr)
+    separate_python_stderr()
+    with silence_native_stderr():
+        print("progress", file=sys.stderr)
+        os.write(2, b"native noise")
+    sys.stderr.close()
+    assert capfd.readouterr().err == "progress\n"
 
 
 def test_native_messages_are_silenced_only_inside(capfd: pytest.CaptureFixture[str]) -> None:
