@@ -6,8 +6,7 @@ from pathlib import Path
 
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.data.consistency.statistics import TrueFraction
-from diff4splat.data.consistency_check import (
+from diff4splat.data.consistency.check import (
     EXACT,
     MEASURED,
     Consistency,
@@ -16,6 +15,7 @@ from diff4splat.data.consistency_check import (
     consistency_limits,
     require_consistency,
 )
+from diff4splat.data.consistency.statistics import TrueFraction
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.progress.phases import Phases
 

@@ -78,13 +78,17 @@ def clip_metadata(
     """Metadata of a clip: caption, and one note per instance."""
     events = iter(facts.events)
     objects: list[ObjectNote] = []
-    for one in assembled:
+    for number, one in enumerate(assembled, 1):
         words = motion_text(next(events)) if one.placed.motion else ""
         family = one.placed.family
         name = FAMILIES[family].noun if family in FAMILIES else family
         for instance, texture in zip(one.instances, one.textures, strict=True):
             color = color_name(dominant_color(texture))
-            objects.append(ObjectNote(instance=instance, name=name, color=color, motion=words))
+            objects.append(
+                ObjectNote(
+                    instance=instance, name=name, color=color, motion=words, object_number=number
+                )
+            )
     return ClipMetadata(
         identifier=identifier,
         source=SOURCE,

@@ -84,6 +84,8 @@ class ObjectNote:
     color: str
     motion: str
     """Such as ``rolls to the left``; ``""`` is static."""
+    object_number: int = 0
+    """Instances with the same number are parts of one object; 0 is an object of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

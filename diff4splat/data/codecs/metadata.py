@@ -88,4 +88,5 @@ def _object(value: dict[str, Any]) -> ObjectNote:
         name=take(value, "name", str),
         color=take(value, "color", str),
         motion=take(value, "motion", str),
+        object_number=take_count({"object_number": 0} | value, "object_number", 0, 255),
     )

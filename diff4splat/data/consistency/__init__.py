@@ -1,1 +1,1 @@
-"""Comparisons behind consistency_check."""
+"""Comparisons behind the consistency check."""

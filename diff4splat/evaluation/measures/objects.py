@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.data.clip import ObjectNote
+from diff4splat.data.clip_objects import clip_objects
 from diff4splat.evaluation.measures.images import Entries
 from diff4splat.evaluation.measures.object_parts import eroded, is_torn
 from diff4splat.evaluation.measures.regions import MIN_PIXELS
@@ -31,11 +32,12 @@ MOVED_SHARE = 0.1
 
 
 def object_masks(sample: EvalSample) -> list[tuple[ObjectNote, Bool[Tensor, "h w"]]]:
-    """Named objects of the first image that are large enough, with their pixels."""
+    """Named objects of the first image that are large enough, with the pixels of all parts."""
     instances = sample.input_view.instances
     if instances is None:
         return []
-    masks = [(note, instances[0] == note.instance) for note in sample.clip.note.objects]
+    objects = clip_objects(sample.clip.note)
+    masks = [(one.note, one.mask(instances[0])) for one in objects]
     return [(n, mask) for n, mask in masks if float(mask.double().mean()) >= MIN_AREA_FRACTION]
 
 

@@ -10,15 +10,15 @@ from oracles_clips import make_clip
 
 from diff4splat.data.clip import Clip, View
 from diff4splat.data.clip_folder import ClipFolder
-from diff4splat.data.consistency.static_pixels import static_instances
-from diff4splat.data.consistency.statistics import ErrorStatistics, TrueFraction
-from diff4splat.data.consistency_check import (
+from diff4splat.data.consistency.check import (
     MEASURED,
     Consistency,
     Tolerances,
     measure_consistency,
     require_consistency,
 )
+from diff4splat.data.consistency.static_pixels import static_instances
+from diff4splat.data.consistency.statistics import ErrorStatistics, TrueFraction
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.errors import InputError
 from diff4splat.geometry.depth import distance_from_depth

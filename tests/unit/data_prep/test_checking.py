@@ -9,7 +9,7 @@ from clip_shards import exact_clip, write_shards
 from oracles_clips import make_clip
 
 from diff4splat.data.clip import Clip
-from diff4splat.data.consistency_check import MEASURED
+from diff4splat.data.consistency.check import MEASURED
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.checking import check_folder, tolerances_for
 from diff4splat.errors import ConfigError, FileFormatError, InputError

@@ -33,6 +33,8 @@ NOTE_FIELDS = ("identifier", "source", "license", "caption", "metric", "is_stati
 def digest(made: World) -> str:
     """Of every number and word of a world; what clips learnt to say later is not among them."""
     note = asdict(made.note)
+    for each in note["objects"]:
+        del each["object_number"]
     total = sha256(repr({name: note[name] for name in NOTE_FIELDS}).encode())
     arrays = [made.times_s, made.light.color, made.light.toward, made.light.sky, made.light.ground]
     arrays += [made.sky.zenith, made.sky.horizon]

@@ -71,6 +71,16 @@ def test_what_moves_everything_overlaps_by_the_share_of_the_object() -> None:
     assert entries[1].value == 0
 
 
+def test_parts_of_one_object_are_measured_together() -> None:
+    case = sample()
+    parts = tuple(replace(note, object_number=7) for note in case.clip.note.objects)
+    whole = replace(case, clip=replace(case.clip, note=replace(case.clip.note, objects=parts)))
+    assert len(object_masks(case)) == 2
+    ((note, mask),) = object_masks(whole)
+    assert note == parts[0]
+    assert torch.equal(mask, torch.stack([one for _, one in object_masks(case)]).any(0))
+
+
 def test_displacement_is_in_pixels_of_the_first_camera() -> None:
     displacement = image_displacement(wall_and_patch((0.3, 0.0, 0.0)), sample())
     # 40 px · 0.3 / 3.

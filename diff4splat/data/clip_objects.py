@@ -1,0 +1,37 @@
+"""Objects of a clip: one or more instances with one name.
+
+Axes: ``h w`` pixels.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, UInt8
+from torch import Tensor
+
+from diff4splat.data.clip import ClipMetadata, ObjectNote
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClipObject:
+    """One object of a clip."""
+
+    note: ObjectNote
+    """Of its first part, whose colour captions name."""
+    instances: tuple[int, ...]
+
+    def mask(self, instances: UInt8[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
+        """Its pixels in an image of ``View.instances``."""
+        return torch.isin(instances, instances.new_tensor(self.instances))
+
+
+def clip_objects(clip: ClipMetadata) -> tuple[ClipObject, ...]:
+    """All objects that the clip has notes of, in order of their first parts."""
+    objects: dict[tuple[int, int], list[ObjectNote]] = {}
+    for note in clip.objects:
+        own = (note.object_number, 0 if note.object_number else note.instance)
+        objects.setdefault(own, []).append(note)
+    return tuple(
+        ClipObject(note=parts[0], instances=tuple(part.instance for part in parts))
+        for parts in objects.values()
+    )
