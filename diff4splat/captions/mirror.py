@@ -49,4 +49,5 @@ def _mirror_move(name: str, sign: int) -> tuple[str, int]:
 
 def _swap_side(word: str) -> str:
     plain = word.rstrip(".,;:!?")
-    return OPPOSITE[plain] + word[len(plain) :] if plain in _SIDES else word
+    side = plain.removesuffix("s").removesuffix("ward")
+    return OPPOSITE[side] + word[len(side) :] if side in _SIDES else word

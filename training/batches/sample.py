@@ -21,6 +21,7 @@ from diff4splat.training.batches.motion_targets import (
     pixel_motion,
 )
 from diff4splat.training.batches.normalise_scale import in_unit
+from diff4splat.training.batches.requests.draw import draw_request
 from diff4splat.training.batches.resize import fitted
 from diff4splat.training.batches.targets import INPUT_VIEW, Targets, draw_targets, draw_tracks
 from diff4splat.training.batches.temporal_crop import at_frame_rate, crop, repeat_keyframes
@@ -58,7 +59,7 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
     if not (settings.supervise_motion or clip.note.is_static):
         targets = targets.at_first_frame()
     tracks = draw_tracks(clip, targets.frames, settings, generator)
-    motion = pixel_motion(clip, settings.input_stride)
+    motion, caption = _motion_and_caption(clip, settings, generator)
     moving = moving_mask(motion)
     depths = [_depth(clip, number, origin) for number in range(len(clip.views))]
     view, shown = clip.views[INPUT_VIEW], slice(None, None, settings.input_stride)
@@ -79,8 +80,19 @@ def make_sample(clip: Clip, settings: DataSettings, origin: Origin) -> ClipBatch
         moving=moving[None],
         motion_known=torch.tensor([motion_known(clip, settings.input_stride)]),
         is_static=torch.tensor([clip.note.is_static]),
-        captions=(clip.note.caption,),
+        captions=(caption,),
     )
+
+
+def _motion_and_caption(
+    clip: Clip, settings: DataSettings, generator: torch.Generator
+) -> tuple[Float[Tensor, "3 t h w"], str]:
+    """The clip's own, or those of another request for its first image."""
+    motion = pixel_motion(clip, settings.input_stride)
+    if not settings.other_object_share + settings.absent_object_share:
+        return motion, clip.note.caption
+    request = draw_request(clip, motion.shape[1], settings, generator)
+    return (motion, clip.note.caption) if request is None else (request.motion, request.caption)
 
 
 def _as_source(

@@ -78,6 +78,12 @@ class DataSettings:
     faster; the motion network needs no other."""
     keyframe_stride: int = 1
     """Input frames from one keyframe to the next; tracked points start at keyframes."""
+    other_object_share: float = 0.0
+    """Stage ``motion_diffusion``: share of samples that ask for another named object of the first
+    image, with a displacement to match."""
+    absent_object_share: float = 0.0
+    """Stage ``motion_diffusion``: share of samples that ask for an object that is not there, or has
+    another colour; then nothing moves."""
     workers: int = 1
     """Worker processes; 0 prepares samples in the training process."""
     in_memory: bool = False
@@ -104,6 +110,14 @@ class DataSettings:
         require(0 <= self.fps < math.inf, "data.fps", "at least 0", self.fps)
         share = self.min_valid_depth
         require(0 <= share <= 1, "data.min_valid_depth", "0 to 1", share)
+        requests = (self.other_object_share, self.absent_object_share)
+        valid = min(requests) >= 0 and sum(requests) <= 1
+        require(
+            valid,
+            "data.other_object_share and data.absent_object_share",
+            "0 to 1 together",
+            requests,
+        )
 
     @property
     def clip_frames(self) -> int:

@@ -17,6 +17,7 @@ from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.stages.model_stage import StagePlan
 
+VARIANTS = 2**31
 DEFAULT_CAPTION = "a scene"
 """Replaces missing captions, so that every process runs the text encoder."""
 
@@ -61,6 +62,9 @@ class TextConditioning:
         paraphrased = []
         generators = self.plan.random.per_sample(batch, "words")
         for caption, own in zip(batch.captions, generators, strict=True):
-            draw, variant = torch.rand((), generator=own), torch.randint(12, (), generator=own)
+            draw, variant = (
+                torch.rand((), generator=own),
+                torch.randint(VARIANTS, (), generator=own),
+            )
             paraphrased.append(paraphrase(caption, float(draw), int(variant)))
         return paraphrased

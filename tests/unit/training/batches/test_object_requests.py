@@ -1,0 +1,174 @@
+"""Other requests for the same first image: what they say is what moves."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from diff4splat.captions.phrasings import TRAINING
+from diff4splat.captions.synonyms import COLOR_SYNONYMS, SIDES, names
+from diff4splat.captions.vocabulary import NOUNS
+from diff4splat.data.clip import Clip, ClipMetadata, ObjectNote, View
+from diff4splat.errors import ConfigError
+from diff4splat.geometry.camera import pinhole
+from diff4splat.models.motion_unet.motion_field import UNIT
+from diff4splat.training.batches.requests.captions import (
+    caption_of_absent_object,
+    caption_of_object,
+)
+from diff4splat.training.batches.requests.draw import ObjectRequest, draw_request
+from diff4splat.training.recipe.data import DataSettings
+
+SIDE, FRAMES = 16, 3
+DEPTHS = {1: 8.0, 2: 3.0, 3: 3.0, 4: 5.0}
+OTHERS = DataSettings(other_object_share=1.0)
+ABSENT = DataSettings(absent_object_share=1.0)
+
+
+def _note(instance: int, color: str, name: str, number: int) -> ObjectNote:
+    return ObjectNote(instance=instance, color=color, name=name, motion="", object_number=number)
+
+
+NOTES = (
+    _note(1, "green", "ground", 1),
+    _note(2, "red", "mug", 2),
+    _note(3, "white", "mug", 2),
+    _note(4, "blue", "box", 3),
+)
+
+
+def clip(notes: tuple[ObjectNote, ...] = NOTES) -> Clip:
+    """A mug of two parts and a box before a ground."""
+    instances = torch.ones(SIDE, SIDE, dtype=torch.uint8)
+    instances[2:6, 2:6], instances[2:6, 6:8], instances[9:14, 9:14] = 2, 3, 4
+    depth = torch.zeros(SIDE, SIDE)
+    for number, value in DEPTHS.items():
+        depth[instances == number] = value
+    view = View(
+        rgb=torch.zeros(FRAMES, SIDE, SIDE, 3, dtype=torch.uint8),
+        depth=depth.repeat(FRAMES, 1, 1),
+        cameras=pinhole(20.0, (SIDE, SIDE)).with_pose(torch.eye(4).repeat(FRAMES, 1, 1)),
+        instances=instances.repeat(FRAMES, 1, 1),
+    )
+    note = ClipMetadata(identifier="x", source="test", license="CC0-1.0", objects=notes)
+    return Clip(note=note, times_s=torch.arange(FRAMES).double(), views=(view,))
+
+
+def requests(settings: DataSettings, count: int = 80, given: Clip | None = None) -> list:
+    given = given or clip()
+    return [
+        draw_request(given, FRAMES, settings, torch.Generator().manual_seed(seed))
+        for seed in range(count)
+    ]
+
+
+def _asked(request: ObjectRequest) -> set[int]:
+    moved = request.motion.norm(dim=0).amax(0) > 0
+    return set(clip().views[0].instances[0][moved].tolist())
+
+
+def test_what_a_caption_names_moves_whole_and_alone() -> None:
+    seen = set()
+    for request in requests(OTHERS):
+        asked = _asked(request)
+        words = set(request.caption.replace(",", "").split())
+        mug = bool(words & {"red", "crimson", *" ".join(names("mug")).split()})
+        assert asked == ({2, 3} if mug else {4}), request.caption
+        moved = request.motion.norm(dim=0).amax(0) > 0
+        instances = clip().views[0].instances[0].int()
+        assert torch.equal(moved, torch.isin(instances, torch.tensor(sorted(asked)).int()))
+        seen.add(mug)
+    assert seen == {True, False}
+
+
+def _direction(caption: str) -> str:
+    """By the longest phrase that fits: "toward the left" is not toward the camera."""
+    phrases = [(len(one), name) for name, each in SIDES.items() for one in each if one in caption]
+    return max(phrases)[1]
+
+
+def test_objects_move_as_one_and_to_the_side_that_is_asked_for() -> None:
+    directions = {"left": (0, -1), "right": (0, 1), "toward": (2, -1), "away": (2, 1)}
+    depth, seen = clip().views[0].depth[0], set()
+    for request in requests(OTHERS):
+        axis, sign = directions[_direction(request.caption)]
+        moved = request.motion[:, -1].norm(dim=0) > 0
+        ends = (request.motion[:, -1] * depth * UNIT)[:, moved].mT
+        torch.testing.assert_close(ends, ends[:1].expand_as(ends))
+        length = float(ends[0].norm())
+        assert sign * float(ends[0, axis]) >= 0.9 * length, request.caption
+        assert 0.1 <= length / float(depth[moved].median()) <= 0.5 + 1e-6
+        seen.add(axis)
+    assert seen == {0, 2}
+
+
+def test_motion_starts_at_rest_and_is_even() -> None:
+    for request in requests(OTHERS, 8):
+        assert not bool(request.motion[:, 0].any())
+        torch.testing.assert_close(2 * request.motion[:, 1], request.motion[:, 2])
+
+
+def test_nothing_moves_for_an_absent_object() -> None:
+    for request in requests(ABSENT):
+        assert not bool(request.motion.any())
+        words = request.caption.split()
+        present = ("red", *names("mug")), ("blue", *names("box"))
+        for color, *nouns in present:
+            colors = {color, *COLOR_SYNONYMS.get(color, ())}
+            ends = {noun.split()[-1] for noun in nouns}
+            assert not (colors & set(words) and ends & set(words)), request.caption
+
+
+def test_both_kinds_of_absent_objects_occur() -> None:
+    captions = [request.caption for request in requests(ABSENT, 200)]
+    present = {word for noun in ("mug", "box") for name in names(noun) for word in name.split()}
+    wrong_color = [bool(present & set(caption.split())) for caption in captions]
+    assert 0.2 < sum(wrong_color) / len(wrong_color) < 0.8
+
+
+def test_a_name_that_fits_two_objects_is_not_used() -> None:
+    notes = [_note(1, "red", "ball", 1), _note(2, "orange", "ball", 2), _note(3, "blue", "ball", 3)]
+    generator = torch.Generator().manual_seed(0)
+    assert caption_of_object(notes, 0, "left", generator) is None
+    captions = [caption_of_object(notes, 2, "left", generator) for _ in range(40)]
+    assert all("blue" in caption for caption in captions)
+
+
+def test_an_image_of_everything_has_no_absent_noun_but_other_colors() -> None:
+    notes = [_note(k, "red", noun, k) for k, noun in enumerate(NOUNS, 1)]
+    generator = torch.Generator().manual_seed(1)
+    captions = [caption_of_absent_object(notes, generator) for _ in range(40)]
+    assert not any("red " in caption or "crimson" in caption for caption in captions)
+
+
+@pytest.mark.parametrize("lacking", ["instances", "depth"])
+def test_clips_without_masks_or_depth_keep_their_own(lacking: str) -> None:
+    view = replace(clip().views[0], **{lacking: None})
+    for settings in (OTHERS, ABSENT):
+        assert set(requests(settings, 4, replace(clip(), views=(view,)))) == {None}
+
+
+def test_clips_without_named_objects_keep_their_own() -> None:
+    for notes in ((), NOTES[:1]):
+        assert set(requests(OTHERS, 4, clip(notes))) == {None}
+        assert set(requests(ABSENT, 4, clip(notes))) == {None}
+
+
+def test_shares_are_kept() -> None:
+    settings = DataSettings(other_object_share=0.5, absent_object_share=0.2)
+    found = requests(settings, 400)
+    own = sum(request is None for request in found) / 400
+    absent = sum(request is not None and not bool(request.motion.any()) for request in found) / 400
+    assert own == pytest.approx(0.3, abs=0.07)
+    assert absent == pytest.approx(0.2, abs=0.06)
+
+
+@pytest.mark.parametrize("shares", [(0.8, 0.3), (-0.1, 0.0), (0.0, 1.1)])
+def test_shares_must_fit_together(shares: tuple[float, float]) -> None:
+    with pytest.raises(ConfigError, match="other_object_share"):
+        DataSettings(other_object_share=shares[0], absent_object_share=shares[1])
+
+
+def test_captions_are_of_the_training_templates() -> None:
+    assert all("see how" not in request.caption for request in requests(OTHERS))
+    assert len(TRAINING) > 40

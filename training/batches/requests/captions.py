@@ -1,0 +1,92 @@
+"""Captions that ask for one object of an image by a name that fits no other, or for none."""
+
+import torch
+
+from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.phrasings import (
+    Choices,
+    any_object_name,
+    noun_name,
+    object_name,
+    request,
+)
+from diff4splat.captions.synonyms import may_be_confused
+from diff4splat.captions.vocabulary import DIRECTIONS, NOUNS
+from diff4splat.data.clip import ObjectNote
+
+LIKE_COLORS = frozenset(
+    frozenset(pair.split())
+    for pair in (
+        *("red orange", "red pink", "red brown", "red purple", "orange yellow", "orange brown"),
+        *("orange beige", "yellow beige", "yellow green", "brown beige", "brown black"),
+        *("beige white", "beige pink", "beige grey", "pink purple", "green turquoise"),
+        *("turquoise blue", "blue purple", "blue grey", "turquoise grey", "white grey"),
+        *("grey black", "brown grey"),
+    )
+)
+"""Colours that one object may be seen in, by its light."""
+PLAIN_SHARE = 0.3
+"""Share of captions of the form ``the red ball moves to the left``."""
+_LARGEST = 2**31
+
+
+def caption_of_object(
+    notes: list[ObjectNote], index: int, direction: str, generator: torch.Generator
+) -> str | None:
+    """A caption that asks the object at ``index`` to move; None if no name fits it alone."""
+    note, others = notes[index], notes[:index] + notes[index + 1 :]
+    like = [other for other in others if may_be_confused(note.name, other.name)]
+    if any(_colors_alike(note.color, other.color) for other in like):
+        return None
+    kinds = ["full", "full", "full"] + ["noun"] * (not like)
+    if not any(_colors_alike(note.color, other.color) for other in others):
+        kinds.append("color")
+    named = NamedObject(note.color, note.name)
+    return _caption(named, _pick(kinds, generator), direction, generator)
+
+
+def caption_of_absent_object(notes: list[ObjectNote], generator: torch.Generator) -> str | None:
+    """A caption that asks for a noun that no object has, or for another colour of one of them.
+
+    None if the image has objects of all nouns and no other colour can be asked for.
+    """
+    direction = tuple(DIRECTIONS)[_number(generator) % len(DIRECTIONS)]
+    colors = list(COLOR_NAMES)
+    nouns = [n for n in NOUNS if not any(may_be_confused(n, note.name) for note in notes)]
+    kind = ("full", "full", "noun")[_number(generator) % 3]
+    if _number(generator) % 2 or not nouns:
+        kind, nouns = "full", [_pick([note.name for note in notes], generator)]
+        taken = [other.color for other in notes if may_be_confused(nouns[0], other.name)]
+        colors = [c for c in colors if not any(_colors_alike(c, one) for one in taken)]
+    if not colors:
+        return None
+    named = NamedObject(_pick(colors, generator), _pick(nouns, generator))
+    return _caption(named, kind, direction, generator)
+
+
+def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Generator) -> str:
+    if float(torch.rand((), generator=generator)) < PLAIN_SHARE and kind == "full":
+        return f"the {named.color} {named.noun} moves {DIRECTIONS[direction]}"
+    choices = Choices(_number(generator))
+    if kind == "full":
+        name = object_name(named, choices)
+    else:
+        name = (
+            noun_name(named.noun, choices)
+            if kind == "noun"
+            else any_object_name(named.color, choices)
+        )
+    return request(name, direction, choices)
+
+
+def _colors_alike(color: str, other: str) -> bool:
+    return color == other or frozenset((color, other)) in LIKE_COLORS
+
+
+def _pick(words: list[str], generator: torch.Generator) -> str:
+    return words[_number(generator) % len(words)]
+
+
+def _number(generator: torch.Generator) -> int:
+    return int(torch.randint(_LARGEST, (), generator=generator))

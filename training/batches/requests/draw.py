@@ -1,0 +1,112 @@
+"""Other requests for the same first image: another object moves, or one that is not there.
+
+In a clip mostly one object moves, often the most salient one, so a network can leave the words out.
+With these samples only the words say what moves. Axes: ``t`` latent frames, ``h w`` pixels.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from diff4splat.captions.vocabulary import NOUNS
+from diff4splat.data.clip import Clip, ObjectNote, View
+from diff4splat.data.clip_objects import clip_objects
+from diff4splat.training.batches.requests.captions import (
+    caption_of_absent_object,
+    caption_of_object,
+)
+from diff4splat.training.batches.requests.displacement import (
+    draw_direction,
+    draw_motion,
+)
+from diff4splat.training.batches.targets import INPUT_VIEW
+from diff4splat.training.recipe.data import DataSettings
+
+AREA_SHARES = (0.003, 0.4)
+"""Smallest and largest share of the image that an object is asked for with."""
+PRESENT_SHARE = 5e-4
+"""Share of the image from which a name may mean an object."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectRequest:
+    """A caption and the motion that it asks for."""
+
+    caption: str
+    motion: Float[Tensor, "3 t h w"]
+    """As ``pixel_motion``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _PresentObject:
+    note: ObjectNote
+    mask: Bool[Tensor, "h w"]
+    """Its pixels with depth."""
+
+    @property
+    def is_asked_for(self) -> bool:
+        least, most = (share * self.mask.numel() for share in AREA_SHARES)
+        return least <= int(self.mask.sum()) <= most
+
+
+def draw_request(
+    clip: Clip, latent_frames: int, settings: DataSettings, generator: torch.Generator
+) -> ObjectRequest | None:
+    """Another request for the clip's first image; None keeps the clip's own.
+
+    ``settings`` has the shares of both kinds. Clips without depth, masks or names of objects keep
+    their own, as do those in which no name fits one object alone.
+    """
+    view, draw = clip.views[INPUT_VIEW], float(torch.rand((), generator=generator))
+    objects = _present_objects(clip, view)
+    if not objects:
+        return None
+    if draw < settings.absent_object_share:
+        return _absent_object(objects, latent_frames, generator)
+    if draw < settings.absent_object_share + settings.other_object_share:
+        return _other_object(objects, view.depth[0].float(), latent_frames, generator)
+    return None
+
+
+def _present_objects(clip: Clip, view: View) -> list[_PresentObject]:
+    """Objects with a noun of captions that the first image shows."""
+    if view.instances is None or view.depth is None:
+        return []
+    instances, seen = view.instances[0], view.depth[0] > 0
+    named = [one for one in clip_objects(clip.note) if one.note.name in NOUNS]
+    objects = [_PresentObject(note=one.note, mask=one.mask(instances) & seen) for one in named]
+    least = PRESENT_SHARE * instances.numel()
+    return [one for one in objects if int(one.mask.sum()) >= least]
+
+
+def _absent_object(
+    objects: list[_PresentObject], latent_frames: int, generator: torch.Generator
+) -> ObjectRequest | None:
+    """Nothing moves, because the caption names no object of the image."""
+    caption = caption_of_absent_object([one.note for one in objects], generator)
+    if caption is None:
+        return None
+    motion = torch.zeros(3, latent_frames, *objects[0].mask.shape)
+    return ObjectRequest(caption=caption, motion=motion)
+
+
+def _other_object(
+    objects: list[_PresentObject],
+    depth: Float[Tensor, "h w"],
+    latent_frames: int,
+    generator: torch.Generator,
+) -> ObjectRequest | None:
+    """One of the objects moves to one side."""
+    numbers = [number for number, one in enumerate(objects) if one.is_asked_for]
+    if not numbers:
+        return None
+    number = numbers[int(torch.randint(len(numbers), (), generator=generator))]
+    direction = draw_direction(generator)
+    notes = [one.note for one in objects]
+    caption = caption_of_object(notes, number, direction, generator)
+    if caption is None:
+        return None
+    motion = draw_motion(objects[number].mask, depth, latent_frames, direction, generator)
+    return ObjectRequest(caption=caption, motion=motion)
