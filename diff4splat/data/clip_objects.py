@@ -35,3 +35,11 @@ def clip_objects(clip: ClipMetadata) -> tuple[ClipObject, ...]:
         ClipObject(note=parts[0], instances=tuple(part.instance for part in parts))
         for parts in objects.values()
     )
+
+
+def present_objects(
+    clip: ClipMetadata, instances: UInt8[Tensor, "h w"], least_share: float
+) -> list[tuple[ObjectNote, Bool[Tensor, "h w"]]]:
+    """Objects that fill ``least_share`` of an image or more, with the pixels of all parts."""
+    masks = [(one.note, one.mask(instances)) for one in clip_objects(clip)]
+    return [(note, mask) for note, mask in masks if float(mask.double().mean()) >= least_share]

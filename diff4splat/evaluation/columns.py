@@ -272,6 +272,21 @@ COLUMNS = (
         tasks=("text",),
         meaning="fraction of static Gaussians if the text requests no motion",
     ),
+    Column(
+        key="text_free",
+        title="direction, free words",
+        better="higher",
+        tasks=("text",),
+        meaning="direction right with sentences that no network was trained on",
+    ),
+    Column(
+        key="text_absent",
+        title="still if absent",
+        better="higher",
+        tasks=("text",),
+        meaning="share of samples in which nothing moves if the text names an object that is not "
+        "there, or in another colour",
+    ),
 )
 PRIMARY = {"generation": "psnr", "reconstruction": "psnr", "text": "text_right"}
 """Metric that ranks the items from best to worst."""

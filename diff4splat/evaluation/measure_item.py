@@ -17,11 +17,14 @@ from diff4splat.evaluation.measure_rows import (
 from diff4splat.evaluation.measures.camera_poses import pose_entries
 from diff4splat.evaluation.measures.diversity import diversity_entries
 from diff4splat.evaluation.measures.images import Entries, true_images
+from diff4splat.evaluation.measures.requests import request_entries
 from diff4splat.evaluation.measures.scenes import check_path, scene_entries
 from diff4splat.evaluation.measures.text import (
     Captioner,
+    TextConditionedSystem,
     plain_caption,
     text_entries,
+    text_sample,
     zero_motion_entries,
 )
 from diff4splat.evaluation.measures.videos import VideoNetworks, video_entries
@@ -84,14 +87,21 @@ def measure_item(item: int, clip: Clip, setup: Setup) -> ItemResult:
 
 
 def _measure_text(sample: EvalSample, setup: Setup) -> Entries:
-    entries = text_entries(SYSTEM, sample, setup.system, setup.captioner, setup.protocol)
+    entries = _text_row(SYSTEM, sample, setup.system, setup)
     for variant in setup.variants:
         if variant.same:
             entries += [replace(e, row=variant.row) for e in entries if e.row == SYSTEM]
             continue
-        system = variant.system
-        entries += text_entries(variant.row, sample, system, setup.captioner, setup.protocol)
+        entries += _text_row(variant.row, sample, variant.system, setup)
     return entries + zero_motion_entries(ZERO_MOTION, sample)
+
+
+def _text_row(row: str, sample: EvalSample, system: TextConditionedSystem, setup: Setup) -> Entries:
+    entries = text_entries(row, sample, system, setup.captioner, setup.protocol)
+    target = text_sample(sample)
+    if target is None:
+        return entries
+    return entries + request_entries(row, target, system, setup.protocol)
 
 
 def _measure_images(sample: EvalSample, setup: Setup) -> Entries:

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.data.clip import ObjectNote
-from diff4splat.data.clip_objects import clip_objects
+from diff4splat.data.clip_objects import present_objects
 from diff4splat.evaluation.measures.images import Entries
 from diff4splat.evaluation.measures.object_parts import eroded, is_torn
 from diff4splat.evaluation.measures.regions import MIN_PIXELS
@@ -36,9 +36,7 @@ def object_masks(sample: EvalSample) -> list[tuple[ObjectNote, Bool[Tensor, "h w
     instances = sample.input_view.instances
     if instances is None:
         return []
-    objects = clip_objects(sample.clip.note)
-    masks = [(one.note, one.mask(instances[0])) for one in objects]
-    return [(n, mask) for n, mask in masks if float(mask.double().mean()) >= MIN_AREA_FRACTION]
+    return present_objects(sample.clip.note, instances[0], MIN_AREA_FRACTION)
 
 
 def image_displacement(scene: Scene, sample: EvalSample) -> Float[Tensor, "h w 2"]:

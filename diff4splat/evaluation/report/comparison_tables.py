@@ -16,6 +16,7 @@ ABLATION_KEYS = (
     *("psnr", "perceptual", "hidden_psnr", "hidden_perceptual", "depth_pearson", "depth_absrel"),
     *("track_error", "object_iou", "object_torn"),
     *("text_right", "text_both", "text_still", "text_object"),
+    *("text_free", "text_absent"),
 )
 """Columns in which networks are compared; ``results.json`` has all."""
 

@@ -74,7 +74,7 @@ def test_text_is_asked_of_the_same_model(protocol_file: Path, tmp_path: Path) ->
         model="test", protocol=str(protocol_file), task="text", out=tmp_path / "out", steps=2
     ).run()
     stored = json.loads((tmp_path / "out" / "results.json").read_text())
-    keys = {"text_right", "text_both", "text_still"}
+    keys = {"text_right", "text_both", "text_still", "text_free", "text_absent"}
     # A random model moves nothing, so nothing can be torn.
     assert {cell["key"] for cell in stored["table"]} == keys | {"object_iou", "text_object"}
 

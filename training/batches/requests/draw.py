@@ -10,13 +10,15 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.captions.vocabulary import NOUNS
-from diff4splat.data.clip import Clip, ObjectNote, View
-from diff4splat.data.clip_objects import clip_objects
-from diff4splat.training.batches.requests.captions import (
+from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.requests import (
+    PRESENT_SHARE,
     caption_of_absent_object,
     caption_of_object,
 )
+from diff4splat.captions.vocabulary import NOUNS
+from diff4splat.data.clip import Clip, View
+from diff4splat.data.clip_objects import present_objects
 from diff4splat.training.batches.requests.displacement import (
     draw_direction,
     draw_motion,
@@ -26,8 +28,6 @@ from diff4splat.training.recipe.data import DataSettings
 
 AREA_SHARES = (0.003, 0.4)
 """Smallest and largest share of the image that an object is asked for with."""
-PRESENT_SHARE = 5e-4
-"""Share of the image from which a name may mean an object."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class ObjectRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _PresentObject:
-    note: ObjectNote
+    named: NamedObject
     mask: Bool[Tensor, "h w"]
     """Its pixels with depth."""
 
@@ -74,18 +74,19 @@ def _present_objects(clip: Clip, view: View) -> list[_PresentObject]:
     """Objects with a noun of captions that the first image shows."""
     if view.instances is None or view.depth is None:
         return []
-    instances, seen = view.instances[0], view.depth[0] > 0
-    named = [one for one in clip_objects(clip.note) if one.note.name in NOUNS]
-    objects = [_PresentObject(note=one.note, mask=one.mask(instances) & seen) for one in named]
-    least = PRESENT_SHARE * instances.numel()
-    return [one for one in objects if int(one.mask.sum()) >= least]
+    seen, objects = view.depth[0] > 0, []
+    for note, mask in present_objects(clip.note, view.instances[0], PRESENT_SHARE):
+        if note.name in NOUNS:
+            named = NamedObject(note.color, note.name)
+            objects.append(_PresentObject(named=named, mask=mask & seen))
+    return objects
 
 
 def _absent_object(
     objects: list[_PresentObject], latent_frames: int, generator: torch.Generator
 ) -> ObjectRequest | None:
     """Nothing moves, because the caption names no object of the image."""
-    caption = caption_of_absent_object([one.note for one in objects], generator)
+    caption = caption_of_absent_object([one.named for one in objects], generator)
     if caption is None:
         return None
     motion = torch.zeros(3, latent_frames, *objects[0].mask.shape)
@@ -104,8 +105,8 @@ def _other_object(
         return None
     number = numbers[int(torch.randint(len(numbers), (), generator=generator))]
     direction = draw_direction(generator)
-    notes = [one.note for one in objects]
-    caption = caption_of_object(notes, number, direction, generator)
+    names = [one.named for one in objects]
+    caption = caption_of_object(names, number, direction, generator)
     if caption is None:
         return None
     motion = draw_motion(objects[number].mask, depth, latent_frames, direction, generator)

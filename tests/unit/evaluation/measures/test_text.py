@@ -119,3 +119,27 @@ def test_with_one_named_object_none_could_be_mistaken_for_it(clip: Clip) -> None
     result = measure(one, obedient)
     assert result.value(SYSTEM, "text_object") is None
     assert any(skip.key == "text_object" for skip in result.skips)
+
+
+def test_free_sentences_are_obeyed_like_plain_ones(clip: Clip) -> None:
+    result = measure(clip, obedient)
+    assert result.value(SYSTEM, "text_free") == 1
+    # It moves the patch whatever is named.
+    assert result.value(SYSTEM, "text_absent") == 0
+
+
+def test_a_system_that_knows_names_moves_nothing_for_others(clip: Clip) -> None:
+    def careful(caption: str) -> Scene:
+        return obedient(caption) if "patch" in caption else wall_and_patch()
+
+    result = measure(clip, careful)
+    assert (result.value(SYSTEM, "text_free"), result.value(SYSTEM, "text_absent")) == (1, 1)
+
+
+def test_a_system_that_reads_plain_sentences_alone_fails_at_free_ones(clip: Clip) -> None:
+    def plain(caption: str) -> Scene:
+        return obedient(caption) if caption.startswith("the red patch") else wall_and_patch()
+
+    result = measure(clip, plain)
+    assert result.value(SYSTEM, "text_right") == 1
+    assert result.value(SYSTEM, "text_free") == 0

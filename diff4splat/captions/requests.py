@@ -13,7 +13,6 @@ from diff4splat.captions.phrasings import (
 )
 from diff4splat.captions.synonyms import may_be_confused
 from diff4splat.captions.vocabulary import DIRECTIONS, NOUNS
-from diff4splat.data.clip import ObjectNote
 
 LIKE_COLORS = frozenset(
     frozenset(pair.split())
@@ -26,38 +25,39 @@ LIKE_COLORS = frozenset(
     )
 )
 """Colours that one object may be seen in, by its light."""
+PRESENT_SHARE = 5e-4
+"""Share of the image from which a name may mean an object."""
 PLAIN_SHARE = 0.3
 """Share of captions of the form ``the red ball moves to the left``."""
 _LARGEST = 2**31
 
 
 def caption_of_object(
-    notes: list[ObjectNote], index: int, direction: str, generator: torch.Generator
+    objects: list[NamedObject], index: int, direction: str, generator: torch.Generator
 ) -> str | None:
     """A caption that asks the object at ``index`` to move; None if no name fits it alone."""
-    note, others = notes[index], notes[:index] + notes[index + 1 :]
-    like = [other for other in others if may_be_confused(note.name, other.name)]
-    if any(_colors_alike(note.color, other.color) for other in like):
+    named, others = objects[index], objects[:index] + objects[index + 1 :]
+    like = [other for other in others if may_be_confused(named.noun, other.noun)]
+    if any(_colors_alike(named.color, other.color) for other in like):
         return None
     kinds = ["full", "full", "full"] + ["noun"] * (not like)
-    if not any(_colors_alike(note.color, other.color) for other in others):
+    if not any(_colors_alike(named.color, other.color) for other in others):
         kinds.append("color")
-    named = NamedObject(note.color, note.name)
     return _caption(named, _pick(kinds, generator), direction, generator)
 
 
-def caption_of_absent_object(notes: list[ObjectNote], generator: torch.Generator) -> str | None:
+def caption_of_absent_object(objects: list[NamedObject], generator: torch.Generator) -> str | None:
     """A caption that asks for a noun that no object has, or for another colour of one of them.
 
     None if the image has objects of all nouns and no other colour can be asked for.
     """
     direction = tuple(DIRECTIONS)[_number(generator) % len(DIRECTIONS)]
     colors = list(COLOR_NAMES)
-    nouns = [n for n in NOUNS if not any(may_be_confused(n, note.name) for note in notes)]
+    nouns = [n for n in NOUNS if not any(may_be_confused(n, one.noun) for one in objects)]
     kind = ("full", "full", "noun")[_number(generator) % 3]
-    if _number(generator) % 2 or not nouns:
-        kind, nouns = "full", [_pick([note.name for note in notes], generator)]
-        taken = [other.color for other in notes if may_be_confused(nouns[0], other.name)]
+    if objects and (_number(generator) % 2 or not nouns):
+        kind, nouns = "full", [_pick([one.noun for one in objects], generator)]
+        taken = [one.color for one in objects if may_be_confused(nouns[0], one.noun)]
         colors = [c for c in colors if not any(_colors_alike(c, one) for one in taken)]
     if not colors:
         return None
