@@ -33,6 +33,8 @@ def with_displacement(
     if displacement.shape[1:3] == maps.depth.shape:
         return replace(maps, displacement=displacement)
     fine = maps.fine or FineMaps(rgb=image.rgb, depth=depth)
+    if fine.depth.shape == depth.shape:
+        fine = replace(fine, depth=depth)
     at_fine_depth, at_fine = upsample_maps(depth, displacement, (image.rgb, fine.rgb))
     at_fine = at_fine * (fine.depth / at_fine_depth)[..., None]
     small = reduced_displacement(displacement, depth, maps.depth)

@@ -15,6 +15,7 @@ from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
 from diff4splat.generation.layered_image.build import FineMaps, ImageMaps
+from diff4splat.generation.layered_image.mask_rim import with_rim
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
 from diff4splat.generation.motion_maps import (
     depth_at,
@@ -52,10 +53,13 @@ def image_maps(
     mask = motion.mask(request.settings.motion.threshold)
     mean = motion.field if request.settings.motion.steps == 1 else motion.mean_field
     depth = depth_at(maps, images.small, image)
+    shows_photograph = image.reduction < images.small.reduction or image is images.small
+    if shows_photograph:
+        mask, depth = with_rim(mask, depth, image.rgb)
     displacement = rigid_component_offsets(motion.field, mask, depth, mean)
     if not displacement.any():
         return maps
-    if image.reduction < images.small.reduction or image is images.small:
+    if shows_photograph:
         return with_displacement(maps, image, depth, displacement)
     return with_majority_displacement(maps, depth, displacement)
 

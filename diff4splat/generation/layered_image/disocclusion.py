@@ -37,16 +37,35 @@ def inpaint_border(
     static = ~grown(moving)
     if not _inpaints(static):
         return layer
-    half = slice(CELL_PX // 2, None, CELL_PX)
-    rows, columns = (side // CELL_PX for side in rgb.shape[:2])
-    top, left = (
-        (size - side) // 2 for size, side in zip(layer.mask.shape, (rows, columns), strict=True)
-    )
-    inner = (slice(top, top + rows), slice(left, left + columns))
+    half, inner = slice(CELL_PX // 2, None, CELL_PX), _inner(layer, rgb.shape[:2])
     colors = layer.rgb.clone()
     fresh = fill_from_neighbours(rgb, static)[half, half]
     colors[inner] = torch.where(static[half, half][..., None], colors[inner], fresh)
     return replace(layer, rgb=colors)
+
+
+def without_uncovered(layer: ImageLayer, moving: Bool[Tensor, "h w"]) -> ImageLayer:
+    """The layer without its static cells behind what moves, which would hide an uncovered layer.
+
+    The border extension has cells of 4 pixels; those whose middle moves are left out.
+    """
+    if layer.depth.shape == moving.shape:
+        behind = (
+            moving if layer.displacement is None else moving & ~layer.displacement.any(-1).any(0)
+        )
+        return replace(layer, mask=layer.mask & ~behind)
+    half = slice(CELL_PX // 2, None, CELL_PX)
+    mask = layer.mask.clone()
+    inner = _inner(layer, moving.shape)
+    mask[inner] &= ~moving[half, half]
+    return replace(layer, mask=mask)
+
+
+def _inner(layer: ImageLayer, size_px: torch.Size) -> tuple[slice, slice]:
+    """Cells of a border extension that lie on the image."""
+    sides = [side // CELL_PX for side in size_px]
+    first = [(whole - side) // 2 for whole, side in zip(layer.mask.shape, sides, strict=True)]
+    return tuple(slice(start, start + side) for start, side in zip(first, sides, strict=True))
 
 
 def fill_from_neighbours(

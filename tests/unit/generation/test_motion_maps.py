@@ -66,15 +66,21 @@ def test_the_small_copy_needs_no_larger_one() -> None:
     assert maps.fine is None and maps.displacement is displacement
 
 
-@pytest.mark.parametrize("side", [2 * SIDE_PX, 4 * SIDE_PX])
-def test_a_larger_copy_with_depth_keeps_it(side: int) -> None:
+def test_a_still_larger_copy_with_depth_keeps_it() -> None:
     depth, displacement = one_pixel()
-    fine = FineMaps(rgb=(LARGER if side == 32 else PHOTO).rgb, depth=torch.full((side, side), 6.0))
-    maps = replace(plane_maps(), fine=fine)
-    whole = with_displacement(maps, LARGER, depth, displacement)
-    assert torch.equal(whole.fine.depth, fine.depth)
-    moved = whole.fine.displacement[1].norm(dim=-1)
+    fine = FineMaps(rgb=PHOTO.rgb, depth=torch.full((4 * SIDE_PX,) * 2, 6.0))
+    maps = with_displacement(replace(plane_maps(), fine=fine), LARGER, depth, displacement)
+    assert torch.equal(maps.fine.depth, fine.depth)
+    moved = maps.fine.displacement[1].norm(dim=-1)
     assert float(moved.max()) == pytest.approx(1.5 * 0.3125**0.5, rel=1e-5), "as far in the image"
+
+
+def test_a_copy_of_one_size_takes_the_depth_that_displacement_belongs_to() -> None:
+    depth, displacement = one_pixel()
+    fine = FineMaps(rgb=LARGER.rgb, depth=torch.full_like(depth, 6.0))
+    maps = with_displacement(replace(plane_maps(), fine=fine), LARGER, depth, displacement)
+    assert torch.equal(maps.fine.depth, depth)
+    torch.testing.assert_close(maps.fine.displacement, displacement)
 
 
 def test_depth_comes_from_the_copy_that_has_it() -> None:

@@ -98,18 +98,23 @@ def test_from_the_input_camera_the_extended_layers_hide_nothing() -> None:
     torch.testing.assert_close(views[0], views[1], atol=0.045, rtol=0)
 
 
-def test_what_moves_takes_its_background_with_it_and_leaves_inpainted_colours() -> None:
+def test_what_moves_takes_its_background_with_it_and_uncovers_a_layer() -> None:
     still, moving = built(limits=(4.0, 4.0)), built(moving_block(), limits=(4.0, 4.0))
+    block = moving_block().any(-1).any(0)
     assert bool(moving.layers[0].displacement.any()) and bool(moving.layers[1].displacement.any())
-    background = moving.layers[2]
+    uncovered, background, border = moving.layers[2:]
+    shown = moving.layers[0].displacement.any(-1).any(0)
+    assert uncovered.displacement is None and bool(uncovered.mask[shown].all())
     assert torch.equal(background.displacement, moving_block())
     assert torch.equal(background.rgb, still.layers[2].rgb), "all of it continues its pixel"
-    before, after = still.layers[3], moving.layers[3]
-    area = torch.zeros(after.depth.shape, dtype=torch.bool)
-    area[MARGIN:-MARGIN, MARGIN:-MARGIN] = grown(moving_block().any(-1).any(0))[2::4, 2::4]
+    assert torch.equal(background.mask, still.layers[2].mask)
+    inner = slice(MARGIN, -MARGIN)
+    assert torch.equal(border.mask[inner, inner], ~block[2::4, 2::4])
+    area = torch.zeros(border.depth.shape, dtype=torch.bool)
+    area[inner, inner] = grown(block)[2::4, 2::4]
     assert bool(area.any())
-    assert torch.equal((after.rgb != before.rgb).any(-1), area)
-    assert after.displacement is None
+    assert torch.equal((border.rgb != still.layers[3].rgb).any(-1), area)
+    assert border.displacement is None
 
 
 def test_gaussians_of_displaced_layers_move_and_no_others() -> None:
@@ -117,7 +122,7 @@ def test_gaussians_of_displaced_layers_move_and_no_others() -> None:
     gathered = image_gaussians(image, TIMES_S)
     moving = torch.zeros(len(gathered.gaussians), dtype=torch.bool)
     moving[gathered.motion.moving_index] = True
-    border = int(image.layers[3].mask.sum())
+    border = int(image.layers[4].mask.sum())
     assert bool(moving[: 16 * 24].any()) and not moving[-border:].any()
 
 

@@ -14,6 +14,7 @@ from diff4splat.generation.layered_image.disocclusion import (
     grown,
     inpaint_background,
     inpaint_border,
+    without_uncovered,
 )
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
 from diff4splat.models.blocks.conv_block import CELL_PX
@@ -132,3 +133,23 @@ def test_unknown_colours_come_from_the_smallest_window(share: float, size: tuple
     rgb, known = torch.rand(*size, 3, dtype=torch.float64), torch.rand(size) < share
     known[0, 0] = True
     torch.testing.assert_close(fill_from_neighbours(rgb, known), oracle(rgb, known))
+
+
+def test_static_cells_behind_what_moves_are_left_out() -> None:
+    static = without_uncovered(background(), box())
+    assert torch.equal(static.mask, background().mask & ~box())
+    cells = border()
+    inner = slice(MARGIN, -MARGIN)
+    kept = without_uncovered(cells, box()).mask
+    half = slice(CELL_PX // 2, None, CELL_PX)
+    assert torch.equal(kept[inner, inner], cells.mask[inner, inner] & ~box()[half, half])
+    outside = torch.ones_like(kept)
+    outside[inner, inner] = False
+    assert torch.equal(kept[outside], cells.mask[outside])
+
+
+def test_cells_that_move_with_their_pixel_are_kept() -> None:
+    displacement = torch.zeros(2, SIDE, SIDE, 3)
+    displacement[1, box()] = 1.0
+    moving = replace(background(), displacement=displacement)
+    assert torch.equal(without_uncovered(moving, box()).mask, moving.mask)

@@ -1,0 +1,89 @@
+"""The rim moves with the object, on its surface, and nothing else does."""
+
+import pytest
+import torch
+from torch import Tensor
+
+from diff4splat.generation.layered_image.mask_rim import RIM_PX, nearest_inside, with_rim
+from diff4splat.generation.layered_image.uncovered_layer import grown_by
+
+SIZE = (24, 28)
+RED, GREEN = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.7, 0.1])
+
+
+def _object(first: int, last: int) -> Tensor:
+    mask = torch.zeros(SIZE, dtype=torch.bool)
+    mask[first:last, first:last] = True
+    return mask
+
+
+MASK, OBJECT = _object(8, 16), _object(7, 17)
+"""The mask misses the object's outermost pixels."""
+
+
+def _image() -> Tensor:
+    return torch.where(OBJECT[..., None], RED, GREEN)
+
+
+def _depth() -> Tensor:
+    depth = torch.full(SIZE, 20.0)
+    depth[MASK] = 3.0
+    return depth
+
+
+def test_pixels_of_the_objects_colour_join_it_at_its_depth() -> None:
+    mask, depth = with_rim(MASK, _depth(), _image())
+    assert torch.equal(mask, OBJECT)
+    assert bool((depth[OBJECT] == 3.0).all()) and bool((depth[~OBJECT] == 20.0).all())
+
+
+def test_a_mask_that_is_right_stays() -> None:
+    mask, depth = with_rim(OBJECT, _depth(), _image())
+    assert torch.equal(mask, OBJECT) and torch.equal(depth, _depth())
+
+
+def test_mixed_pixels_join_if_they_are_more_of_the_object() -> None:
+    image, edge = _image(), OBJECT & ~MASK
+    for share, joins in ((0.6, True), (0.2, False)):
+        image[edge] = share * RED + (1 - share) * GREEN
+        mask, _ = with_rim(MASK, _depth(), image)
+        assert torch.equal(mask, OBJECT if joins else MASK)
+
+
+def test_nothing_joins_where_object_and_background_are_alike() -> None:
+    image = torch.full((*SIZE, 3), 0.5)
+    image[OBJECT] = 0.52
+    mask, depth = with_rim(MASK, _depth(), image)
+    assert torch.equal(mask, MASK) and torch.equal(depth, _depth())
+
+
+def test_the_rim_is_no_wider_than_it_may_be() -> None:
+    image = torch.where(_object(2, 22)[..., None], RED, GREEN)
+    mask, _ = with_rim(MASK, _depth(), image)
+    assert not bool((mask & ~grown_by(MASK, RIM_PX)).any())
+
+
+@pytest.mark.parametrize("value", [False, True])
+def test_an_empty_or_a_full_mask_stays(value: bool) -> None:
+    mask = torch.full(SIZE, value)
+    grown, depth = with_rim(mask, _depth(), _image())
+    assert torch.equal(grown, mask) and torch.equal(depth, _depth())
+
+
+@pytest.mark.parametrize("size", [(1, 2), (2, 2), (3, 9)])
+def test_small_images(size: tuple[int, int]) -> None:
+    mask = torch.zeros(size, dtype=torch.bool)
+    mask[0, 0] = True
+    grown, depth = with_rim(mask, torch.ones(size), torch.rand(*size, 3))
+    assert bool(grown[0, 0]) and bool((depth == 1).all())
+
+
+def test_the_nearest_pixel_is_the_nearest() -> None:
+    mask = torch.rand(20, 17, generator=torch.Generator().manual_seed(0)) > 0.9
+    nearest = nearest_inside(mask)
+    points, every = mask.nonzero().double(), torch.ones_like(mask).nonzero().double()
+    truth = torch.cdist(every, points).amin(1)
+    chosen = torch.stack([nearest.flatten() // 17, nearest.flatten() % 17], 1).double()
+    # OpenCV's distance is exact to a few per cent.
+    assert bool(((every - chosen).norm(dim=1) <= 1.05 * truth + 1e-9).all())
+    assert bool(mask.flatten()[nearest.flatten()].all())
