@@ -13,6 +13,10 @@ from torch import Tensor
 from diff4splat.generation.layered_image.uncovered_layer import grown_by
 
 RIM_PX = 2
+EDGE_SHARE = 3 / 128
+"""Of the image's longer side: width of the edge in which depth may be that of the background."""
+FARTHEST_SHARE = 1.05
+"""Depth over that of the object's surface nearby, above which it is the background's."""
 LEAST_LIKENESS = 0.5
 """Place of a colour between that of the background, 0, and of the object, 1."""
 LEAST_CONTRAST = 0.08
@@ -31,9 +35,25 @@ def with_rim(
     if not bool(mask.any()) or bool(mask.all()):
         return mask, depth
     beside = grown_by(mask, RIM_PX) & ~mask
-    rim = beside & (likeness(mask, beside, rgb) > LEAST_LIKENESS)
-    nearest = nearest_inside(mask)
-    return mask | rim, torch.where(rim, depth.flatten()[nearest], depth)
+    moving = mask | (beside & (likeness(mask, beside, rgb) > LEAST_LIKENESS))
+    return moving, on_surface(moving, depth, mask)
+
+
+def on_surface(
+    moving: Bool[Tensor, "h w"], depth: Float[Tensor, "h w"], mask: Bool[Tensor, "h w"]
+) -> Float[Tensor, "h w"]:
+    """Depth without what lies far behind the object at its edge; ``moving`` is ``mask`` and more.
+
+    Depth edges lie beside colour edges. What is farther than the object would move less in the
+    image, and tear off.
+    """
+    edge_px = max(round(EDGE_SHARE * max(mask.shape)), 1)
+    core = ~grown_by(~mask, edge_px)
+    if not bool(core.any()):
+        core = mask
+    surface = depth.flatten()[nearest_inside(core)]
+    behind = ~mask | (depth > FARTHEST_SHARE * surface)
+    return torch.where(moving & ~core & behind, surface, depth)
 
 
 def likeness(

@@ -4,7 +4,12 @@ import pytest
 import torch
 from torch import Tensor
 
-from diff4splat.generation.layered_image.mask_rim import RIM_PX, nearest_inside, with_rim
+from diff4splat.generation.layered_image.mask_rim import (
+    RIM_PX,
+    nearest_inside,
+    on_surface,
+    with_rim,
+)
 from diff4splat.generation.layered_image.uncovered_layer import grown_by
 
 SIZE = (24, 28)
@@ -38,8 +43,8 @@ def test_pixels_of_the_objects_colour_join_it_at_its_depth() -> None:
 
 
 def test_a_mask_that_is_right_stays() -> None:
-    mask, depth = with_rim(OBJECT, _depth(), _image())
-    assert torch.equal(mask, OBJECT) and torch.equal(depth, _depth())
+    mask, _ = with_rim(OBJECT, _depth(), _image())
+    assert torch.equal(mask, OBJECT)
 
 
 def test_mixed_pixels_join_if_they_are_more_of_the_object() -> None:
@@ -76,6 +81,25 @@ def test_small_images(size: tuple[int, int]) -> None:
     mask[0, 0] = True
     grown, depth = with_rim(mask, torch.ones(size), torch.rand(*size, 3))
     assert bool(grown[0, 0]) and bool((depth == 1).all())
+
+
+def test_background_depth_inside_the_objects_edge_is_pulled_forward() -> None:
+    depth = torch.where(_object(8, 15), 3.0, 20.0)
+    found = on_surface(MASK, depth, MASK)
+    assert bool((found[MASK] == 3.0).all()), "row 15 had that of the background"
+    assert torch.equal(found[~MASK], depth[~MASK])
+
+
+def test_a_surface_that_recedes_keeps_its_depth() -> None:
+    depth = (3.0 + 0.02 * torch.arange(SIZE[1])).expand(SIZE).clone()
+    assert torch.equal(on_surface(MASK, depth, MASK), depth)
+
+
+def test_what_is_thinner_than_its_edges_keeps_its_depth() -> None:
+    line = torch.zeros(SIZE, dtype=torch.bool)
+    line[10] = True
+    depth = torch.rand(SIZE) + 1
+    assert torch.equal(on_surface(line, depth, line), depth)
 
 
 def test_the_nearest_pixel_is_the_nearest() -> None:
