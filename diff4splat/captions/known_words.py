@@ -13,15 +13,7 @@ from functools import cache
 from itertools import pairwise
 
 from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.phrasings import TRAINING
-from diff4splat.captions.synonyms import (
-    ANY_OBJECT,
-    COLOR_SYNONYMS,
-    NOUN_SYNONYMS,
-    SIDES,
-    TRAVEL_VERBS,
-)
-from diff4splat.captions.vocabulary import CAMERA_MOVES, NOUNS, PLACES, VERBS
+from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
 
 NO_OBJECT = "the prompt names no object or colour that the model knows"
 UNKNOWN_OBJECT = "the model does not know the object {!r}"
@@ -34,7 +26,6 @@ _FUNCTION_WORDS = frozenset(
         *("a", "an", "and", "are", "at", "by", "for", "from", "has", "in", "into", "is", "it"),
         *("its", "of", "off", "on", "onto", "out", "over", "the", "then", "to", "with"),
         *("above", "around", "beside", "camera", "gets", "joints", "like", "one", "ones", "way"),
-        *("side", "us", "viewer"),
     ]
 )
 """Words that neither name an object nor a motion."""
@@ -54,10 +45,10 @@ class PromptWords:
 def known_words() -> dict[str, tuple[str, ...]]:
     """Every phrase, by kind."""
     return {
-        "objects": (*NOUNS, *_all(NOUN_SYNONYMS), *ANY_OBJECT),
-        "colours": (*COLOR_NAMES, *_all(COLOR_SYNONYMS)),
-        "motions": (*_all(VERBS), *(forms[0] for forms in TRAVEL_VERBS), "is pushed", "is pulled"),
-        "directions": _all(SIDES),
+        "objects": NOUNS,
+        "colours": COLOR_NAMES,
+        "motions": tuple(phrase for phrases in VERBS.values() for phrase in phrases),
+        "directions": tuple(DIRECTIONS.values()),
         "places": tuple(PLACES.values()),
         "nothing": (STATIC,),
     }
@@ -76,9 +67,8 @@ def read_prompt(prompt: str) -> PromptWords:
 
 
 def _unknown_object(words: list[str], known: frozenset[str]) -> str:
-    words_by_kind = known_words()
-    colors = _of(words_by_kind["colours"])
-    nouns = _of(noun.split()[-1] for noun in words_by_kind["objects"]) - colors
+    colors = _of(COLOR_NAMES)
+    nouns = _of(noun.split()[-1] for noun in NOUNS) - colors
     if any(stem(word) in nouns for word in words):
         return ""
     pairs = pairwise(words)
@@ -113,20 +103,9 @@ def _stems() -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
     words, camera = known_words(), [phrase for one in CAMERA_MOVES.values() for phrase in one]
     functions = _of(_FUNCTION_WORDS)
     # Of names in several words the last one is the object: tree of "fir tree".
-    ends = (noun.split()[-1] for noun in words["objects"])
-    objects = _of((*ends, *words["colours"], "nothing"))
-    verbs = [form for forms in TRAVEL_VERBS for form in forms]
-    motions = _of((*words["motions"], *words["directions"], *verbs)) - functions
-    sentences = (re.sub(r"{\w+}", "", template) for template in TRAINING)
-    return (
-        objects,
-        motions,
-        functions | _of((*words["objects"], *words["places"], *camera, *sentences)),
-    )
-
-
-def _all(phrases: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
-    return tuple(phrase for several in phrases.values() for phrase in several)
+    objects = _of((*(noun.split()[-1] for noun in NOUNS), *COLOR_NAMES, "nothing"))
+    motions = _of((*words["motions"], *words["directions"])) - functions
+    return objects, motions, functions | _of((*NOUNS, *words["places"], *camera))
 
 
 def _of(phrases: Iterable[str]) -> frozenset[str]:

@@ -17,7 +17,6 @@ from diff4splat.captions.known_words import (
     stem,
     why_static,
 )
-from diff4splat.captions.phrasings import TRAINING, VALIDATION, Choices, request
 from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
 from diff4splat.cli.main import run
 from diff4splat.cli.options.models import prompt_notes
@@ -45,7 +44,7 @@ def test_every_training_caption_is_known_word_by_word(
 @pytest.mark.parametrize(
     ("prompt", "reason"),
     [
-        ("an otter moves to the left", NO_OBJECT),
+        ("a cat moves to the left", NO_OBJECT),
         ("der Hund läuft nach links", NO_OBJECT),
         ("猫が歩く", NO_OBJECT),
         ("🚗💨", NO_OBJECT),
@@ -58,12 +57,9 @@ def test_every_training_caption_is_known_word_by_word(
         ("a gear is spinning", ""),
         ("nothing moves", ""),
         ("the blue one moves", ""),
-        ("the blue otter walks", UNKNOWN_OBJECT.format("otter")),
+        ("the blue cat walks", UNKNOWN_OBJECT.format("cat")),
         ("a purple zebra flies away", UNKNOWN_OBJECT.format("zebra")),
         ("the sofa beside the red car moves", ""),
-        ("the coffee cup drifts leftwards", ""),
-        ("push the violet couch into the distance", ""),
-        ("the red object is going away", ""),
     ],
 )
 def test_a_prompt_needs_an_object_and_a_motion(prompt: str, reason: str) -> None:
@@ -80,15 +76,15 @@ def test_endings_do_not_count(forms: str) -> None:
 def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     notes = partial(prompt_notes, model="small")
 
-    (line,) = notes("an otter purrs")
+    (line,) = notes("a cat purrs")
     assert "nothing moves: the prompt names no object" in line
     assert "diff4splat inspect words" in line
-    (line,) = notes("the red otter moves")
-    assert "nothing moves: the model does not know the object 'otter'" in line
-    unknown = "words of the prompt that the model does not know: majestically"
-    assert notes("the red car moves majestically") == [unknown]
+    (line,) = notes("the red cat moves")
+    assert "nothing moves: the model does not know the object 'cat'" in line
+    unknown = "words of the prompt that the model does not know: quickly"
+    assert notes("the red car moves quickly") == [unknown]
     assert notes("the red car moves to the left") == notes(None) == []
-    assert notes("an otter purrs", model="test") == []
+    assert notes("a cat purrs", model="test") == []
 
 
 def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:
@@ -96,10 +92,3 @@ def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:
     text = " ".join(capsys.readouterr().out.split())
     for words in known_words().values():
         assert all(word in text for word in words)
-
-
-@pytest.mark.parametrize("template", TRAINING + VALIDATION)
-def test_free_sentences_are_known(template: str) -> None:
-    for number in range(0, 6000, 397):
-        sentence = request("teal coffee cup", "left", Choices(number), (template,))
-        assert why_static(sentence) == ""
