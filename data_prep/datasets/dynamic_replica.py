@@ -37,7 +37,7 @@ from diff4splat.io.require_file import require_file
 from diff4splat.paths.formats.json_text import decode_json
 
 FPS = 30.0
-_LARGEST_LIST = 2 << 30
+_LARGEST_LIST, _PIECE = 2 << 30, 1 << 24
 Entries = list[dict[str, Any]]
 
 
@@ -51,12 +51,20 @@ def _sequences(root: Path) -> Iterator[ListedSequence]:
             )
 
 
+def _read_at_most(stream: gzip.GzipFile, count: int) -> bytes:
+    """Up to ``count`` bytes in pieces: one read would reserve all of them at once."""
+    content = bytearray()
+    while len(content) < count and (piece := stream.read(min(_PIECE, count - len(content)))):
+        content += piece
+    return bytes(content)
+
+
 def _grouped(file: Path) -> dict[str, dict[str, Entries]]:
     """Entries by sequence and eye."""
     require_file(file, "a list of frames")
     try:
         with gzip.open(file) as stream:
-            content = stream.read(_LARGEST_LIST + 1)
+            content = _read_at_most(stream, _LARGEST_LIST + 1)
     except (OSError, EOFError, ValueError) as error:
         raise FileFormatError(
             f"{file}: expected a whole gzip file, got a cut off or damaged one; copy it again"
