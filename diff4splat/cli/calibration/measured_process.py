@@ -13,6 +13,8 @@ from diff4splat.errors import Diff4SplatError
 from diff4splat.progress.phases import peak_of_status
 
 LOOK_S = 0.02
+LEAST_BYTES = 4 << 20
+"""Any Python that runs has more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,5 +67,7 @@ def _watched(pid: int) -> tuple[int, resource.struct_rusage, int]:
         ended, status, used = os.wait4(pid, os.WNOHANG)
         if ended:
             scale = 1 if sys.platform == "darwin" else 1024
-            return status, used, peak or used.ru_maxrss * scale
+            # A short command may have been seen before its program was loaded, and never again.
+            seen = peak if peak > LEAST_BYTES else used.ru_maxrss * scale
+            return status, used, seen
         time.sleep(LOOK_S)

@@ -30,6 +30,13 @@ def test_processor_time_and_what_was_printed() -> None:
     assert measured.memory_bytes > 1e6
 
 
+def test_a_look_before_the_program_is_loaded_does_not_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(measured_process, "peak_of_status", lambda status: 4096)
+    assert measured_process.measure_process(["--version"]).memory_bytes > 1e6
+
+
 def test_a_command_that_fails_says_what_it_said(tmp_path: Path) -> None:
     with pytest.raises(Diff4SplatError, match=r"expected bake .* to work, got: .*no-such-file"):
         measured_process.measure_process(
