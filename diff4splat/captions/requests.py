@@ -25,8 +25,6 @@ LIKE_COLORS = frozenset(
     )
 )
 """Colours that one object may be seen in, by its light."""
-PRESENT_SHARE = 5e-4
-"""Share of the image from which a name may mean an object."""
 PLAIN_SHARE = 0.3
 """Share of captions of the form ``the red ball moves to the left``."""
 _LARGEST = 2**31
@@ -69,15 +67,14 @@ def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Gen
     if float(torch.rand((), generator=generator)) < PLAIN_SHARE and kind == "full":
         return f"the {named.color} {named.noun} moves {DIRECTIONS[direction]}"
     choices = Choices(_number(generator))
-    if kind == "full":
-        name = object_name(named, choices)
-    else:
-        name = (
-            noun_name(named.noun, choices)
-            if kind == "noun"
-            else any_object_name(named.color, choices)
-        )
-    return request(name, direction, choices)
+    return request(_name(named, kind, choices), direction, choices)
+
+
+def _name(named: NamedObject, kind: str, choices: Choices) -> str:
+    """Colour and noun, the noun alone, or the colour alone."""
+    if kind == "noun":
+        return noun_name(named.noun, choices)
+    return any_object_name(named.color, choices) if kind == "color" else object_name(named, choices)
 
 
 def _colors_alike(color: str, other: str) -> bool:

@@ -11,6 +11,9 @@ from torch import Tensor
 
 from diff4splat.data.clip import ClipMetadata, ObjectNote
 
+PRESENT_SHARE = 5e-4
+"""Share of the image from which a name may mean an object."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClipObject:

@@ -10,9 +10,9 @@ import torch
 
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.phrasings import VALIDATION, Choices, request
-from diff4splat.captions.requests import PRESENT_SHARE, caption_of_absent_object
+from diff4splat.captions.requests import caption_of_absent_object
 from diff4splat.captions.vocabulary import NOUNS
-from diff4splat.data.clip_objects import present_objects
+from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
 from diff4splat.evaluation.measures.images import Entries
 from diff4splat.evaluation.measures.objects import MIN_AREA_FRACTION, image_displacement
 from diff4splat.evaluation.measures.text import (

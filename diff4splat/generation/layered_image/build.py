@@ -1,9 +1,9 @@
 """From an image, its depth and its displacement to all layers.
 
     image and maps ─ upsample ─ smooth ─ pixels ─ subpixel infill       the image shows these
-    pixels ─ uncovered layer                                            these extend them into
+    pixels ─ disoccluded layer                                            these extend them into
     smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving   what the image hides
-                           └─ border extension ─┘  objects uncover
+                           └─ border extension ─┘  objects disocclude
 
 A new way of filling hidden regions belongs into ``hidden_layers``.
 """
@@ -21,14 +21,14 @@ from diff4splat.generation.layered_image.border_extension import (
     push_behind_surface,
 )
 from diff4splat.generation.layered_image.depth_smoothing import smooth_maps
+from diff4splat.generation.layered_image.disoccluded_layer import disoccluded_layer
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
     inpaint_border,
-    without_uncovered,
+    without_disoccluded,
 )
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
-from diff4splat.generation.layered_image.uncovered_layer import uncovered_layer
 from diff4splat.generation.layered_image.upsampling import upsample_maps
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 
@@ -71,9 +71,9 @@ def build_layered_image(
     hidden = hidden_layers(small, maps, border_cells)
     if small.camera.size_px != image.camera.size_px:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
-    if (uncovered := uncovered_layer(pixels)) is not None:
+    if (disoccluded := disoccluded_layer(pixels)) is not None:
         moving = _moving(maps)
-        hidden = [uncovered, *(without_uncovered(layer, moving) for layer in hidden)]
+        hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))

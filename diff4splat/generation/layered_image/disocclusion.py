@@ -1,4 +1,4 @@
-"""Colours of what a moving object uncovers: inpainting of the layers behind it (ours, ADR 23).
+"""Colours of what a moving object disoccludes: inpainting of the layers behind it (ours, ADR 23).
 
 Axes: ``h w`` pixels of the smaller copy that the networks see. The extended layers continue the
 image backwards, so behind an object they have the object's colours, which would stay when it moves
@@ -44,8 +44,8 @@ def inpaint_border(
     return replace(layer, rgb=colors)
 
 
-def without_uncovered(layer: ImageLayer, moving: Bool[Tensor, "h w"]) -> ImageLayer:
-    """The layer without its static cells behind what moves, which would hide an uncovered layer.
+def without_disoccluded(layer: ImageLayer, moving: Bool[Tensor, "h w"]) -> ImageLayer:
+    """The layer without its static cells behind what moves, which would hide an disoccluded layer.
 
     The border extension has cells of 4 pixels; those whose middle moves are left out.
     """
@@ -84,10 +84,10 @@ def fill_from_neighbours(
     return filled
 
 
-def grown(mask: Bool[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
-    """The mask with ``GROWN_PX`` pixels around it."""
-    side = 2 * GROWN_PX + 1
-    return torch.nn.functional.max_pool2d(mask.float()[None, None], side, 1, GROWN_PX)[0, 0] > 0
+def grown(mask: Bool[Tensor, "h w"], margin_px: int = GROWN_PX) -> Bool[Tensor, "h w"]:
+    """The mask with a margin around it."""
+    side = 2 * margin_px + 1
+    return torch.nn.functional.max_pool2d(mask.float()[None, None], side, 1, margin_px)[0, 0] > 0
 
 
 def _inpaints(static: Bool[Tensor, "h w"]) -> bool:

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from diff4splat.generation.layered_image.uncovered_layer import grown_by
+from diff4splat.generation.layered_image.disocclusion import grown
 
 RIM_PX = 2
 EDGE_SHARE = 3 / 128
@@ -34,7 +34,7 @@ def with_rim(
     """
     if not bool(mask.any()) or bool(mask.all()):
         return mask, depth
-    beside = grown_by(mask, RIM_PX) & ~mask
+    beside = grown(mask, RIM_PX) & ~mask
     moving = mask | (beside & (likeness(mask, beside, rgb) > LEAST_LIKENESS))
     return moving, on_surface(moving, depth, mask)
 
@@ -48,7 +48,7 @@ def on_surface(
     image, and tear off.
     """
     edge_px = max(round(EDGE_SHARE * max(mask.shape)), 1)
-    core = ~grown_by(~mask, edge_px)
+    core = ~grown(~mask, edge_px)
     if not bool(core.any()):
         core = mask
     surface = depth.flatten()[nearest_inside(core)]
@@ -63,7 +63,7 @@ def likeness(
 
     0 where one of them is not near, or both are alike.
     """
-    inner = ~grown_by(~mask, 1)
+    inner = ~grown(~mask, 1)
     colors, seen = _local_mean(rgb, inner if bool(inner.any()) else mask)
     others, seen_too = _local_mean(rgb, ~mask & ~beside)
     axis = colors - others

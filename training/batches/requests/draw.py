@@ -12,13 +12,12 @@ from torch import Tensor
 
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.requests import (
-    PRESENT_SHARE,
     caption_of_absent_object,
     caption_of_object,
 )
 from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.data.clip import Clip, View
-from diff4splat.data.clip_objects import present_objects
+from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
 from diff4splat.training.batches.requests.displacement import (
     draw_direction,
     draw_motion,

@@ -98,13 +98,13 @@ def test_from_the_input_camera_the_extended_layers_hide_nothing() -> None:
     torch.testing.assert_close(views[0], views[1], atol=0.045, rtol=0)
 
 
-def test_what_moves_takes_its_background_with_it_and_uncovers_a_layer() -> None:
+def test_what_moves_takes_its_background_with_it_and_leaves_a_disoccluded_layer() -> None:
     still, moving = built(limits=(4.0, 4.0)), built(moving_block(), limits=(4.0, 4.0))
     block = moving_block().any(-1).any(0)
     assert bool(moving.layers[0].displacement.any()) and bool(moving.layers[1].displacement.any())
-    uncovered, background, border = moving.layers[2:]
+    disoccluded, background, border = moving.layers[2:]
     shown = moving.layers[0].displacement.any(-1).any(0)
-    assert uncovered.displacement is None and bool(uncovered.mask[shown].all())
+    assert disoccluded.displacement is None and bool(disoccluded.mask[shown].all())
     assert torch.equal(background.displacement, moving_block())
     assert torch.equal(background.rgb, still.layers[2].rgb), "all of it continues its pixel"
     assert torch.equal(background.mask, still.layers[2].mask)

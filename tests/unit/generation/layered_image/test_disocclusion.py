@@ -14,7 +14,7 @@ from diff4splat.generation.layered_image.disocclusion import (
     grown,
     inpaint_background,
     inpaint_border,
-    without_uncovered,
+    without_disoccluded,
 )
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
 from diff4splat.models.blocks.conv_block import CELL_PX
@@ -136,11 +136,11 @@ def test_unknown_colours_come_from_the_smallest_window(share: float, size: tuple
 
 
 def test_static_cells_behind_what_moves_are_left_out() -> None:
-    static = without_uncovered(background(), box())
+    static = without_disoccluded(background(), box())
     assert torch.equal(static.mask, background().mask & ~box())
     cells = border()
     inner = slice(MARGIN, -MARGIN)
-    kept = without_uncovered(cells, box()).mask
+    kept = without_disoccluded(cells, box()).mask
     half = slice(CELL_PX // 2, None, CELL_PX)
     assert torch.equal(kept[inner, inner], cells.mask[inner, inner] & ~box()[half, half])
     outside = torch.ones_like(kept)
@@ -152,4 +152,4 @@ def test_cells_that_move_with_their_pixel_are_kept() -> None:
     displacement = torch.zeros(2, SIDE, SIDE, 3)
     displacement[1, box()] = 1.0
     moving = replace(background(), displacement=displacement)
-    assert torch.equal(without_uncovered(moving, box()).mask, moving.mask)
+    assert torch.equal(without_disoccluded(moving, box()).mask, moving.mask)

@@ -4,13 +4,13 @@ import pytest
 import torch
 from torch import Tensor
 
+from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.mask_rim import (
     RIM_PX,
     nearest_inside,
     on_surface,
     with_rim,
 )
-from diff4splat.generation.layered_image.uncovered_layer import grown_by
 
 SIZE = (24, 28)
 RED, GREEN = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.7, 0.1])
@@ -65,7 +65,7 @@ def test_nothing_joins_where_object_and_background_are_alike() -> None:
 def test_the_rim_is_no_wider_than_it_may_be() -> None:
     image = torch.where(_object(2, 22)[..., None], RED, GREEN)
     mask, _ = with_rim(MASK, _depth(), image)
-    assert not bool((mask & ~grown_by(MASK, RIM_PX)).any())
+    assert not bool((mask & ~grown(MASK, RIM_PX)).any())
 
 
 @pytest.mark.parametrize("value", [False, True])

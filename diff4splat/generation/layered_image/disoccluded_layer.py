@@ -1,4 +1,4 @@
-"""What a moving object uncovers, at the size of the image: static cells behind its pixels (ours).
+"""What a moving object disoccludes, at the size of the image: static cells behind it (ours).
 
     pixels ─ what moves ─┬─ inverse depth of the static pixels around it, extended evenly
                          └─ colours: patches of the image, shifted (shift map of OpenCV)
@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from diff4splat.generation.layered_image.background_layer import BEHIND
+from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
 from diff4splat.io.pixels import to_bytes
@@ -36,13 +37,13 @@ SWEEPS = 40
 
 
 @torch.no_grad()
-def uncovered_layer(pixels: ImageLayer) -> ImageLayer | None:
+def disoccluded_layer(pixels: ImageLayer) -> ImageLayer | None:
     """The layer behind what moves of ``pixels``; None where nothing or almost everything does."""
     if pixels.displacement is None:
         return None
     moving = pixels.displacement.any(-1).any(0)
     margin_px = math.ceil(MARGIN_SHARE * max(moving.shape))
-    known = ~grown_by(moving, margin_px)
+    known = ~grown(moving, margin_px)
     if not bool(moving.any()) or not bool(known.any()):
         return None
     depth = 1 / extended_evenly(1 / pixels.depth, known)
@@ -50,7 +51,7 @@ def uncovered_layer(pixels: ImageLayer) -> ImageLayer | None:
         pixels,
         rgb=textured(pixels.rgb, known),
         depth=torch.maximum(depth, BEHIND * pixels.depth),
-        mask=grown_by(moving, 1) & is_drawable(pixels.camera),
+        mask=grown(moving, 1) & is_drawable(pixels.camera),
         footprint_px=FOOTPRINT_PX,
         displacement=None,
         pixel_index=torch.full_like(pixels.pixel_index, NO_PIXEL),
@@ -133,12 +134,6 @@ def _patched(
     missing = hole & (patched == 0).all(-1)
     result = cv2.cvtColor(patched, cv2.COLOR_Lab2RGB)
     return cv2.inpaint(result, missing.astype(np.uint8), 3, cv2.INPAINT_TELEA)
-
-
-def grown_by(mask: Bool[Tensor, "h w"], margin_px: int) -> Bool[Tensor, "h w"]:
-    """The mask with a margin around it."""
-    side = 2 * margin_px + 1
-    return torch.nn.functional.max_pool2d(mask.float()[None, None], side, 1, margin_px)[0, 0] > 0
 
 
 def _window(hole: Bool[Tensor, "h w"]) -> tuple[slice, slice]:

@@ -7,14 +7,14 @@ from image_layers import layer
 from torch import Tensor
 
 from diff4splat.generation.layered_image.background_layer import BEHIND
-from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
-from diff4splat.generation.layered_image.uncovered_layer import (
+from diff4splat.generation.layered_image.disoccluded_layer import (
+    disoccluded_layer,
     extended_evenly,
     filled_with_patches,
-    grown_by,
     textured,
-    uncovered_layer,
 )
+from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
 
 SIDE = 48
 NEAR, FAR = 2.0, 6.0
@@ -44,26 +44,26 @@ def _pixels(moving: Tensor | None = None) -> ImageLayer:
 
 
 def test_the_layer_is_static_and_covers_what_moves() -> None:
-    found = uncovered_layer(_pixels())
+    found = disoccluded_layer(_pixels())
     assert found.displacement is None and not found.in_image
-    assert torch.equal(found.mask, grown_by(_box(), 1))
+    assert torch.equal(found.mask, grown(_box(), 1))
     assert bool((found.pixel_index == NO_PIXEL).all())
 
 
 def test_it_lies_on_the_surface_around_the_object() -> None:
-    depth = uncovered_layer(_pixels()).depth
+    depth = disoccluded_layer(_pixels()).depth
     torch.testing.assert_close(depth[_box()], torch.full_like(depth[_box()], FAR))
 
 
 def test_it_is_never_before_the_image() -> None:
     pixels = _pixels()
     pixels.depth[_box()] = 3 * FAR
-    found = uncovered_layer(pixels)
+    found = disoccluded_layer(pixels)
     assert bool((found.depth >= BEHIND * pixels.depth).all())
 
 
 def test_texture_goes_on_in_place_of_a_blur() -> None:
-    rgb = uncovered_layer(_pixels()).rgb[_box()]
+    rgb = disoccluded_layer(_pixels()).rgb[_box()]
     around = _checkers()[_box()]
     assert float(rgb.std(0).mean()) > 0.5 * float(around.std(0).mean())
     # Nothing of the object is copied, and nothing is left empty.
@@ -73,11 +73,11 @@ def test_texture_goes_on_in_place_of_a_blur() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_there_is_none_where_nothing_or_everything_moves(share: float) -> None:
-    assert uncovered_layer(_pixels(torch.full((SIDE, SIDE), bool(share)))) is None
+    assert disoccluded_layer(_pixels(torch.full((SIDE, SIDE), bool(share)))) is None
 
 
 def test_static_images_have_none() -> None:
-    assert uncovered_layer(layer(torch.ones(8, 8))) is None
+    assert disoccluded_layer(layer(torch.ones(8, 8))) is None
 
 
 def test_a_plane_goes_on_through_a_hole() -> None:
