@@ -99,13 +99,16 @@ def test_from_the_input_camera_the_extended_layers_hide_nothing() -> None:
 
 
 def test_what_moves_takes_its_background_with_it_and_leaves_a_disoccluded_layer() -> None:
-    still, moving = built(limits=(4.0, 4.0)), built(moving_block(), limits=(4.0, 4.0))
-    block = moving_block().any(-1).any(0)
+    wide = torch.zeros(3, *SMALL, 3)
+    wide[1:, 1:4, 1:9, 0] = 0.5
+    still, moving = built(limits=(4.0, 4.0)), built(wide, limits=(4.0, 4.0))
+    block = wide.any(-1).any(0)
+    assert bool(block[2::4, 2::4].any()), "some cells of the border extension are behind it"
     assert bool(moving.layers[0].displacement.any()) and bool(moving.layers[1].displacement.any())
     disoccluded, background, border = moving.layers[2:]
     shown = moving.layers[0].displacement.any(-1).any(0)
     assert disoccluded.displacement is None and bool(disoccluded.mask[shown].all())
-    assert torch.equal(background.displacement, moving_block())
+    assert torch.equal(background.displacement, wide)
     assert torch.equal(background.rgb, still.layers[2].rgb), "all of it continues its pixel"
     assert torch.equal(background.mask, still.layers[2].mask)
     inner = slice(MARGIN, -MARGIN)
