@@ -25,6 +25,7 @@ from diff4splat.training.recipe.losses import (
     FlowLosses,
     MotionDiffusionLosses,
     MotionLosses,
+    ObjectMaskLosses,
     ReconstructionLosses,
 )
 from diff4splat.training.recipe.optimizer import OptimizerSettings
@@ -73,6 +74,7 @@ def small_recipe() -> Recipe:
             _monocular_depth(dynamic),
             video,
             _motion_diffusion(video),
+            _object_mask(video),
         ),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
@@ -187,4 +189,19 @@ def _motion_diffusion(video: StageRecipe) -> StageRecipe:
         losses=MotionDiffusionLosses(min_level_weighting=0.4, motion_mask=10.0),
         data=replace(video.data, keyframes_only=True),
         timestep_shift=16.0,
+    )
+
+
+def _object_mask(video: StageRecipe) -> StageRecipe:
+    """Five prompts for every image: all that a clip shows can be asked for."""
+    return replace(
+        video,
+        name="object_mask",
+        kind="object_mask",
+        steps=6_000,
+        trained=("object_mask",),
+        losses=ObjectMaskLosses(),
+        optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=200),
+        data=replace(video.data, keyframes_only=True),
+        text_dropout=0.0,
     )

@@ -22,6 +22,7 @@ from diff4splat.models.image_encoder.clip import ClipImageEncoder
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
+from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.placement.initial_weights import (
     InitialWeights,
@@ -81,6 +82,7 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
         "motion_unet": lambda: MotionUNet(
             motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
         ),
+        "object_mask": lambda: ObjectMaskNet(config.object_mask.width, config.text.width),
         "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 

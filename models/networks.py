@@ -12,6 +12,7 @@ from diff4splat.models.protocols import (
     GaussianMaps,
     ImageStates,
     MotionPrior,
+    ObjectMask,
     PromptEncoder,
     VideoCodec,
     VideoVelocity,
@@ -30,6 +31,7 @@ class Networks:
     monocular_depth: DepthPrior | None = None
     motion_unet: MotionPrior | None = None
     image_encoder: ImageStates | None = None
+    object_mask: ObjectMask | None = None
 
     def parts(self) -> list[tuple[str, Any]]:
         """(name, network) of the parts that exist."""
@@ -56,4 +58,6 @@ def model_parts(config: ModelConfig) -> tuple[str, ...]:
         absent.add("monocular_depth")
     if not config.motion_unet.used:
         absent.add("motion_unet")
+    if not config.object_mask.used:
+        absent.add("object_mask")
     return tuple(part for part in PARTS if part not in absent)

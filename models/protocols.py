@@ -64,6 +64,14 @@ class MotionPrior(Protocol):
 
 
 @runtime_checkable
+class ObjectMask(Protocol):
+    """As ``ObjectMaskNet``."""
+
+    def __call__(self, image: Tensor, text: Tensor, text_mask: Tensor | None = None) -> Tensor:
+        """For every pixel the logit that the prompt asks it to move."""
+
+
+@runtime_checkable
 class VideoCodec(Protocol):
     """As ``VideoVae``."""
 

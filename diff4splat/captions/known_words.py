@@ -1,4 +1,4 @@
-"""The words of a prompt that the motion prior knows: those of its training captions.
+"""The words of a prompt that the motion prior and the object mask know: those of their captions.
 
 A prompt moves something if it has a word for an object (a noun or a colour) and one for a motion (a
 verb or a direction). A colour alone is an object, but not that of a noun that the model does not
@@ -7,13 +7,20 @@ know: of a "purple sofa" it would move whatever it likes. Endings do not count: 
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
 from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
+from diff4splat.captions.synonyms import (
+    ANY_OBJECT,
+    COLOR_SYNONYMS,
+    NOUN_SYNONYMS,
+    SIDES,
+    TRAVEL_VERBS,
+)
+from diff4splat.captions.vocabulary import CAMERA_MOVES, NOUNS, PLACES, VERBS
 
 NO_OBJECT = "the prompt names no object or colour that the model knows"
 UNKNOWN_OBJECT = "the model does not know the object {!r}"
@@ -44,14 +51,21 @@ class PromptWords:
 
 def known_words() -> dict[str, tuple[str, ...]]:
     """Every phrase, by kind."""
+    travel = tuple(form for forms in TRAVEL_VERBS for form in forms)
     return {
-        "objects": NOUNS,
-        "colours": COLOR_NAMES,
-        "motions": tuple(phrase for phrases in VERBS.values() for phrase in phrases),
-        "directions": tuple(DIRECTIONS.values()),
+        "objects": (*_with_synonyms(NOUNS, NOUN_SYNONYMS), *ANY_OBJECT),
+        "colours": _with_synonyms(COLOR_NAMES, COLOR_SYNONYMS),
+        "motions": (*(phrase for phrases in VERBS.values() for phrase in phrases), *travel),
+        "directions": tuple(phrase for phrases in SIDES.values() for phrase in phrases),
         "places": tuple(PLACES.values()),
         "nothing": (STATIC,),
     }
+
+
+def _with_synonyms(
+    words: tuple[str, ...], synonyms: Mapping[str, tuple[str, ...]]
+) -> tuple[str, ...]:
+    return tuple(one for word in words for one in (word, *synonyms.get(word, ())))
 
 
 def read_prompt(prompt: str) -> PromptWords:
@@ -67,8 +81,8 @@ def read_prompt(prompt: str) -> PromptWords:
 
 
 def _unknown_object(words: list[str], known: frozenset[str]) -> str:
-    colors = _of(COLOR_NAMES)
-    nouns = _of(noun.split()[-1] for noun in NOUNS) - colors
+    colors = _of(known_words()["colours"])
+    nouns = _of(noun.split()[-1] for noun in known_words()["objects"]) - colors
     if any(stem(word) in nouns for word in words):
         return ""
     pairs = pairwise(words)
@@ -103,9 +117,10 @@ def _stems() -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
     words, camera = known_words(), [phrase for one in CAMERA_MOVES.values() for phrase in one]
     functions = _of(_FUNCTION_WORDS)
     # Of names in several words the last one is the object: tree of "fir tree".
-    objects = _of((*(noun.split()[-1] for noun in NOUNS), *COLOR_NAMES, "nothing"))
+    nouns = (noun.split()[-1] for noun in words["objects"])
+    objects = _of((*nouns, *words["colours"], "nothing"))
     motions = _of((*words["motions"], *words["directions"])) - functions
-    return objects, motions, functions | _of((*NOUNS, *words["places"], *camera))
+    return objects, motions, functions | _of((*words["objects"], *words["places"], *camera))
 
 
 def _of(phrases: Iterable[str]) -> frozenset[str]:

@@ -50,17 +50,32 @@ def caption_of_absent_object(objects: list[NamedObject], generator: torch.Genera
     None if the image has objects of all nouns and no other colour can be asked for.
     """
     direction = tuple(DIRECTIONS)[_number(generator) % len(DIRECTIONS)]
-    colors = list(COLOR_NAMES)
-    nouns = [n for n in NOUNS if not any(may_be_confused(n, one.noun) for one in objects)]
     kind = ("full", "full", "noun")[_number(generator) % 3]
-    if objects and (_number(generator) % 2 or not nouns):
-        kind, nouns = "full", [_pick([one.noun for one in objects], generator)]
+    found = absent_object(objects, generator, other_color=bool(_number(generator) % 2))
+    if found is None:
+        return None
+    other_color = any(may_be_confused(found.noun, one.noun) for one in objects)
+    return _caption(found, "full" if other_color else kind, direction, generator)
+
+
+def absent_object(
+    objects: list[NamedObject], generator: torch.Generator, *, other_color: bool
+) -> NamedObject | None:
+    """A noun that no object has, or another colour of one; None if there is neither."""
+    nouns = [n for n in NOUNS if not any(may_be_confused(n, one.noun) for one in objects)]
+    colors = list(COLOR_NAMES)
+    if objects and (other_color or not nouns):
+        nouns = [_pick([one.noun for one in objects], generator)]
         taken = [one.color for one in objects if may_be_confused(nouns[0], one.noun)]
         colors = [c for c in colors if not any(_colors_alike(c, one) for one in taken)]
-    if not colors:
-        return None
-    named = NamedObject(_pick(colors, generator), _pick(nouns, generator))
-    return _caption(named, kind, direction, generator)
+    return NamedObject(_pick(colors, generator), _pick(nouns, generator)) if colors else None
+
+
+def is_unique(objects: list[NamedObject], index: int) -> bool:
+    """Whether colour and noun of the object at ``index`` fit no other."""
+    named, others = objects[index], objects[:index] + objects[index + 1 :]
+    like = [other for other in others if may_be_confused(named.noun, other.noun)]
+    return not any(_colors_alike(named.color, other.color) for other in like)
 
 
 def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Generator) -> str:

@@ -4,7 +4,9 @@ Axes: ``b`` = 1, ``s d`` text, ``t`` latent frames after the first, ``hc wc`` ce
 ``hh ww`` pixels of the copy that the networks see.
 
     noise ─ flow solver × motion U-Net ─ field ─┐
-    image, text ─ motion U-Net ─ probability ───┴─ mask ─ rigid components ─ displacement
+    image, text ─ object mask ─── probability ──┴─ mask ─ rigid components ─ displacement
+
+Models without an object mask take the probability from the motion U-Net too.
 """
 
 from collections.abc import Callable
@@ -20,6 +22,7 @@ from diff4splat.flow.samplers import VelocityFn
 from diff4splat.flow.solve import ADAPTIVE, FITTED, FIXED_DEFAULT, SolverPath, solve
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
+from diff4splat.generation.motion_networks import least_probability
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.protocols import MotionPrior
@@ -53,15 +56,19 @@ class MotionSample:
     probability: Float[Tensor, "hh ww"]
     """That a pixel moves."""
     calls: CallCount
+    least_probability: float = 0.0
+    """Of the most probable pixel, for anything to move."""
 
     def mask(self, threshold: float) -> Bool[Tensor, "hh ww"]:
         """Pixels whose probability is above ``threshold``.
 
-        Where none is, the most probable component moves: the prompt may ask for motion that the
-        image does not suggest. Connected pixels are one component, which moves if some of it is
-        probable enough (hysteresis, Canny 1986).
+        Where none is, the most probable component moves if it has ``least_probability``: the prompt
+        may ask for motion that the image does not suggest. Connected pixels are one component,
+        which moves if some of it is probable enough (hysteresis, Canny 1986).
         """
         highest = float(self.probability.max())
+        if highest < self.least_probability:
+            return torch.zeros_like(self.probability, dtype=torch.bool)
         low = min(threshold, max(highest / 2, HYSTERESIS_LOW))
         component = connected_components(self.probability > low)
         best = self.probability.new_zeros(int(component.max()) + 1)
@@ -106,6 +113,7 @@ def sample_motion(
         mean_field=_from_first(mean),
         probability=bilateral_smooth(logits.sigmoid(), rgb)[0],
         calls=calls,
+        least_probability=least_probability(network),
     )
 
 

@@ -4,6 +4,7 @@
                          on a plane
     motion prior         if the model has one and a prompt asks for motion in words that it knows;
                          else the image is static
+    object mask          with the motion prior
     text encoder         if a prompt is given and something takes it
     VAE, DiT, LDRM       only where hidden regions are filled by the video model
     deformation          only where such a fill may move
@@ -20,6 +21,8 @@ from diff4splat.models.hub.model import Model, parameter_counts
 from diff4splat.models.networks import model_parts
 from diff4splat.progress.run_log import RunLog
 
+MOTION_PARTS = ("text_encoder", "motion_unet", "object_mask")
+"""What a prompt that moves something needs; some models have no object mask."""
 FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 """What fills hidden regions by video; some public models also have an image encoder."""
 RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
@@ -119,6 +122,10 @@ def plan_generation(
         or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
+    # What moves and how it moves belong together.
+    reasons["object_mask"] = (
+        reasons["motion_unet"] or _untrained("object_mask", trained) or facts.removed("object_mask")
+    )
     fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:

@@ -22,6 +22,7 @@ from diff4splat.generation.motion_maps import (
     with_displacement,
     with_majority_displacement,
 )
+from diff4splat.generation.motion_networks import motion_prior
 from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import why_unguided
 from diff4splat.models.hub.model import Model
@@ -115,7 +116,7 @@ def _sample_motion(
 ) -> MotionSample:
     motion = request.settings.motion
     with log.phases.phase("sample motion", motion.steps) as advance:
-        sample = sample_motion(model.networks.motion_unet, image, frames, request, advance)
+        sample = sample_motion(motion_prior(model.networks), image, frames, request, advance)
     if sample.calls.saved:
         why = "no prompt" if request.text is None else why_unguided(motion.guidance)
         log.record_skipped("guidance pass", why, f"{sample.calls.saved} network calls")

@@ -27,7 +27,7 @@ from diff4splat.models.config.networks import (
     TextConfig,
     VaeConfig,
 )
-from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
+from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig, ObjectMaskConfig
 from diff4splat.paths.formats.json_text import decode_json
 
 Config = TypeVar("Config")
@@ -46,6 +46,7 @@ __all__ = [
     "ModelConfig",
     "MonocularDepthConfig",
     "MotionUNetConfig",
+    "ObjectMaskConfig",
     "RefinementConfig",
     "TextConfig",
     "VaeConfig",
@@ -71,6 +72,7 @@ class ModelConfig:
     refinement: RefinementConfig = field(default_factory=RefinementConfig)
     monocular_depth: MonocularDepthConfig = field(default_factory=MonocularDepthConfig)
     motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
+    object_mask: ObjectMaskConfig = field(default_factory=ObjectMaskConfig)
     joint: JointConfig = field(default_factory=JointConfig)
     """Where the video model has one sequence of text and video."""
     image_encoder: ImageEncoderConfig = field(default_factory=ImageEncoderConfig)
@@ -98,6 +100,7 @@ class ModelConfig:
         require(known, "ModelConfig.default_guidance", "at least 0", self.default_guidance)
         self._require_fitting_refinement()
         self._require_fitting_joint()
+        self._require_motion_prior()
         self._require_fitting_image_encoder()
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
@@ -131,6 +134,11 @@ class ModelConfig:
             "velocity alone, no image states, pooled text or experts",
             self.dit,
         )
+
+    def _require_motion_prior(self) -> None:
+        """An object mask says what moves, a motion prior says how."""
+        fits = self.motion_unet.used or not self.object_mask.used
+        require(fits, "ObjectMaskConfig.width", "0 without a motion prior", self.object_mask.width)
 
     def _require_fitting_image_encoder(self) -> None:
         """Its states are those that the video model attends to."""

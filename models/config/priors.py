@@ -25,6 +25,22 @@ class MonocularDepthConfig:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectMaskConfig:
+    """Object mask: a U-Net from one image to the pixels that a prompt asks to move (ADR 29)."""
+
+    width: int = 0
+    """Channels at half the resolution; 0 leaves it out: the motion prior's own mask decides."""
+
+    def __post_init__(self) -> None:
+        require_optional_width(self, "width")
+
+    @property
+    def used(self) -> bool:
+        """Whether there is such a network."""
+        return self.width > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionUNetConfig:
     """Motion prior: a U-Net from one image and text to displacements and a mask (ours, ADR 22)."""
 

@@ -12,6 +12,7 @@ from diff4splat.models.config.model import (
     ModelConfig,
     MonocularDepthConfig,
     MotionUNetConfig,
+    ObjectMaskConfig,
     RefinementConfig,
     TextConfig,
     VaeConfig,
@@ -65,6 +66,7 @@ def small_size() -> ModelConfig:
         refinement=RefinementConfig(channels=48),
         monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
+        object_mask=ObjectMaskConfig(width=24),
         default_fill="none",
         default_guidance=1.0,
     )

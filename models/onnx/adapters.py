@@ -99,6 +99,16 @@ class OnnxMotion(OnnxPart):
         return found["motion"], found["mask_logits"]
 
 
+class OnnxObjectMask(OnnxPart):
+    """As ``ObjectMaskNet``."""
+
+    def __call__(self, image: Tensor, text: Tensor, text_mask: Tensor | None = None) -> Tensor:
+        """For every pixel the logit that the prompt asks it to move."""
+        text, text_mask = text_or_none(text, text_mask, len(image), self.config.text.width)
+        inputs = {"image": image, "text": text, "text_mask": text_mask}
+        return run_graph(self.model["object_mask"], inputs)["mask_logits"]
+
+
 class OnnxVae(OnnxPart):
     """As ``VideoVae``."""
 

@@ -11,6 +11,7 @@ from diff4splat.models.onnx.adapters import (
     OnnxDit,
     OnnxLdrm,
     OnnxMotion,
+    OnnxObjectMask,
     OnnxTextEncoder,
     OnnxVae,
 )
@@ -24,8 +25,9 @@ ADAPTERS = {
     "deformation": OnnxDeformation,
     "monocular_depth": OnnxDepth,
     "motion_unet": OnnxMotion,
+    "object_mask": OnnxObjectMask,
 }
-FEW_THREADS = ("text_encoder", "monocular_depth", "motion_unet")
+FEW_THREADS = ("text_encoder", "monocular_depth", "motion_unet", "object_mask")
 """One thread: these decide about a scene by thresholds, and must not depend on the machine."""
 
 

@@ -1,4 +1,4 @@
-"""Graphs of the text encoder, the depth prior and the motion prior."""
+"""Graphs of the text encoder, the depth prior, the motion prior and the object mask."""
 
 from torch import Tensor, nn
 
@@ -6,6 +6,7 @@ from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.monocular_depth.network import MULTIPLE_PX as DEPTH_MULTIPLE_PX
 from diff4splat.models.motion_unet.unet import MULTIPLE_PX as MOTION_MULTIPLE_PX
+from diff4splat.models.object_mask.network import MULTIPLE_PX as MASK_MULTIPLE_PX
 from diff4splat.models.onnx_export.source import (
     GraphSource,
     TensorFunction,
@@ -67,6 +68,24 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
                 mask("text_mask", "batch", "tokens"),
             ),
             outputs=(output("motion", *motion), output("mask_logits", "batch", *size)),
+        )
+    ]
+
+
+def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """An image and text to the logits of what the text asks to move."""
+    size = (f"{MASK_MULTIPLE_PX}*rows", f"{MASK_MULTIPLE_PX}*columns")
+    return [
+        GraphSource(
+            name="object_mask",
+            part="object_mask",
+            module=TensorFunction(network, lambda masks, *inputs: (masks(*inputs),)),
+            inputs=(
+                unit("image", "batch", 3, *size),
+                normal("text", "batch", "tokens", config.text.width),
+                mask("text_mask", "batch", "tokens"),
+            ),
+            outputs=(output("mask_logits", "batch", *size),),
         )
     ]
 

@@ -11,6 +11,7 @@ from diff4splat.models.onnx_export.gaussian_graphs import deformation_graphs, ld
 from diff4splat.models.onnx_export.prior_graphs import (
     monocular_depth_graphs,
     motion_unet_graphs,
+    object_mask_graphs,
     text_encoder_graphs,
 )
 from diff4splat.models.onnx_export.source import GraphSource
@@ -25,6 +26,7 @@ GRAPHS: Mapping[str, Callable[[nn.Module, ModelConfig], list[GraphSource]]] = Ma
         "deformation": deformation_graphs,
         "monocular_depth": monocular_depth_graphs,
         "motion_unet": motion_unet_graphs,
+        "object_mask": object_mask_graphs,
     }
 )
 """Part → its graphs."""

@@ -33,7 +33,7 @@ from diff4splat.scene.scene import Scene
 
 SIDE_PX = 64
 PROMPT = "the red box slides to the left"
-PRIORS = frozenset({"text_encoder", "monocular_depth", "motion_unet"})
+PRIORS = frozenset({"text_encoder", "monocular_depth", "motion_unet", "object_mask"})
 VIDEO = frozenset({"vae", "dit", "ldrm", "deformation"})
 PARTS = sorted(PRIORS | VIDEO)
 
@@ -64,7 +64,7 @@ CASES = {
     ),
     "video, still": Case(
         prompt=PROMPT,
-        parts=(PRIORS | VIDEO) - {"motion_unet", "deformation"},
+        parts=(PRIORS | VIDEO) - {"motion_unet", "object_mask", "deformation"},
         fill="video",
         still=True,
     ),

@@ -28,7 +28,7 @@ def with_coarse_images(batch: ClipBatch, side_px: int) -> ClipBatch:
             f"view side: expected a divisor of {height} x {width} px, got {side_px}; "
             "correct data.view_sides_px"
         )
-    return batch if factor == 1 else replace(batch, video=_coarse(batch.video, factor))
+    return batch if factor == 1 else replace(batch, video=coarse(batch.video, factor))
 
 
 def enlarged(batch: ClipBatch, factor: int) -> ClipBatch:
@@ -66,7 +66,8 @@ def _repeated(maps: Shaped[Tensor, "*n h w"], factor: int) -> Shaped[Tensor, "*n
     return maps.repeat_interleave(factor, -2).repeat_interleave(factor, -1)
 
 
-def _coarse(images: UInt8[Tensor, "*n h w 3"], factor: int) -> UInt8[Tensor, "*n h w 3"]:
+def coarse(images: UInt8[Tensor, "*n h w 3"], factor: int) -> UInt8[Tensor, "*n h w 3"]:
+    """Reduced by ``factor`` and enlarged again."""
     flat = images.flatten(0, -4).movedim(-1, 1).float()
     small = torch.nn.functional.avg_pool2d(flat, factor)
     return _pixels(_bicubic(small, factor)).unflatten(0, images.shape[:-3])

@@ -11,6 +11,7 @@ from diff4splat.training.batches.epoch_shuffle import (
     ShuffledIndices,
     split_by_motion,
 )
+from diff4splat.training.batches.requests.samples import RequestSamples
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latents.latent_batch import LatentBatch, collate_latents
 from diff4splat.training.latents.latent_shards import LatentPack, read_packs, require_alike
@@ -64,8 +65,10 @@ class LatentSamples:
         return collate_latents(samples)
 
 
-def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples:
-    """What the recipe's sources hold: clips, or clips that were encoded before.
+def open_samples(
+    recipe: StageRecipe, seed: int
+) -> ClipSamples | LatentSamples | RequestSamples:
+    """What the recipe's sources hold: clips, clips that were encoded before, or images of clips.
 
     Raises:
         ConfigError: some sources are one and some the other.
@@ -77,7 +80,10 @@ def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples:
             f"stage {recipe.name}: expected sources that are all latents or all clips, got both; "
             "encode the clips first"
         )
-    return LatentSamples(recipe, seed) if encoded.pop() else ClipSamples.open(recipe, seed)
+    if encoded.pop():
+        return LatentSamples(recipe, seed)
+    kind = RequestSamples if recipe.kind == "object_mask" else ClipSamples
+    return kind.open(recipe, seed)
 
 
 def _require_kinds(places: IndicesByMotion, settings: SourceSettings) -> None:

@@ -132,6 +132,16 @@ class MotionDiffusionLosses:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectMaskLosses:
+    """Of the pixels that a prompt asks to move."""
+
+    cross_entropy: float = 10.0
+    """Mean over pixels: most are not asked for, whatever the prompt."""
+    dice: float = 1.0
+    """1 − overlap (V-Net, arXiv 1606.04797): small objects count as large ones."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointLosses:
     """Of the video diffusion model and the reconstruction together."""
 
@@ -149,6 +159,7 @@ Losses = (
     | FlowLosses
     | DistillationLosses
     | MotionDiffusionLosses
+    | ObjectMaskLosses
     | JointLosses
 )
 LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
@@ -160,6 +171,7 @@ LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
         "dynamic": DynamicLosses,
         "monocular_depth": DepthLosses,
         "motion_diffusion": MotionDiffusionLosses,
+        "object_mask": ObjectMaskLosses,
         "video_diffusion": FlowLosses,
         "video_distillation": DistillationLosses,
         "joint": JointLosses,

@@ -6,7 +6,7 @@ All that recipes ask of a model configuration is here.
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.training.recipe.checks import require
-from diff4splat.training.recipe.kinds import CAPTION_KINDS, LATENT_KINDS, RECONSTRUCTION_KINDS
+from diff4splat.training.recipe.kinds import CAPTION_KINDS, IMAGE_KINDS, LATENT_KINDS, RECONSTRUCTION_KINDS
 from diff4splat.training.recipe.stage import StageRecipe
 
 
@@ -27,6 +27,8 @@ def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
     require(fits, what, expected, "one or neither")
     fits = stage.kind != "motion_diffusion" or model.motion_unet.used
     require(fits, f"{what}: model.motion_unet.width", "a motion network for its kind", 0)
+    fits = stage.kind != "object_mask" or model.object_mask.used
+    require(fits, f"{what}: model.object_mask.width", "an object mask for its kind", 0)
     fits = stage.kind != "monocular_depth" or model.monocular_depth.used
     require(fits, f"{what}: model.monocular_depth.channels", "a depth network for its kind", 0)
 
@@ -40,8 +42,9 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     )
     fits = not (data.augment and stage.kind in CAPTION_KINDS)
     require(fits, f"{what}.augment", "false where captions are read", "true")
-    fits = not data.keyframes_only or stage.kind == "motion_diffusion"
-    require(fits, f"{what}.keyframes_only", "false but for a motion_diffusion stage", "true")
+    fits = not data.keyframes_only or stage.kind in IMAGE_KINDS
+    expected = f"false but for {' and '.join(IMAGE_KINDS)} stages"
+    require(fits, f"{what}.keyframes_only", expected, "true")
     keyframed = model.refinement.used and stage.kind in RECONSTRUCTION_KINDS
     fits, stride = not keyframed or data.keyframe_stride == TIME_STRIDE, data.keyframe_stride
     expected = f"{TIME_STRIDE} with a refinement decoder"

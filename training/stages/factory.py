@@ -10,6 +10,7 @@ from diff4splat.training.stages.kinds.joint import JointStage
 from diff4splat.training.stages.kinds.monocular_depth import MonocularDepthStage
 from diff4splat.training.stages.kinds.motion import MotionStage
 from diff4splat.training.stages.kinds.motion_diffusion import MotionDiffusionStage
+from diff4splat.training.stages.kinds.object_mask import ObjectMaskStage
 from diff4splat.training.stages.kinds.posed_video_pretrain import PosedVideoPretrainStage
 from diff4splat.training.stages.kinds.static import StaticStage
 from diff4splat.training.stages.kinds.vae import AutoencoderStage
@@ -26,6 +27,7 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "dynamic": DynamicStage,
         "monocular_depth": MonocularDepthStage,
         "motion_diffusion": MotionDiffusionStage,
+        "object_mask": ObjectMaskStage,
         "video_diffusion": VideoDiffusionStage,
         "video_distillation": VideoDistillationStage,
         "joint": JointStage,

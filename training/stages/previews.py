@@ -24,6 +24,9 @@ MOTION_CONTRAST = 0.1
 LEAST_PX = 96
 """Smaller images are enlarged by a whole factor, so that people see their pixels."""
 
+MOST_PROMPTS = 6
+"""Prompts of one image that a panel shows."""
+
 Row = tuple[str, Sequence[Float[Tensor, "h w 3"]]]
 """What a row shows, and its images."""
 
@@ -147,3 +150,26 @@ def depth_preview(
 def _near_is_bright(log_depth: Float[Tensor, "n h w"]) -> list[Tensor]:
     near = torch.sigmoid(math.log(PLANE_DEPTH) - log_depth)
     return list(near[..., None].expand(-1, -1, -1, 3).cpu())
+
+
+def mask_preview(
+    rgb: Float[Tensor, "b 3 h w"],
+    masks: Bool[Tensor, "b r h w"],
+    probabilities: Float[Tensor, "b r h w"],
+) -> Float[Tensor, "height width 3"]:
+    """The first image, and for some of its prompts what is asked for and what is found."""
+    image = rgb[0].movedim(0, -1)
+    return preview(
+        [
+            ("image", [image]),
+            ("asked for", [_dimmed(image, one.to(image)) for one in masks[0, :MOST_PROMPTS]]),
+            ("found", [_dimmed(image, one.to(image)) for one in probabilities[0, :MOST_PROMPTS]]),
+        ]
+    )
+
+
+def _dimmed(
+    image: Float[Tensor, "h w 3"], mask: Float[Tensor, "h w"]
+) -> Float[Tensor, "h w 3"]:
+    """Dark where the mask is 0."""
+    return image * (0.15 + 0.85 * mask[..., None])

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from diff4splat.error_time.subjects.inputs import Inputs
 from diff4splat.error_time.subjects.model import request, shipped_model
+from diff4splat.generation.motion_networks import motion_prior
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.priors import Copies, motion_copy
 from diff4splat.generation.settings import GenerationSettings
@@ -25,7 +26,7 @@ def run(settings: GenerationSettings, inputs: Inputs) -> Tensor:
         motion = MotionRequest(text=prompt(index), seed=0, settings=settings)
         copies = Copies(image=asked.image, small=asked.small)
         image = motion_copy(copies, model.config.motion_unet.input_scale)
-        sample = sample_motion(model.networks.motion_unet, image, frames, motion)
+        sample = sample_motion(motion_prior(model.networks), image, frames, motion)
         fields.append(sample.field)
     return torch.stack(fields)
 

@@ -22,9 +22,10 @@ from diff4splat.generation.inputs.image_size import (
 )
 from diff4splat.generation.inputs.input_cameras import path_frame
 from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
+from diff4splat.generation.motion_networks import motion_prior
 from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
 from diff4splat.generation.pipeline import Diff4SplatPipeline
-from diff4splat.generation.plan import FILL_PARTS
+from diff4splat.generation.plan import FILL_PARTS, MOTION_PARTS
 from diff4splat.generation.priors import Copies, motion_copy
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.models.hub.model import load_model
@@ -94,7 +95,7 @@ def unprompted_items(source: Source, lean: Callable[[], Frames]) -> Iterator[Ite
         name="motion prior",
         full=lambda: _with_motion(source),
         lean=lean,
-        saved_bytes=source.weights_bytes("motion_unet", "text_encoder"),
+        saved_bytes=source.weights_bytes(*MOTION_PARTS),
     )
     yield all_items(source, lean)
 
@@ -126,7 +127,7 @@ def all_items(source: Source, lean: Callable[[], Frames]) -> Item:
         name="all together, static and without a prompt",
         full=lambda: full_path(source),
         lean=lean,
-        saved_bytes=source.weights_bytes("text_encoder", "motion_unet", *FILL_PARTS),
+        saved_bytes=source.weights_bytes(*MOTION_PARTS, *FILL_PARTS),
         compared=lambda: film_singly(keyed(source.scene()), ("rgb", "depth")),
     )
 
@@ -147,7 +148,7 @@ def keyed(scene: Scene) -> Scene:
 @torch.no_grad()
 def run_motion_prior(source: Source) -> None:
     """Text encoder and motion prior, both passes; what they say is then not used."""
-    model = load_model(source.model, parts=("text_encoder", "motion_unet"))
+    model = load_model(source.model, parts=MOTION_PARTS)
     plan = image_plan(model.config, model.trained)
     factor = downsampling_factor(model.config, plan, source.image.camera.size_px)
     small = downsample(source.image, factor)
@@ -157,7 +158,7 @@ def run_motion_prior(source: Source) -> None:
     request = MotionRequest(text=text, seed=0, settings=settings)
     copies = Copies(image=source.image, small=small)
     image = motion_copy(copies, model.config.motion_unet.input_scale)
-    sample_motion(model.networks.motion_unet, image, frames, request)
+    sample_motion(motion_prior(model.networks), image, frames, request)
 
 
 def _with_text(source: Source) -> Frames:

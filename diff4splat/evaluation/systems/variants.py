@@ -10,11 +10,12 @@ from typing import Literal, get_args
 
 from diff4splat.evaluation.systems.evaluated_system import Generator
 
-Network = Literal["depth", "motion", "text", "video", "ldrm", "deformation"]
+Network = Literal["depth", "motion", "object-mask", "text", "video", "ldrm", "deformation"]
 """Names of ablations, as on the command line."""
 REMOVED_PARTS: dict[Network, tuple[str, ...]] = {
     "depth": ("monocular_depth",),
     "motion": ("motion_unet",),
+    "object-mask": ("object_mask",),
     "text": ("text_encoder",),
     "video": ("dit",),
     "ldrm": ("vae", "ldrm"),
@@ -24,6 +25,7 @@ REMOVED_PARTS: dict[Network, tuple[str, ...]] = {
 ABLATION_ROWS: dict[Network, str] = {
     "depth": "without depth prior",
     "motion": "without motion prior",
+    "object-mask": "without object mask",
     "text": "without text encoder",
     "video": "without video model",
     "ldrm": "without VAE and LDRM",

@@ -44,7 +44,7 @@ def test_every_training_caption_is_known_word_by_word(
 @pytest.mark.parametrize(
     ("prompt", "reason"),
     [
-        ("a cat moves to the left", NO_OBJECT),
+        ("an ostrich moves to the left", NO_OBJECT),
         ("der Hund läuft nach links", NO_OBJECT),
         ("猫が歩く", NO_OBJECT),
         ("🚗💨", NO_OBJECT),
@@ -57,7 +57,7 @@ def test_every_training_caption_is_known_word_by_word(
         ("a gear is spinning", ""),
         ("nothing moves", ""),
         ("the blue one moves", ""),
-        ("the blue cat walks", UNKNOWN_OBJECT.format("cat")),
+        ("the blue ostrich walks", UNKNOWN_OBJECT.format("ostrich")),
         ("a purple zebra flies away", UNKNOWN_OBJECT.format("zebra")),
         ("the sofa beside the red car moves", ""),
     ],
@@ -76,15 +76,15 @@ def test_endings_do_not_count(forms: str) -> None:
 def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     notes = partial(prompt_notes, model="small")
 
-    (line,) = notes("a cat purrs")
+    (line,) = notes("an ostrich sings")
     assert "nothing moves: the prompt names no object" in line
     assert "diff4splat inspect words" in line
-    (line,) = notes("the red cat moves")
-    assert "nothing moves: the model does not know the object 'cat'" in line
+    (line,) = notes("the red ostrich moves")
+    assert "nothing moves: the model does not know the object 'ostrich'" in line
     unknown = "words of the prompt that the model does not know: quickly"
     assert notes("the red car moves quickly") == [unknown]
     assert notes("the red car moves to the left") == notes(None) == []
-    assert notes("a cat purrs", model="test") == []
+    assert notes("an ostrich sings", model="test") == []
 
 
 def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:

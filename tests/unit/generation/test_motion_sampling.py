@@ -1,11 +1,14 @@
 """The motion prior's sample: what moves, seeds and guidance."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from image_layers import input_image, random_rgb
 
 from diff4splat.flow.guidance import CallCount, Guidance
 from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.motion_networks import LEAST_PROBABILITY, MaskedMotion
 from diff4splat.generation.motion_sampling import (
     MotionRequest,
     MotionSample,
@@ -15,6 +18,7 @@ from diff4splat.generation.motion_sampling import (
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.motion_unet.unet import MotionUNet
+from diff4splat.models.object_mask.network import ObjectMaskNet
 
 SIDE_PX = 32
 
@@ -56,6 +60,21 @@ def test_the_most_probable_moves_where_nothing_is_probable() -> None:
     assert sample.mask(0.1).tolist() == [[False, True], [True, True]]
     assert not sample_of(0 * probability).mask(0.3).any()
     assert bool(sample_of(probability + 0.6).mask(0.5).all())
+
+
+@pytest.mark.parametrize(("highest", "moves"), [(0.49, False), (0.51, True), (0.0, False)])
+def test_nothing_moves_below_the_least_probability(highest: float, moves: bool) -> None:
+    sample = replace(sample_of(torch.tensor([[highest, 0.1]])), least_probability=0.5)
+    assert sample.mask(0.3).tolist() == [[moves, False]]
+
+
+@torch.no_grad()
+def test_only_an_object_mask_has_a_least_probability(network: MotionUNet) -> None:
+    masked = MaskedMotion(motion_unet=network, object_mask=ObjectMaskNet(4, 16))
+    assert sample_motion(network, image(), 2, request(text=True)).least_probability == 0
+    sample = sample_motion(masked, image(), 2, request(text=True))
+    assert sample.least_probability == LEAST_PROBABILITY
+    assert not bool(sample.mask(0.3).any())
 
 
 @pytest.mark.parametrize(("second", "moves"), [(0.39, False), (0.41, True)])

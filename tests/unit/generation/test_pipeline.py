@@ -9,6 +9,7 @@ import torch
 from diff4splat.errors import CheckpointError, ConfigError, InputError
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.plan import MOTION_PARTS
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
@@ -231,7 +232,7 @@ def test_networks_load_when_they_are_needed_and_stay(image: InputImage) -> None:
     assert pipeline.model.loaded == {"monocular_depth"}
     first = pipeline.model.networks.monocular_depth
     pipeline(image, "arc", "a ball rolls", settings=QUICK)
-    assert pipeline.model.loaded == {"monocular_depth", "motion_unet", "text_encoder"}
+    assert pipeline.model.loaded == {"monocular_depth", *MOTION_PARTS}
     assert pipeline.model.networks.monocular_depth is first
 
 

@@ -21,7 +21,7 @@ from diff4splat.models.networks import PARTS, model_parts
 from diff4splat.progress.run_log import RunLog
 
 VIDEO = frozenset(FILL_PARTS)
-PRIORS = frozenset({"monocular_depth", "motion_unet", "text_encoder"})
+PRIORS = frozenset({"monocular_depth", "motion_unet", "object_mask", "text_encoder"})
 DEPTH = frozenset({"monocular_depth"})
 TABLE = [
     # size, trained, request, parts that run
@@ -45,6 +45,7 @@ TABLE = [
     ("small", PARTS, {"prompt": True, "without": ("monocular_depth",)}, PRIORS - DEPTH),
     ("small", PARTS, {"prompt": True, "without": ("motion_unet",)}, DEPTH),
     ("small", PARTS, {"prompt": True, "without": ("text_encoder",)}, DEPTH),
+    ("small", PARTS, {"prompt": True, "without": ("object_mask",)}, PRIORS - {"object_mask"}),
     (
         "small",
         PARTS,
@@ -63,7 +64,13 @@ TABLE = [
     ("small", PRIORS, {"prompt": True}, PRIORS),
     ("small", DEPTH, {"prompt": True}, DEPTH),
     ("small", ("vae", "ldrm", "deformation"), {"prompt": True}, frozenset()),
-    ("small", ("text_encoder", "motion_unet"), {"prompt": True}, PRIORS - DEPTH),
+    (
+        "small",
+        ("text_encoder", "motion_unet"),
+        {"prompt": True},
+        PRIORS - DEPTH - {"object_mask"},
+    ),
+    ("small", ("text_encoder", "object_mask"), {"prompt": True}, frozenset()),
     (
         "small",
         (*FILL_PARTS, "text_encoder"),
@@ -83,6 +90,7 @@ REASONS = [
     ({"prompt": False}, PARTS, "motion_unet", "no prompt asks for motion", 0.0),
     ({"prompt": False}, PARTS, "text_encoder", "no prompt", 0.0),
     (STILL, PARTS, "motion_unet", "nothing may move", 0.0),
+    (STILL, PARTS, "object_mask", "nothing may move", 0.0),
     (
         {"prompt": True, "still": True},
         PARTS,

@@ -4,30 +4,24 @@ In a clip mostly one object moves, often the most salient one, so a network can 
 With these samples only the words say what moves. Axes: ``t`` latent frames, ``h w`` pixels.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.requests import (
     caption_of_absent_object,
     caption_of_object,
 )
-from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.data.clip import Clip, View
-from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
 from diff4splat.training.batches.requests.displacement import (
     draw_direction,
     draw_motion,
 )
+from diff4splat.training.batches.requests.present import PresentObject, named_objects
 from diff4splat.training.batches.targets import INPUT_VIEW
 from diff4splat.training.recipe.data import DataSettings
-
-AREA_SHARES = (0.003, 0.4)
-"""Smallest and largest share of the image that an object is asked for with."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectRequest:
@@ -36,18 +30,6 @@ class ObjectRequest:
     caption: str
     motion: Float[Tensor, "3 t h w"]
     """As ``pixel_motion``."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _PresentObject:
-    named: NamedObject
-    mask: Bool[Tensor, "h w"]
-    """Its pixels with depth."""
-
-    @property
-    def is_asked_for(self) -> bool:
-        least, most = (share * self.mask.numel() for share in AREA_SHARES)
-        return least <= int(self.mask.sum()) <= most
 
 
 def draw_request(
@@ -69,20 +51,17 @@ def draw_request(
     return None
 
 
-def _present_objects(clip: Clip, view: View) -> list[_PresentObject]:
-    """Objects with a noun of captions that the first image shows."""
+def _present_objects(clip: Clip, view: View) -> list[PresentObject]:
+    """Objects with a noun of captions, by their pixels with depth in the first image."""
     if view.instances is None or view.depth is None:
         return []
-    seen, objects = view.depth[0] > 0, []
-    for note, mask in present_objects(clip.note, view.instances[0], PRESENT_SHARE):
-        if note.name in NOUNS:
-            named = NamedObject(note.color, note.name)
-            objects.append(_PresentObject(named=named, mask=mask & seen))
-    return objects
+    seen = view.depth[0] > 0
+    objects = named_objects(clip.note, view.instances[0])
+    return [replace(one, mask=one.mask & seen) for one in objects]
 
 
 def _absent_object(
-    objects: list[_PresentObject], latent_frames: int, generator: torch.Generator
+    objects: list[PresentObject], latent_frames: int, generator: torch.Generator
 ) -> ObjectRequest | None:
     """Nothing moves, because the caption names no object of the image."""
     caption = caption_of_absent_object([one.named for one in objects], generator)
@@ -93,7 +72,7 @@ def _absent_object(
 
 
 def _other_object(
-    objects: list[_PresentObject],
+    objects: list[PresentObject],
     depth: Float[Tensor, "h w"],
     latent_frames: int,
     generator: torch.Generator,

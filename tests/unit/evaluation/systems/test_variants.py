@@ -59,8 +59,9 @@ def test_a_network_that_runs_is_left_out() -> None:
     video = {"vae", "dit", "ldrm", "deformation"}
     assert gone == {
         "without depth prior": {"monocular_depth"},
-        "without motion prior": {"motion_unet"},
-        "without text encoder": {"text_encoder", "motion_unet"},
+        "without motion prior": {"motion_unet", "object_mask"},
+        "without object mask": {"object_mask"},
+        "without text encoder": {"text_encoder", "motion_unet", "object_mask"},
         "without video model": {"dit"},
         "without VAE and LDRM": video,
         "without deformation": {"deformation"},

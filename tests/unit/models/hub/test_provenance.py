@@ -48,6 +48,7 @@ def test_the_file_lists_parts_in_one_order(tmp_path: Path) -> None:
             "monocular_depth",
             "motion_unet",
             "image_encoder",
+            "object_mask",
         ],
         "license": "not stated",
         "origin": "not stated",

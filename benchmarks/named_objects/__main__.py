@@ -1,0 +1,92 @@
+"""Print how well a model finds named objects: ``python -m benchmarks.named_objects CLIPS MODEL``.
+
+``CLIPS`` are worlds of 128 px (``prepare synth --size 128 --still-share 0``).
+
+overlap   of the mask with the object that was asked for
+found     the most probable pixel is on it
+whole     four fifths of it are in the mask
+still     no pixel moves where the sentence asks for an object that is not there
+"""
+
+import argparse
+from collections import defaultdict
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from benchmarks.named_objects.requests import AskedImage, asked_image
+from diff4splat.data.clip_folder import ClipFolder
+from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
+from diff4splat.generation.motion_networks import motion_prior
+from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.plan import MOTION_PARTS
+from diff4splat.generation.settings import GenerationSettings
+from diff4splat.geometry.camera import pinhole
+from diff4splat.models.hub.model import Model, load_model
+
+THRESHOLD = GenerationSettings().motion.threshold
+COLUMNS = ("overlap", "found", "whole", "still")
+
+
+def motion_of(model: Model, rgb: Tensor, sentence: str) -> MotionSample:
+    """What the model's motion prior says of one sentence."""
+    camera = pinhole(float(rgb.shape[1]), tuple(rgb.shape[:2]))
+    image = InputImage(rgb=rgb, camera=camera, focal_source="")
+    text = model.networks.text_encoder.encode_prompt(sentence)
+    request = MotionRequest(text=text, seed=0, settings=GenerationSettings())
+    return sample_motion(motion_prior(model.networks), image, 2, request)
+
+
+def soft(rgb: Tensor) -> Tensor:
+    """As an image of half the sides comes to the network."""
+    camera = pinhole(float(rgb.shape[1]), tuple(rgb.shape[:2]))
+    image = InputImage(rgb=rgb, camera=camera, focal_source="")
+    return enlarged(downsample(image, 2), 2).rgb
+
+
+def measure(sample: MotionSample, truth: Tensor) -> dict[str, float]:
+    """Columns that apply."""
+    mask = sample.mask(THRESHOLD)
+    if not bool(truth.any()):
+        return {"still": float(not bool(mask.any()))}
+    shared = int((mask & truth).sum())
+    return {
+        "overlap": shared / int((mask | truth).sum()),
+        "found": float(truth.flatten()[sample.probability.argmax()]),
+        "whole": float(shared >= 0.8 * int(truth.sum())),
+    }
+
+
+def rows(model: Model, images: list[AskedImage]) -> dict[str, dict[str, float]]:
+    """Means of sharp images of 128 px, and of enlarged ones of 64 px."""
+    table = {}
+    for name, change in (("128 px", lambda rgb: rgb), ("64 px enlarged", soft)):
+        values: dict[str, list[float]] = defaultdict(list)
+        for image in images:
+            for sentence, truth in image.requests:
+                found = measure(motion_of(model, change(image.rgb), sentence), truth)
+                for column, value in found.items():
+                    values[column].append(value)
+        table[name] = {column: sum(all_) / len(all_) for column, all_ in values.items()}
+    return table
+
+
+@torch.no_grad()
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("clips", type=Path)
+    parser.add_argument("model")
+    parser.add_argument("--most", type=int, default=120)
+    options = parser.parse_args()
+    model, folder = load_model(options.model, parts=MOTION_PARTS), ClipFolder(options.clips)
+    count = min(len(folder), options.most)
+    images = [asked_image(folder.clip(index)) for index in range(count)]
+    print("| images |", " | ".join(COLUMNS), "|\n|---|" + "---:|" * len(COLUMNS))
+    for name, values in rows(model, images).items():
+        print(f"| {name} |", " | ".join(f"{values[column]:.3f}" for column in COLUMNS), "|")
+
+
+if __name__ == "__main__":
+    main()

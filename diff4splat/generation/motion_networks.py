@@ -1,0 +1,61 @@
+"""The networks that decide about motion, as one prior.
+
+image, text ─ object mask ─ what moves
+image, noise, text ─ motion U-Net ─ how
+"""
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from diff4splat.models.networks import Networks
+from diff4splat.models.protocols import MotionPrior, ObjectMask
+
+LEAST_PROBABILITY = 0.5
+"""Below it nothing moves (chosen on validation worlds: docs/log/motion.md)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaskedMotion:
+    """A motion prior whose mask is that of another network, wherever there is text."""
+
+    motion_unet: MotionPrior
+    object_mask: ObjectMask
+
+    def __call__(
+        self,
+        image: Tensor,
+        noisy: Tensor,
+        level: Tensor,
+        text: Tensor | None = None,
+        text_mask: Tensor | None = None,
+    ) -> Tensor:
+        """The clean motion."""
+        return self.motion_unet(image, noisy, level, text, text_mask)
+
+    def predict_motion_and_mask(
+        self,
+        image: Tensor,
+        noisy: Tensor,
+        level: Tensor,
+        text: Tensor | None = None,
+        text_mask: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor]:
+        """The clean motion, and for every pixel the logit that it moves."""
+        if text is None:
+            return self.motion_unet.predict_motion_and_mask(image, noisy, level)
+        motion = self.motion_unet(image, noisy, level, text, text_mask)
+        return motion, self.object_mask(image, text, text_mask)
+
+
+def motion_prior(networks: Networks) -> MotionPrior | None:
+    """The motion prior of a model; None if it has none, or none is loaded."""
+    motion, mask = networks.motion_unet, networks.object_mask
+    if motion is None or mask is None:
+        return motion
+    return MaskedMotion(motion_unet=motion, object_mask=mask)
+
+
+def least_probability(prior: MotionPrior) -> float:
+    """Of the most probable pixel, for anything to move: an object mask knows what is not there."""
+    return LEAST_PROBABILITY if isinstance(prior, MaskedMotion) else 0.0

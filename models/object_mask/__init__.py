@@ -1,0 +1,1 @@
+"""Object mask: the pixels of what a prompt asks to move."""

@@ -1,0 +1,88 @@
+"""Object mask: the pixels of what a prompt asks to move (ours; ADR 29).
+
+Axes: ``b`` images, ``r`` prompts of an image, ``h w`` pixels, ``c`` channels, ``q`` queries. Image
+and prompt meet in a product of vectors, so one pass over an image serves many prompts:
+
+    image, coordinates ─ cells of 2 ─ 1/2 ── 1/4 ── 1/8 ── 1/16 ── 1/8 ── 1/4 ── 1/2 ─ embedding ─┐
+    prompt ─ text queries ────────────────────────────────────────────────────────────────────────┴ · ─ logits
+"""
+
+import math
+from itertools import pairwise
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.conv_block import ConvBlock
+from diff4splat.models.monocular_depth.network import pixel_coordinates
+from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
+from diff4splat.models.object_mask.text_queries import TextQueries
+
+FOLDED_PX = 2
+"""Pixels per side that become channels before the first convolution."""
+GROWTH = (1, 2, 5, 8)
+"""Channels at 1/2, 1/4, 1/8 and 1/16 of the resolution, in multiples of the configured width."""
+BLOCKS = (0, 1, 2, 3)
+"""Residual blocks at each of them on the way down; one on the way up."""
+TEXT_CHANNELS = 96
+MULTIPLE_PX = FOLDED_PX << (len(GROWTH) - 1)
+"""Image sides must be multiples of it."""
+START_LOGIT = -3.0
+"""Of a fresh network: few pixels are asked for."""
+
+
+class ObjectMaskNet(nn.Module):
+    """For every pixel the logit of the probability that the prompt asks it to move."""
+
+    def __init__(self, width: int, text_width: int) -> None:
+        super().__init__()
+        channels = [width * share for share in GROWTH]
+        steps = list(pairwise(channels))
+        self.embedding_width = 2 * width
+        self.input_conv = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
+        self.down_blocks = nn.ModuleList(
+            [_blocks(size, count) for size, count in zip(channels, BLOCKS, strict=True)]
+        )
+        self.downsample = nn.ModuleList([nn.Conv2d(a, b, 2, stride=2) for a, b in steps])
+        self.upsample = nn.ModuleList([nn.Conv2d(b, 4 * a, 1) for a, b in steps])
+        self.up_blocks = nn.ModuleList([ConvBlock(size) for size in channels[:-1]])
+        self.embedding = nn.Conv2d(width, self.embedding_width * FOLDED_PX**2, 1)
+        self.queries = TextQueries(text_width, TEXT_CHANNELS, self.embedding_width)
+
+    def forward(
+        self,
+        image: Float[Tensor, "b 3 h w"],
+        text: Float[Tensor, "b s e"],
+        text_mask: Bool[Tensor, "b s"] | None = None,
+    ) -> Float[Tensor, "b h w"]:
+        """Logits of one prompt per image; ``image`` is RGB in [0, 1], its sides multiples of 16."""
+        return self.logits(self.embed(image), text_tokens(text, text_mask))[:, 0]
+
+    def embed(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h w"]:
+        """A vector for every pixel, without a prompt."""
+        inputs = torch.cat([image * 2 - 1, pixel_coordinates(image)], 1)
+        features = self.input_conv(torch.nn.functional.pixel_unshuffle(inputs, FOLDED_PX))
+        skips = []
+        for blocks, downsample in zip(self.down_blocks, self.downsample, strict=False):
+            skips.append(blocks(features))
+            features = downsample(skips[-1])
+        features = self.down_blocks[-1](features)
+        for level in reversed(range(len(self.up_blocks))):
+            upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
+            features = self.up_blocks[level](skips[level] + upsampled)
+        return torch.nn.functional.pixel_shuffle(self.embedding(features), FOLDED_PX)
+
+    def logits(
+        self, embedding: Float[Tensor, "b c h w"], text: TextTokens
+    ) -> Float[Tensor, "b r h w"]:
+        """Of the prompts of every image; those of one image follow each other in ``text``."""
+        queries, biases = self.queries(text)
+        queries = queries.unflatten(0, (len(embedding), -1)) / math.sqrt(self.embedding_width)
+        biases = biases.unflatten(0, (len(embedding), -1))[..., None, None]
+        found = torch.einsum("brqc,bchw->brqhw", queries, embedding) + biases
+        return torch.logsumexp(found, 2) + START_LOGIT
+
+
+def _blocks(channels: int, count: int) -> nn.Sequential:
+    return nn.Sequential(*[ConvBlock(channels) for _ in range(count)])

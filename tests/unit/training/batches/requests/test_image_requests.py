@@ -1,0 +1,92 @@
+"""Prompts for one image: captions and masks agree, and every kind occurs."""
+
+import torch
+from torch import Tensor
+
+from diff4splat.captions.grammar import NamedObject, parse_caption
+from diff4splat.captions.synonyms import names
+from diff4splat.errors import InputError
+from diff4splat.training.batches.requests import image_requests
+from diff4splat.training.batches.requests.image_requests import ImageRequest, draw_image_requests
+from diff4splat.training.batches.requests.present import PresentObject
+
+SIDE = 20
+EMPTY = torch.zeros(SIDE, SIDE, dtype=torch.bool)
+
+
+def _square(row: int, column: int, side: int) -> Tensor:
+    mask = EMPTY.clone()
+    mask[row : row + side, column : column + side] = True
+    return mask
+
+
+def present(color: str, noun: str, mask: Tensor, moves: bool = False) -> PresentObject:
+    return PresentObject(named=NamedObject(color, noun), mask=mask, moves=moves)
+
+
+OBJECTS = [
+    present("red", "mug", _square(0, 0, 5), moves=True),
+    present("blue", "box", _square(10, 10, 6)),
+    present("green", "bush", _square(0, 10, 1)),
+]
+"""The last is too small to be asked for."""
+
+
+def drawn(objects: list[PresentObject], count: int = 300) -> list[ImageRequest]:
+    generator = torch.Generator().manual_seed(0)
+    return draw_image_requests(objects, EMPTY, count, generator)
+
+
+def _named(caption: str, noun: str, color: str) -> bool:
+    words = set(caption.replace(",", "").split())
+    return color in words or any(set(one.split()) <= words for one in names(noun))
+
+
+def test_what_a_caption_says_is_what_its_mask_shows() -> None:
+    seen = set()
+    for request in drawn(OBJECTS):
+        try:
+            events = parse_caption(request.caption).events
+        except InputError:
+            continue
+        subjects = {event.subject for event in events}
+        asked = [one for one in OBJECTS if one.named in subjects]
+        expected = torch.stack([EMPTY, *(one.mask for one in asked)]).any(0)
+        assert torch.equal(request.mask, expected), request.caption
+        seen.add((len(events), len(asked)))
+    assert seen >= {(0, 0), (1, 0), (1, 1), (2, 2)}
+
+
+def test_free_sentences_ask_for_one_object_or_for_none() -> None:
+    free = 0
+    for request in drawn(OBJECTS):
+        try:
+            parse_caption(request.caption)
+        except InputError:
+            free += 1
+            found = [one for one in OBJECTS if torch.equal(one.mask, request.mask)]
+            assert found or not bool(request.mask.any())
+            if found:
+                color, noun = found[0].named.color, found[0].named.noun
+                assert "crimson" in request.caption or _named(request.caption, noun, color)
+    assert free > 90
+
+
+def test_an_image_without_objects_asks_for_nothing() -> None:
+    assert not any(bool(request.mask.any()) for request in drawn([], 60))
+
+
+def test_names_that_fit_two_are_asked_for_only_where_one_moves() -> None:
+    twins = [
+        present("red", "mug", _square(0, 0, 5), moves=True),
+        present("red", "mug", _square(10, 10, 5)),
+    ]
+    masks = [request.mask for request in drawn(twins) if bool(request.mask.any())]
+    assert masks and all(torch.equal(mask, twins[0].mask) for mask in masks)
+
+
+def test_all_kinds_have_a_share() -> None:
+    shares = image_requests.KIND_SHARES
+    assert sum(shares.values()) == 1.0 and min(shares.values()) > 0
+    empty = sum(not bool(request.mask.any()) for request in drawn(OBJECTS)) / 300
+    assert 0.15 < empty < 0.4

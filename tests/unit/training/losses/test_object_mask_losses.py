@@ -1,0 +1,62 @@
+"""Errors of object masks against their formulas, with gradients, and where nothing is asked for."""
+
+import math
+
+import pytest
+import torch
+from torch import Tensor
+
+from diff4splat.training.losses.object_mask import SMOOTHING_PX, cross_entropy, dice_error
+
+
+def example() -> tuple[Tensor, Tensor]:
+    torch.manual_seed(0)
+    masks = torch.rand(2, 3, 4, 5) < 0.3
+    masks[0, 1] = False
+    return torch.randn(2, 3, 4, 5).double(), masks
+
+
+def test_cross_entropy_is_that_of_every_pixel() -> None:
+    logits, masks = example()
+    for batch in range(2):
+        total = 0.0
+        for logit, truth in zip(
+            logits[batch].flatten().tolist(), masks[batch].flatten().tolist(), strict=True
+        ):
+            probability = 1 / (1 + math.exp(-logit))
+            total -= math.log(probability if truth else 1 - probability)
+        assert float(cross_entropy(logits, masks)[batch]) == pytest.approx(total / 60)
+
+
+def test_dice_is_that_of_prompts_that_ask_for_something() -> None:
+    logits, masks = example()
+    expected = []
+    for prompt in (0, 2):
+        probability, truth = logits[0, prompt].sigmoid(), masks[0, prompt].double()
+        both = float(probability.sum() + truth.sum())
+        shared = 2 * float((probability * truth).sum())
+        expected.append(1 - (shared + SMOOTHING_PX) / (both + SMOOTHING_PX))
+    assert float(dice_error(logits, masks)[0]) == pytest.approx(sum(expected) / 2)
+
+
+@pytest.mark.parametrize("error", [cross_entropy, dice_error])
+def test_gradients(error: object) -> None:
+    logits, masks = example()
+    assert torch.autograd.gradcheck(lambda x: error(x, masks), logits.requires_grad_())
+
+
+@pytest.mark.parametrize("error", [cross_entropy, dice_error])
+@pytest.mark.parametrize("logit", [-1e4, 0.0, 1e4])
+def test_extreme_logits_and_empty_masks(error: object, logit: float) -> None:
+    for truth in (False, True):
+        logits = torch.full((1, 2, 3, 3), logit, requires_grad=True)
+        value = error(logits, torch.full((1, 2, 3, 3), truth))
+        value.sum().backward()
+        assert bool(value.isfinite().all()) and bool(logits.grad.isfinite().all())
+
+
+def test_without_any_object_only_the_cross_entropy_teaches() -> None:
+    logits = torch.zeros(1, 2, 3, 3)
+    masks = torch.zeros(1, 2, 3, 3, dtype=torch.bool)
+    assert float(dice_error(logits, masks)) == 0.0
+    assert float(cross_entropy(logits, masks)) == pytest.approx(math.log(2))

@@ -1,0 +1,108 @@
+"""The stage of the object mask: what learns, what is measured, and random light."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from stage_fixtures import make_stage, shake_heads, stage_recipe
+
+from diff4splat.errors import ConfigError
+from diff4splat.models.config.model import MotionUNetConfig, ObjectMaskConfig
+from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.training.batches.requests.request_batch import RequestBatch
+from diff4splat.training.recipe.losses import ObjectMaskLosses
+from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.stage import TOTAL
+
+BASE = tiny_size()
+MODEL = replace(
+    BASE, motion_unet=MotionUNetConfig(width=8, heads=1), object_mask=ObjectMaskConfig(width=4)
+)
+
+
+def mask_recipe() -> StageRecipe:
+    return replace(
+        stage_recipe("video_diffusion"),
+        name="object_mask",
+        kind="object_mask",
+        trained=("object_mask",),
+        losses=ObjectMaskLosses(),
+    )
+
+
+def requests(first: int = 0) -> RequestBatch:
+    """Two images; the left half is asked for, then nothing."""
+    torch.manual_seed(first)
+    masks = torch.zeros(2, 2, 32, 32, dtype=torch.bool)
+    masks[:, 0, :, :16] = True
+    return RequestBatch(
+        sample_index=torch.tensor([first, first + 1]),
+        source=("x", "x"),
+        images=torch.randint(256, (2, 32, 32, 3)).to(torch.uint8),
+        masks=masks,
+        captions=("a red ball rolls", "nothing moves") * 2,
+    )
+
+
+def test_terms_and_gradients_are_finite_and_only_the_object_mask_learns() -> None:
+    stage = make_stage(mask_recipe(), model=MODEL)
+    shake_heads(stage)
+    terms = stage(requests())
+    assert set(terms) == {"cross_entropy", "dice", TOTAL}
+    terms[TOTAL].sum().backward()
+    gradients = {name: p.grad for name, p in stage.named_parameters() if p.grad is not None}
+    assert gradients and all(name.startswith("object_mask.") for name in gradients)
+    assert all(bool(gradient.isfinite().all()) for gradient in gradients.values())
+
+
+def test_it_learns_which_half_is_asked_for() -> None:
+    stage, batch = make_stage(mask_recipe(), model=MODEL), requests()
+    optimiser = torch.optim.Adam(stage.object_mask.parameters(), lr=1e-2)
+    for _ in range(60):
+        optimiser.zero_grad()
+        stage(batch)[TOTAL].mean().backward()
+        optimiser.step()
+    measured = stage.eval().measure(batch)
+    assert float(measured["overlap"].mean()) > 0.8
+    assert float(measured["found"].mean()) == 1.0
+    assert float(measured["absent_empty"].mean()) == 1.0
+
+
+def test_measures_have_no_value_where_no_prompt_is_of_their_kind() -> None:
+    stage = make_stage(mask_recipe(), model=MODEL).eval()
+    nothing = replace(requests(), masks=torch.zeros(2, 2, 32, 32, dtype=torch.bool))
+    measured = stage.measure(nothing)
+    assert bool(measured["overlap"].isnan().all()) and bool(measured["found"].isnan().all())
+    assert bool(measured["absent_empty"].isfinite().all())
+
+
+def test_images_get_another_light_and_another_sharpness() -> None:
+    recipe = mask_recipe()
+    recipe = replace(recipe, data=replace(recipe.data, view_sides_px=(16, 32)))
+    stage, sharp = make_stage(recipe, model=MODEL), set()
+    for first in range(0, 16, 2):
+        batch = requests(first)
+        plain = batch.images.movedim(-1, 1) / 255
+        seen = stage._random_sharpness(batch)
+        sharp.add(torch.allclose(seen, plain, atol=1e-3))
+        lit = stage._random_light(seen, batch)
+        assert lit.shape == plain.shape and 0 <= float(lit.min()) <= float(lit.max()) <= 1
+        assert not torch.allclose(lit, seen, atol=1e-3)
+        assert torch.equal(lit, stage._random_light(seen, batch))
+    assert sharp == {True, False}
+
+
+def test_panel() -> None:
+    image = make_stage(mask_recipe(), model=MODEL).eval().panel(requests())
+    assert image.ndim == 3 and bool(image.isfinite().all())
+
+
+def test_the_kind_needs_an_object_mask() -> None:
+    with pytest.raises(ConfigError, match=r"object_mask\.width: expected an object mask"):
+        Recipe(name="x", seed=0, model=BASE, stages=(mask_recipe(),))
+
+
+def test_an_object_mask_needs_a_motion_prior() -> None:
+    with pytest.raises(ConfigError, match=r"ObjectMaskConfig\.width: expected 0 without"):
+        replace(BASE, object_mask=ObjectMaskConfig(width=4))

@@ -1,0 +1,90 @@
+"""Many prompts for one image, each with the pixels that it asks to move.
+
+Axes: ``h w`` pixels.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+
+from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.requests import (
+    absent_object,
+    caption_of_absent_object,
+    caption_of_object,
+    is_unique,
+)
+from diff4splat.captions.scene_captions import caption_of_moving, caption_of_static
+from diff4splat.training.batches.requests.displacement import draw_direction
+from diff4splat.training.batches.requests.present import PresentObject
+
+KIND_SHARES = {"named": 0.55, "moving": 0.1, "two": 0.1, "absent": 0.2, "static": 0.05}
+"""One named object, one that moves in the clip, two, one that is not there, nothing."""
+GRAMMAR_SHARE = 0.4
+"""Share of captions in the grammar; the others are free or plain sentences."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageRequest:
+    """A caption and the pixels that it asks to move."""
+
+    caption: str
+    mask: Bool[Tensor, "h w"]
+
+
+def draw_image_requests(
+    objects: list[PresentObject], empty: Bool[Tensor, "h w"], count: int, generator: torch.Generator
+) -> list[ImageRequest]:
+    """``count`` requests for an image that shows ``objects``; ``empty`` is the mask of none."""
+    kinds = list(KIND_SHARES)
+    shares = torch.tensor(list(KIND_SHARES.values()))
+    drawn = shares.multinomial(count, replacement=True, generator=generator)
+    return [_draw(kinds[int(kind)], objects, empty, generator) for kind in drawn]
+
+
+def _draw(
+    kind: str,
+    objects: list[PresentObject],
+    empty: Bool[Tensor, "h w"],
+    generator: torch.Generator,
+) -> ImageRequest:
+    chosen = _chosen(kind, objects, generator)
+    names = [one.named for one in objects]
+    if chosen:
+        mask = torch.stack([objects[index].mask for index in chosen]).any(0)
+        return ImageRequest(caption=_caption(names, chosen, generator), mask=mask)
+    caption = None if kind == "static" else _absent_caption(names, generator)
+    return ImageRequest(caption=caption or caption_of_static(names, generator), mask=empty)
+
+
+def _chosen(kind: str, objects: list[PresentObject], generator: torch.Generator) -> list[int]:
+    """Indices of the objects that are asked to move."""
+    names = [one.named for one in objects]
+    able = [index for index, one in enumerate(objects) if one.is_asked_for]
+    if kind == "moving":
+        # Names that fit several objects stay in: then the one moves that would.
+        able = [index for index in able if objects[index].moves]
+    else:
+        able = [index for index in able if is_unique(names, index)]
+    count = {"named": 1, "moving": 1, "two": 2}.get(kind, 0)
+    order = torch.randperm(len(able), generator=generator).tolist()
+    return [able[index] for index in order[:count]]
+
+
+def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Generator) -> str:
+    if len(chosen) == 1 and float(torch.rand((), generator=generator)) > GRAMMAR_SHARE:
+        caption = caption_of_object(names, chosen[0], draw_direction(generator), generator)
+        if caption is not None:
+            return caption
+    others = [name for index, name in enumerate(names) if index not in chosen]
+    return caption_of_moving([names[index] for index in chosen], others, generator)
+
+
+def _absent_caption(names: list[NamedObject], generator: torch.Generator) -> str | None:
+    if float(torch.rand((), generator=generator)) > GRAMMAR_SHARE:
+        return caption_of_absent_object(names, generator)
+    other_color = bool(torch.rand((), generator=generator) < 0.5)
+    absent = absent_object(names, generator, other_color=other_color)
+    return None if absent is None else caption_of_moving([absent], names, generator)

@@ -1,0 +1,44 @@
+"""Named objects that a frame of a clip shows.
+
+Axes: ``h w`` pixels.
+"""
+
+from dataclasses import dataclass
+
+from jaxtyping import Bool, UInt8
+from torch import Tensor
+
+from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.vocabulary import NOUNS
+from diff4splat.data.clip import ClipMetadata
+from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
+
+AREA_SHARES = (0.003, 0.4)
+"""Smallest and largest share of the image that an object is asked for with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PresentObject:
+    """An object with a noun of captions."""
+
+    named: NamedObject
+    mask: Bool[Tensor, "h w"]
+    moves: bool
+    """In the clip."""
+
+    @property
+    def is_asked_for(self) -> bool:
+        """Whether it is neither too small nor most of the image."""
+        least, most = (share * self.mask.numel() for share in AREA_SHARES)
+        return least <= int(self.mask.sum()) <= most
+
+
+def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[PresentObject]:
+    """Objects with a noun of captions in an image of ``View.instances``."""
+    return [
+        PresentObject(
+            named=NamedObject(note.color, note.name), mask=mask, moves=bool(note.motion)
+        )
+        for note, mask in present_objects(clip, instances, PRESENT_SHARE)
+        if note.name in NOUNS
+    ]

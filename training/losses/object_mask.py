@@ -1,0 +1,37 @@
+"""Errors of the pixels that prompts ask to move.
+
+Axes: ``b`` images, ``r`` prompts of an image, ``h w`` pixels.
+"""
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from diff4splat.metrics.masked import masked_mean
+
+SMOOTHING_PX = 1.0
+"""Added to both areas, so that a missed speck has a finite gradient."""
+
+
+def cross_entropy(
+    logits: Float[Tensor, "b r h w"], masks: Bool[Tensor, "b r h w"]
+) -> Float[Tensor, " b"]:
+    """Mean over pixels and prompts."""
+    error = torch.nn.functional.binary_cross_entropy_with_logits(
+        logits, masks.to(logits), reduction="none"
+    )
+    return error.flatten(1).mean(1)
+
+
+def dice_error(
+    logits: Float[Tensor, "b r h w"], masks: Bool[Tensor, "b r h w"]
+) -> Float[Tensor, " b"]:
+    """1 − 2 Σ p m / Σ (p + m), mean over prompts that ask for something; 0 without any.
+
+    (V-Net, arXiv 1606.04797, eq. 1 without squares.)
+    """
+    truth, predicted = masks.flatten(2).to(logits), logits.flatten(2).sigmoid()
+    shared = (truth * predicted).sum(-1)
+    both = truth.sum(-1) + predicted.sum(-1)
+    error = 1 - (2 * shared + SMOOTHING_PX) / (both + SMOOTHING_PX)
+    return masked_mean(error, masks.flatten(2).any(-1))

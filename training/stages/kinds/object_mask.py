@@ -1,0 +1,114 @@
+"""The object mask: the pixels that prompts ask to move, many prompts for every image.
+
+    images, with random light ─ object mask ─ embedding ─┐
+    captions ─ text encoder (frozen) ─ queries ──────────┴ logits ─ cross-entropy, overlap
+
+Captions name every object of an image in turn, some that it does not show, and none.
+"""
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.motion_unet.text_tokens import text_tokens
+from diff4splat.models.networks import Networks
+from diff4splat.training.batches.coarse_images import coarse
+from diff4splat.training.batches.requests.request_batch import RequestBatch
+from diff4splat.training.losses.object_mask import cross_entropy, dice_error
+from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
+from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
+from diff4splat.training.stages.previews import mask_preview
+from diff4splat.training.stages.text_conditioning import TextConditioning
+
+LOG_GAMMA, LOG_GAIN, LOG_BALANCE, NOISE = 0.3, 0.2, 0.06, 0.03
+"""Half the ranges of gamma, gain and white balance, as logarithms; largest deviation of noise.
+Small enough that colours keep their names."""
+
+
+class ObjectMaskStage(ModelStage):
+    """The object mask alone."""
+
+    parts = ("text_encoder", "object_mask")
+
+    def __init__(self, networks: Networks, plan: StagePlan) -> None:
+        super().__init__(networks, plan)
+        self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
+
+    def forward(self, batch: RequestBatch) -> Terms:
+        """The terms ``cross_entropy`` and ``dice``."""
+        losses = self.plan.recipe.losses
+        logits = self._logits(self._random_light(self._random_sharpness(batch), batch), batch)
+        errors = {"cross_entropy": cross_entropy, "dice": dice_error}
+        return weighted_sum(
+            [
+                LossTerm(
+                    name=name,
+                    weight=getattr(losses, name),
+                    compute=lambda error=error: error(logits, batch.masks),
+                )
+                for name, error in errors.items()
+            ]
+        )
+
+    @torch.no_grad()
+    def measure(self, batch: RequestBatch) -> Terms:
+        """Shares over prompts; NaN for images whose prompts are all of the other kind.
+
+        ``overlap`` and ``found``: of the objects asked for, mean overlap, and whether the most
+        probable pixel is on them. ``absent_empty``: no pixel is probable where nothing is asked for.
+        """
+        logits = self._logits(_rgb(batch.images), batch).flatten(2)
+        truth, predicted = batch.masks.flatten(2), logits > 0
+        asked = truth.any(-1)
+        shared, either = (truth & predicted).sum(-1), (truth | predicted).sum(-1)
+        best = truth.gather(-1, logits.argmax(-1, keepdim=True))[..., 0]
+        return {
+            "overlap": _mean_where(shared / either.clamp_min(1), asked),
+            "found": _mean_where(best.double(), asked),
+            "absent_empty": _mean_where((either == 0).double(), ~asked),
+        }
+
+    @torch.no_grad()
+    def panel(self, batch: RequestBatch) -> Float[Tensor, "h w 3"]:
+        """The first image, its true masks, and the predicted ones."""
+        rgb = _rgb(batch.images)
+        return mask_preview(rgb, batch.masks, self._logits(rgb, batch).sigmoid())
+
+    def _logits(
+        self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
+    ) -> Float[Tensor, "b r h w"]:
+        tokens = text_tokens(*self._text.encode(batch, training=False))
+        return self.object_mask.logits(self.object_mask.embed(rgb), tokens)
+
+    def _random_sharpness(self, batch: RequestBatch) -> Float[Tensor, "b 3 h w"]:
+        """All images of a step as sharp as one of the recipe's sides."""
+        sides = self.plan.recipe.data.view_sides_px
+        if not sides:
+            return _rgb(batch.images)
+        index = torch.randint(len(sides), (), generator=self.random.per_step(batch, "view size"))
+        factor = max(batch.images.shape[2] // sides[int(index)], 1)
+        images = batch.images if factor == 1 else coarse(batch.images, factor)
+        return _rgb(images)
+
+    def _random_light(
+        self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
+    ) -> Float[Tensor, "b 3 h w"]:
+        """Another exposure, white balance and noise for every image."""
+        own = self.random.per_sample(batch, "light")
+        draws = torch.stack([torch.rand(6, generator=one) for one in own]).to(rgb)
+        gamma, gain, *balance, noise = (2 * draws - 1)[..., None, None, None].unbind(1)
+        factors = (LOG_GAIN * gain + LOG_BALANCE * torch.cat(balance, 1)).exp()
+        lit = rgb.clamp_min(1e-3) ** (LOG_GAMMA * gamma).exp() * factors
+        normal = torch.randn(rgb.shape, generator=self.random.per_step(batch, "noise"))
+        return (lit + NOISE * noise.abs() * normal.to(rgb)).clamp(0, 1)
+
+
+def _rgb(images: Tensor) -> Float[Tensor, "b 3 h w"]:
+    return unit_rgb(images).movedim(-1, 1)
+
+
+def _mean_where(values: Float[Tensor, "b r"], mask: Bool[Tensor, "b r"]) -> Float[Tensor, " b"]:
+    kept = torch.where(mask, values, torch.zeros_like(values)).sum(1)
+    count = mask.sum(1)
+    return torch.where(count > 0, kept / count.clamp_min(1), torch.nan)
