@@ -11,7 +11,7 @@ from torch import Tensor
 from diff4splat.models.networks import Networks
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
-LEAST_PROBABILITY = 0.5
+LEAST_PROBABILITY = 0.35
 """Below it nothing moves (chosen on validation worlds: docs/log/motion.md)."""
 
 

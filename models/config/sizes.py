@@ -41,7 +41,7 @@ test_size.__test__ = False
 
 
 def small_size() -> ModelConfig:
-    """Under 20 million weights: runs on two CPU cores in seconds, and can be trained there."""
+    """Under 25 million weights: runs on two CPU cores in seconds, and can be trained there."""
     return ModelConfig(
         name="small",
         frames=9,

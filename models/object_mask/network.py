@@ -14,6 +14,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
+from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.models.blocks.conv_block import ConvBlock
 from diff4splat.models.monocular_depth.network import pixel_coordinates
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
@@ -48,6 +50,7 @@ class ObjectMaskNet(nn.Module):
         self.upsample = nn.ModuleList([nn.Conv2d(b, 4 * a, 1) for a, b in steps])
         self.up_blocks = nn.ModuleList([ConvBlock(size) for size in channels[:-1]])
         self.embedding = nn.Conv2d(width, self.embedding_width * FOLDED_PX**2, 1)
+        self.names = nn.Conv2d(self.embedding_width, len(NOUNS) + len(COLOR_NAMES) + 2, 1)
         self.queries = TextQueries(text_width, TEXT_CHANNELS, self.embedding_width)
 
     def forward(
@@ -72,6 +75,15 @@ class ObjectMaskNet(nn.Module):
             upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
             features = self.up_blocks[level](skips[level] + upsampled)
         return torch.nn.functional.pixel_shuffle(self.embedding(features), FOLDED_PX)
+
+    def name_logits(
+        self, embedding: Float[Tensor, "b c h w"]
+    ) -> tuple[Float[Tensor, "b n h w"], Float[Tensor, "b k h w"]]:
+        """Of the nouns and colours of what pixels show; the first of each is none of them.
+
+        For training alone: vectors that tell names apart are easily asked for by name.
+        """
+        return self.names(embedding).split([len(NOUNS) + 1, len(COLOR_NAMES) + 1], 1)
 
     def logits(
         self, embedding: Float[Tensor, "b c h w"], text: TextTokens

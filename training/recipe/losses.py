@@ -139,6 +139,8 @@ class ObjectMaskLosses:
     """Mean over pixels: most are not asked for, whatever the prompt."""
     dice: float = 1.0
     """1 − overlap (V-Net, arXiv 1606.04797): small objects count as large ones."""
+    names: float = 0.3
+    """Cross-entropy of noun and colour of every pixel, without a prompt."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

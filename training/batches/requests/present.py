@@ -5,9 +5,11 @@ Axes: ``h w`` pixels.
 
 from dataclasses import dataclass
 
+import torch
 from jaxtyping import Bool, UInt8
 from torch import Tensor
 
+from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.data.clip import ClipMetadata
@@ -42,3 +44,14 @@ def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[P
         for note, mask in present_objects(clip, instances, PRESENT_SHARE)
         if note.name in NOUNS
     ]
+
+
+def name_maps(
+    objects: list[PresentObject], empty: Bool[Tensor, "h w"]
+) -> tuple[UInt8[Tensor, "h w"], UInt8[Tensor, "h w"]]:
+    """Noun and colour of every pixel, as ``RequestBatch`` has them; ``empty`` is the mask of none."""
+    nouns, colors = (torch.zeros(empty.shape, dtype=torch.uint8) for _ in range(2))
+    for one in objects:
+        nouns[one.mask] = 1 + NOUNS.index(one.named.noun)
+        colors[one.mask] = 1 + COLOR_NAMES.index(one.named.color)
+    return nouns, colors

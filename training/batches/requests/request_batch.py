@@ -18,6 +18,10 @@ class RequestBatch:
     source: tuple[str, ...]
     images: UInt8[Tensor, "b h w 3"]
     masks: Bool[Tensor, "b r h w"]
+    nouns: UInt8[Tensor, "b h w"]
+    """1 + index in ``vocabulary.NOUNS`` of what a pixel shows; 0 for all else."""
+    colors: UInt8[Tensor, "b h w"]
+    """1 + index in ``colors.COLOR_NAMES``."""
     captions: tuple[str, ...]
     """b r of them; those of one image follow each other."""
 
@@ -31,6 +35,8 @@ class RequestBatch:
             sample_index=self.sample_index.to(device),
             images=self.images.to(device),
             masks=self.masks.to(device),
+            nouns=self.nouns.to(device),
+            colors=self.colors.to(device),
         )
 
 
@@ -41,5 +47,7 @@ def collate_requests(samples: list[RequestBatch]) -> RequestBatch:
         source=tuple(name for sample in samples for name in sample.source),
         images=torch.cat([sample.images for sample in samples]),
         masks=torch.cat([sample.masks for sample in samples]),
+        nouns=torch.cat([sample.nouns for sample in samples]),
+        colors=torch.cat([sample.colors for sample in samples]),
         captions=tuple(text for sample in samples for text in sample.captions),
     )

@@ -12,7 +12,7 @@ from torch import Tensor
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
 from diff4splat.training.batches.requests.image_requests import draw_image_requests
-from diff4splat.training.batches.requests.present import named_objects
+from diff4splat.training.batches.requests.present import name_maps, named_objects
 from diff4splat.training.batches.requests.request_batch import RequestBatch, collate_requests
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.recipe.stage import StageRecipe
@@ -52,11 +52,14 @@ class RequestSamples:
         objects = named_objects(clip.note, instances)
         empty = torch.zeros(instances.shape, dtype=torch.bool)
         requests = draw_image_requests(objects, empty, REQUESTS, generator)
+        nouns, colors = name_maps(objects, empty)
         return RequestBatch(
             sample_index=torch.tensor([sample_index]),
             source=(source,),
             images=image[None],
             masks=torch.stack([request.mask for request in requests])[None],
+            nouns=nouns[None],
+            colors=colors[None],
             captions=tuple(request.caption for request in requests),
         )
 

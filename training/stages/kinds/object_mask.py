@@ -3,6 +3,8 @@
     images, with random light ─ object mask ─ embedding ─┐
     captions ─ text encoder (frozen) ─ queries ──────────┴ logits ─ cross-entropy, overlap
 
+Beside it the embedding alone gives noun and colour of every pixel.
+
 Captions name every object of an image in turn, some that it does not show, and none.
 """
 
@@ -11,11 +13,11 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.motion_unet.text_tokens import text_tokens
+from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.coarse_images import coarse
 from diff4splat.training.batches.requests.request_batch import RequestBatch
-from diff4splat.training.losses.object_mask import cross_entropy, dice_error
+from diff4splat.training.losses.object_mask import cross_entropy, dice_error, name_error
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import mask_preview
@@ -24,6 +26,9 @@ from diff4splat.training.stages.text_conditioning import TextConditioning
 LOG_GAMMA, LOG_GAIN, LOG_BALANCE, NOISE = 0.3, 0.2, 0.06, 0.03
 """Half the ranges of gamma, gain and white balance, as logarithms; largest deviation of noise.
 Small enough that colours keep their names."""
+
+
+NAME_STRIDE = 2
 
 
 class ObjectMaskStage(ModelStage):
@@ -36,18 +41,20 @@ class ObjectMaskStage(ModelStage):
         self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
 
     def forward(self, batch: RequestBatch) -> Terms:
-        """The terms ``cross_entropy`` and ``dice``."""
+        """The terms ``cross_entropy``, ``dice`` and ``names``."""
         losses = self.plan.recipe.losses
-        logits = self._logits(self._random_light(self._random_sharpness(batch), batch), batch)
-        errors = {"cross_entropy": cross_entropy, "dice": dice_error}
+        rgb = self._random_light(self._random_sharpness(batch), batch)
+        embedding = self.object_mask.embed(rgb)
+        logits = self.object_mask.logits(embedding, self._tokens(batch))
+        errors = {
+            "cross_entropy": lambda: cross_entropy(logits, batch.masks),
+            "dice": lambda: dice_error(logits, batch.masks),
+            "names": lambda: self._name_error(embedding, batch),
+        }
         return weighted_sum(
             [
-                LossTerm(
-                    name=name,
-                    weight=getattr(losses, name),
-                    compute=lambda error=error: error(logits, batch.masks),
-                )
-                for name, error in errors.items()
+                LossTerm(name=name, weight=getattr(losses, name), compute=compute)
+                for name, compute in errors.items()
             ]
         )
 
@@ -78,8 +85,21 @@ class ObjectMaskStage(ModelStage):
     def _logits(
         self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
     ) -> Float[Tensor, "b r h w"]:
-        tokens = text_tokens(*self._text.encode(batch, training=False))
-        return self.object_mask.logits(self.object_mask.embed(rgb), tokens)
+        return self.object_mask.logits(self.object_mask.embed(rgb), self._tokens(batch))
+
+    def _tokens(self, batch: RequestBatch) -> TextTokens:
+        return text_tokens(*self._text.encode(batch, training=False))
+
+    def _name_error(
+        self, embedding: Float[Tensor, "b c h w"], batch: RequestBatch
+    ) -> Float[Tensor, " b"]:
+        """Of noun and colour, at every second pixel: neighbours say the same."""
+        coarse = embedding[:, :, ::NAME_STRIDE, ::NAME_STRIDE]
+        truth = (batch.nouns, batch.colors)
+        return sum(
+            name_error(found, names[:, ::NAME_STRIDE, ::NAME_STRIDE].long())
+            for found, names in zip(self.object_mask.name_logits(coarse), truth, strict=True)
+        )
 
     def _random_sharpness(self, batch: RequestBatch) -> Float[Tensor, "b 3 h w"]:
         """All images of a step as sharp as one of the recipe's sides."""

@@ -6,7 +6,13 @@ import pytest
 import torch
 from torch import Tensor
 
-from diff4splat.training.losses.object_mask import SMOOTHING_PX, cross_entropy, dice_error
+from diff4splat.training.losses.object_mask import (
+    NO_NAME_WEIGHT,
+    SMOOTHING_PX,
+    cross_entropy,
+    dice_error,
+    name_error,
+)
 
 
 def example() -> tuple[Tensor, Tensor]:
@@ -60,3 +66,18 @@ def test_without_any_object_only_the_cross_entropy_teaches() -> None:
     masks = torch.zeros(1, 2, 3, 3, dtype=torch.bool)
     assert float(dice_error(logits, masks)) == 0.0
     assert float(cross_entropy(logits, masks)) == pytest.approx(math.log(2))
+
+
+def test_names_are_weighted_pixel_by_pixel() -> None:
+    torch.manual_seed(0)
+    logits, names = torch.randn(1, 4, 2, 3).double(), torch.tensor([[[0, 1, 3], [2, 0, 0]]])
+    shares = logits.softmax(1)
+    total = weight = 0.0
+    for row in range(2):
+        for column in range(3):
+            name = int(names[0, row, column])
+            own = 1.0 if name else NO_NAME_WEIGHT
+            total -= own * math.log(float(shares[0, name, row, column]))
+            weight += own
+    assert float(name_error(logits, names)) == pytest.approx(total / weight)
+    assert torch.autograd.gradcheck(lambda x: name_error(x, names), logits.requires_grad_())

@@ -41,6 +41,8 @@ def requests(first: int = 0) -> RequestBatch:
         source=("x", "x"),
         images=torch.randint(256, (2, 32, 32, 3)).to(torch.uint8),
         masks=masks,
+        nouns=masks[:, 0].to(torch.uint8) * 3,
+        colors=masks[:, 0].to(torch.uint8) * 2,
         captions=("a red ball rolls", "nothing moves") * 2,
     )
 
@@ -49,7 +51,7 @@ def test_terms_and_gradients_are_finite_and_only_the_object_mask_learns() -> Non
     stage = make_stage(mask_recipe(), model=MODEL)
     shake_heads(stage)
     terms = stage(requests())
-    assert set(terms) == {"cross_entropy", "dice", TOTAL}
+    assert set(terms) == {"cross_entropy", "dice", "names", TOTAL}
     terms[TOTAL].sum().backward()
     gradients = {name: p.grad for name, p in stage.named_parameters() if p.grad is not None}
     assert gradients and all(name.startswith("object_mask.") for name in gradients)
@@ -67,6 +69,19 @@ def test_it_learns_which_half_is_asked_for() -> None:
     assert float(measured["overlap"].mean()) > 0.8
     assert float(measured["found"].mean()) == 1.0
     assert float(measured["absent_empty"].mean()) == 1.0
+
+
+def test_it_learns_the_names_of_pixels() -> None:
+    stage, batch = make_stage(mask_recipe(), model=MODEL), requests()
+    optimiser = torch.optim.Adam(stage.object_mask.parameters(), lr=1e-2)
+    errors = []
+    for _ in range(60):
+        optimiser.zero_grad()
+        terms = stage(batch)
+        terms[TOTAL].mean().backward()
+        optimiser.step()
+        errors.append(float(terms["names"].mean()))
+    assert errors[-1] < 0.3 * errors[0]
 
 
 def test_measures_have_no_value_where_no_prompt_is_of_their_kind() -> None:

@@ -5,6 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
+from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.data.clip import Clip, ClipMetadata, ObjectNote, View
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import pinhole
@@ -69,6 +71,7 @@ def test_shapes() -> None:
     batch = source.collate([source[0], source[3]])
     assert batch.images.shape == (2, 32, 32, 3)
     assert batch.masks.shape == (2, REQUESTS, 32, 32)
+    assert batch.nouns.shape == batch.colors.shape == (2, 32, 32)
     assert len(batch.captions) == 2 * REQUESTS and len(batch) == 2
     assert batch.sample_index.tolist() == [0, 3]
     assert batch.to(torch.device("cpu")).captions == batch.captions
@@ -88,6 +91,19 @@ def test_masks_lie_on_the_objects_that_captions_name() -> None:
                 assert not (part and whole) or bool(mask[pixels].double().mean() > 0.8)
             asked.add(tuple(parts))
     assert asked == {(False, False), (True, False), (False, True), (True, True)}
+
+
+def test_every_pixel_has_the_name_of_its_object() -> None:
+    source = samples()
+    for index in range(10):
+        batch = source[index]
+        box = batch.nouns[0] == 1 + NOUNS.index("box")
+        assert torch.equal(box, batch.colors[0] == 1 + COLOR_NAMES.index("red"))
+        ball = batch.nouns[0] == 1 + NOUNS.index("ball")
+        assert torch.equal(ball, batch.colors[0] == 1 + COLOR_NAMES.index("blue"))
+        assert not bool(batch.nouns[0][~(box | ball)].any())
+        if bool(box.any()):
+            assert float(batch.images[0][box].float().mean(0)[0]) > 120
 
 
 def test_parts_and_mirrored_images_occur() -> None:
