@@ -12,7 +12,10 @@ from diff4splat.models.networks import Networks
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
 LEAST_PROBABILITY = 0.35
-"""Below it nothing moves (chosen on validation worlds: docs/log/motion.md)."""
+"""Of the most probable pixel; below it nothing moves."""
+LEAST_SHARE = 0.85
+"""Of the highest probability; components below it are other objects, and stay (both chosen on
+validation worlds: docs/log/motion.md)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +57,3 @@ def motion_prior(networks: Networks) -> MotionPrior | None:
     if motion is None or mask is None:
         return motion
     return MaskedMotion(motion_unet=motion, object_mask=mask)
-
-
-def least_probability(prior: MotionPrior) -> float:
-    """Of the most probable pixel, for anything to move: an object mask knows what is not there."""
-    return LEAST_PROBABILITY if isinstance(prior, MaskedMotion) else 0.0

@@ -22,7 +22,7 @@ from diff4splat.flow.samplers import VelocityFn
 from diff4splat.flow.solve import ADAPTIVE, FITTED, FIXED_DEFAULT, SolverPath, solve
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
-from diff4splat.generation.motion_networks import least_probability
+from diff4splat.generation.motion_networks import LEAST_PROBABILITY, LEAST_SHARE, MaskedMotion
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.protocols import MotionPrior
@@ -58,6 +58,8 @@ class MotionSample:
     calls: CallCount
     least_probability: float = 0.0
     """Of the most probable pixel, for anything to move."""
+    least_share: float = 0.0
+    """Of the highest probability, for a component to move beside the most probable one."""
 
     def mask(self, threshold: float) -> Bool[Tensor, "hh ww"]:
         """Pixels whose probability is above ``threshold``.
@@ -73,7 +75,8 @@ class MotionSample:
         component = connected_components(self.probability > low)
         best = self.probability.new_zeros(int(component.max()) + 1)
         best = best.scatter_reduce(0, component.flatten(), self.probability.flatten(), "amax")
-        return (component > 0) & (best >= min(HYSTERESIS_HIGH, highest))[component]
+        needed = min(max(HYSTERESIS_HIGH, self.least_share * highest), highest)
+        return (component > 0) & (best >= needed)[component]
 
 
 def sample_motion(
@@ -106,6 +109,7 @@ def sample_motion(
         advance,
     )
     # Which pixels move is not sampled: image and text decide.
+    named = isinstance(network, MaskedMotion) and request.text is not None
     level = noise.new_ones(1)
     mean, logits = network.predict_motion_and_mask(rgb, noise, level, request.text)
     return MotionSample(
@@ -113,7 +117,8 @@ def sample_motion(
         mean_field=_from_first(mean),
         probability=bilateral_smooth(logits.sigmoid(), rgb)[0],
         calls=calls,
-        least_probability=least_probability(network),
+        least_probability=LEAST_PROBABILITY if named else 0.0,
+        least_share=LEAST_SHARE if named else 0.0,
     )
 
 

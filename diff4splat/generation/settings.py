@@ -40,7 +40,7 @@ class MotionSettings:
     shift: float = 16.0
     """As in its training: where objects are is learnt at noisy levels."""
     guidance: Guidance = UNGUIDED
-    threshold: float = 0.3
+    threshold: float = 0.2
     """A pixel moves if it is more probable than this, or among the most probable (ADR 22)."""
 
     def __post_init__(self) -> None:

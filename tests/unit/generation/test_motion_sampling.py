@@ -8,7 +8,11 @@ from image_layers import input_image, random_rgb
 
 from diff4splat.flow.guidance import CallCount, Guidance
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.motion_networks import LEAST_PROBABILITY, MaskedMotion
+from diff4splat.generation.motion_networks import (
+    LEAST_PROBABILITY,
+    LEAST_SHARE,
+    MaskedMotion,
+)
 from diff4splat.generation.motion_sampling import (
     MotionRequest,
     MotionSample,
@@ -68,12 +72,20 @@ def test_nothing_moves_below_the_least_probability(highest: float, moves: bool) 
     assert sample.mask(0.3).tolist() == [[moves, False]]
 
 
+def test_components_far_below_the_highest_are_other_objects() -> None:
+    probability = torch.zeros(5, 9)
+    probability[1:4, 1:3], probability[1:4, 4], probability[1:4, 6:8] = 0.9, 0.8, 0.6
+    sample = replace(sample_of(probability), least_share=0.85)
+    assert torch.equal(sample.mask(0.3), probability > 0.7)
+    assert torch.equal(sample_of(probability).mask(0.3), probability > 0)
+
+
 @torch.no_grad()
 def test_only_an_object_mask_has_a_least_probability(network: MotionUNet) -> None:
     masked = MaskedMotion(motion_unet=network, object_mask=ObjectMaskNet(4, 16))
     assert sample_motion(network, image(), 2, request(text=True)).least_probability == 0
     sample = sample_motion(masked, image(), 2, request(text=True))
-    assert sample.least_probability == LEAST_PROBABILITY
+    assert (sample.least_probability, sample.least_share) == (LEAST_PROBABILITY, LEAST_SHARE)
     assert not bool(sample.mask(0.3).any())
 
 
