@@ -54,6 +54,7 @@ SMALL_BUILDS_ON = {
     "monocular_depth": {},
     "video_diffusion": {"vae": "vae", "monocular_depth": "monocular_depth"},
     "motion_diffusion": {"text_encoder": "video_diffusion"},
+    "object_mask": {"text_encoder": "video_diffusion"},
     "video_distillation": {
         "vae": "vae",
         "monocular_depth": "monocular_depth",

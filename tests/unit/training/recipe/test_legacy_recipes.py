@@ -71,6 +71,7 @@ def since(old: ModelConfig, new: ModelConfig) -> ModelConfig:
         old,
         monocular_depth=replace(old.monocular_depth, photo_scale=2),
         motion_unet=replace(old.motion_unet, input_scale=2),
+        object_mask=new.object_mask,
         default_guidance=new.default_guidance,
     )
 
@@ -84,7 +85,8 @@ def test_the_test_recipe_loads_as_the_one_of_this_release() -> None:
 
 def test_every_stage_of_the_small_recipe_loads_as_the_one_of_this_release() -> None:
     old, new = recipe_from_json(SMALL.read_text()), recipe_by_name("small")
-    for stage in new.stages:
+    known = [stage for stage in new.stages if stage.kind != "object_mask"]
+    for stage in known:
         names = {after: before for before, after in NAMES.items()}
         found = replace(old.stage(names.get(stage.name, stage.name)), name=stage.name)
         if stage.kind == "monocular_depth":

@@ -21,12 +21,12 @@ def test_every_recipe_survives_its_json(name: str) -> None:
 @pytest.mark.parametrize("name", RECIPES)
 def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     names = [stage.name for stage in recipe_by_name(name).stages]
-    # Small has one size, so one static stage. The motion network reads the text encoder that
-    # the stage before it trains.
+    # Small has one size, so one static stage. The motion network and the object mask read the
+    # text encoder that the stage before them trains.
     small = ["posed_video_pretrain", "static-low", "motion", "dynamic", "monocular_depth"]
     is_small = name in ("small", "distil")
     middle = small if is_small else ["static-low", "static-high", "dynamic"]
-    last = ["motion_diffusion"] if is_small else ["joint"]
+    last = ["motion_diffusion", "object_mask"] if is_small else ["joint"]
     last += ["video_distillation"] if name == "distil" else []
     assert names == ["vae", *middle, "video_diffusion", *last]
 
@@ -151,8 +151,9 @@ def test_clips_reach_from_the_first_input_frame_to_the_last() -> None:
     assert (data.frames, data.input_stride, data.clip_frames) == (9, 2, 17)
 
 
-def test_only_motion_diffusion_may_read_keyframes_alone() -> None:
-    branch = recipe_by_name("small").stage("motion_diffusion")
+@pytest.mark.parametrize("name", ["motion_diffusion", "object_mask"])
+def test_only_stages_of_single_images_may_read_keyframes_alone(name: str) -> None:
+    branch = recipe_by_name("small").stage(name)
     data = replace(branch.data, keyframes_only=True)
     assert (data.clip_frames, data.keyframe_spacing) == (3, 8)
     assert replace(branch, data=data).data.keyframes_only
