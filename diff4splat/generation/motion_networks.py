@@ -15,7 +15,7 @@ LEAST_PROBABILITY = 0.35
 """Of the most probable pixel; below it nothing moves."""
 LEAST_SHARE = 0.85
 """Of the highest probability; components below it are other objects, and stay (both chosen on
-validation worlds: docs/log/motion.md)."""
+validation worlds: docs/log/object-mask.md)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
