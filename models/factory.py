@@ -22,8 +22,8 @@ from diff4splat.models.image_encoder.clip import ClipImageEncoder
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
-from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.networks import PARTS, Networks, model_parts
+from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.placement.initial_weights import (
     InitialWeights,
     RecordedCalls,

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.captions.phrasings import VALIDATION, Choices, request
+from diff4splat.captions.random_draws import draw, draw_number
 from diff4splat.captions.requests import caption_of_absent_object, is_unique
 from diff4splat.data.clip import Clip
 from diff4splat.io.pixels import unit_rgb
@@ -39,9 +40,9 @@ def asked_image(clip: Clip) -> AskedImage:
     order = torch.randperm(len(able), generator=generator)[:OBJECTS].tolist()
     requests = []
     for index in (able[place] for place in order):
-        side = ("left", "right")[int(torch.randint(2, (), generator=generator))]
+        side = draw(("left", "right"), generator)
         name = f"{names[index].color} {names[index].noun}"
-        drawn = int(torch.randint(2**31, (), generator=generator))
+        drawn = draw_number(generator)
         sentence = request(name, side, Choices(drawn), VALIDATION)
         requests.append((sentence, objects[index].mask))
     absent = caption_of_absent_object(names, generator)

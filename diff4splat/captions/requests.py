@@ -11,6 +11,7 @@ from diff4splat.captions.phrasings import (
     object_name,
     request,
 )
+from diff4splat.captions.random_draws import draw, draw_number, draw_share
 from diff4splat.captions.synonyms import may_be_confused
 from diff4splat.captions.vocabulary import DIRECTIONS, NOUNS
 
@@ -27,21 +28,20 @@ LIKE_COLORS = frozenset(
 """Colours that one object may be seen in, by its light."""
 PLAIN_SHARE = 0.3
 """Share of captions of the form ``the red ball moves to the left``."""
-_LARGEST = 2**31
 
 
 def caption_of_object(
     objects: list[NamedObject], index: int, direction: str, generator: torch.Generator
 ) -> str | None:
     """A caption that asks the object at ``index`` to move; None if no name fits it alone."""
-    named, others = objects[index], objects[:index] + objects[index + 1 :]
-    like = [other for other in others if may_be_confused(named.noun, other.noun)]
-    if any(_colors_alike(named.color, other.color) for other in like):
+    if not is_unique(objects, index):
         return None
+    named, others = objects[index], objects[:index] + objects[index + 1 :]
+    like = any(may_be_confused(named.noun, other.noun) for other in others)
     kinds = ["full", "full", "full"] + ["noun"] * (not like)
     if not any(_colors_alike(named.color, other.color) for other in others):
         kinds.append("color")
-    return _caption(named, _pick(kinds, generator), direction, generator)
+    return _caption(named, draw(kinds, generator), direction, generator)
 
 
 def caption_of_absent_object(objects: list[NamedObject], generator: torch.Generator) -> str | None:
@@ -49,9 +49,9 @@ def caption_of_absent_object(objects: list[NamedObject], generator: torch.Genera
 
     None if the image has objects of all nouns and no other colour can be asked for.
     """
-    direction = tuple(DIRECTIONS)[_number(generator) % len(DIRECTIONS)]
-    kind = ("full", "full", "noun")[_number(generator) % 3]
-    found = absent_object(objects, generator, other_color=bool(_number(generator) % 2))
+    direction = draw(tuple(DIRECTIONS), generator)
+    kind = draw(("full", "full", "noun"), generator)
+    found = absent_object(objects, generator, other_color=bool(draw_number(generator) % 2))
     if found is None:
         return None
     other_color = any(may_be_confused(found.noun, one.noun) for one in objects)
@@ -65,10 +65,10 @@ def absent_object(
     nouns = [n for n in NOUNS if not any(may_be_confused(n, one.noun) for one in objects)]
     colors = list(COLOR_NAMES)
     if objects and (other_color or not nouns):
-        nouns = [_pick([one.noun for one in objects], generator)]
+        nouns = [draw([one.noun for one in objects], generator)]
         taken = [one.color for one in objects if may_be_confused(nouns[0], one.noun)]
         colors = [c for c in colors if not any(_colors_alike(c, one) for one in taken)]
-    return NamedObject(_pick(colors, generator), _pick(nouns, generator)) if colors else None
+    return NamedObject(draw(colors, generator), draw(nouns, generator)) if colors else None
 
 
 def is_unique(objects: list[NamedObject], index: int) -> bool:
@@ -79,9 +79,9 @@ def is_unique(objects: list[NamedObject], index: int) -> bool:
 
 
 def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Generator) -> str:
-    if float(torch.rand((), generator=generator)) < PLAIN_SHARE and kind == "full":
+    if draw_share(generator) < PLAIN_SHARE and kind == "full":
         return f"the {named.color} {named.noun} moves {DIRECTIONS[direction]}"
-    choices = Choices(_number(generator))
+    choices = Choices(draw_number(generator))
     return request(_name(named, kind, choices), direction, choices)
 
 
@@ -94,11 +94,3 @@ def _name(named: NamedObject, kind: str, choices: Choices) -> str:
 
 def _colors_alike(color: str, other: str) -> bool:
     return color == other or frozenset((color, other)) in LIKE_COLORS
-
-
-def _pick(words: list[str], generator: torch.Generator) -> str:
-    return words[_number(generator) % len(words)]
-
-
-def _number(generator: torch.Generator) -> int:
-    return int(torch.randint(_LARGEST, (), generator=generator))

@@ -3,13 +3,15 @@
 What moves depends on none of the three, so a network that looks for it sees all of them.
 """
 
+from dataclasses import replace
+
 import torch
 
 from diff4splat.captions.grammar import CaptionFacts, Event, NamedObject, describe
+from diff4splat.captions.random_draws import draw, draw_number, draw_share
 from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, PLACES, VERBS
 
 PLACE_SHARE, CAMERA_SHARE, BESIDE_SHARE = 0.15, 0.15, 0.25
-_LARGEST = 2**31
 
 
 def caption_of_moving(
@@ -22,7 +24,7 @@ def caption_of_moving(
 
 def caption_of_static(objects: list[NamedObject], generator: torch.Generator) -> str:
     """Nothing moves around up to two of ``objects``."""
-    count = min(_number(generator) % 3, len(objects))
+    count = min(draw_number(generator) % 3, len(objects))
     order = torch.randperm(len(objects), generator=generator)[:count]
     named = tuple(objects[int(index)] for index in order)
     return _described(CaptionFacts(static_objects=named), generator)
@@ -30,28 +32,16 @@ def caption_of_static(objects: list[NamedObject], generator: torch.Generator) ->
 
 def _event(named: NamedObject, others: list[NamedObject], generator: torch.Generator) -> Event:
     beside = None
-    if others and _share(generator) < BESIDE_SHARE:
-        beside = others[_number(generator) % len(others)]
-    direction = ("", *DIRECTIONS)[_number(generator) % (len(DIRECTIONS) + 1)]
-    motion = list(VERBS)[_number(generator) % len(VERBS)]
+    if others and draw_share(generator) < BESIDE_SHARE:
+        beside = draw(others, generator)
+    direction = draw(("", *DIRECTIONS), generator)
+    motion = draw(list(VERBS), generator)
     return Event(subject=named, motion=motion, direction=direction, beside=beside)
 
 
 def _described(facts: CaptionFacts, generator: torch.Generator) -> str:
-    place, camera = "", ()
-    if _share(generator) < PLACE_SHARE:
-        place = list(PLACES)[_number(generator) % len(PLACES)]
-    if _share(generator) < CAMERA_SHARE:
-        camera = (list(CAMERA_MOVES)[_number(generator) % len(CAMERA_MOVES)],)
-    facts = CaptionFacts(
-        place=place, camera=camera, events=facts.events, static_objects=facts.static_objects
-    )
-    return describe(facts, _number(generator))
-
-
-def _share(generator: torch.Generator) -> float:
-    return float(torch.rand((), generator=generator))
-
-
-def _number(generator: torch.Generator) -> int:
-    return int(torch.randint(_LARGEST, (), generator=generator))
+    if draw_share(generator) < PLACE_SHARE:
+        facts = replace(facts, place=draw(list(PLACES), generator))
+    if draw_share(generator) < CAMERA_SHARE:
+        facts = replace(facts, camera=(draw(list(CAMERA_MOVES), generator),))
+    return describe(facts, draw_number(generator))

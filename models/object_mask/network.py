@@ -3,12 +3,11 @@
 Axes: ``b`` images, ``r`` prompts of an image, ``h w`` pixels, ``c`` channels, ``q`` queries. Image
 and prompt meet in a product of vectors, so one pass over an image serves many prompts:
 
-    image, coordinates ─ cells of 2 ─ 1/2 ── 1/4 ── 1/8 ── 1/16 ── 1/8 ── 1/4 ── 1/2 ─ embedding ─┐
-    prompt ─ text queries ────────────────────────────────────────────────────────────────────────┴ · ─ logits
+    image ─ image U-Net ─ embedding ─┐
+    prompt ─ text queries ───────────┴ · ─ logits
 """
 
 import math
-from itertools import pairwise
 
 import torch
 from jaxtyping import Bool, Float
@@ -17,38 +16,26 @@ from torch import Tensor, nn
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.models.blocks.conv_block import ConvBlock
-from diff4splat.models.monocular_depth.network import pixel_coordinates
+from diff4splat.models.image_unet.network import FOLDED_PX, ImageUNet
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 from diff4splat.models.object_mask.text_queries import TextQueries
 
-FOLDED_PX = 2
-"""Pixels per side that become channels before the first convolution."""
 GROWTH = (1, 2, 5, 8)
 """Channels at 1/2, 1/4, 1/8 and 1/16 of the resolution, in multiples of the configured width."""
 BLOCKS = (0, 1, 2, 3)
 """Residual blocks at each of them on the way down; one on the way up."""
 TEXT_CHANNELS = 96
-MULTIPLE_PX = FOLDED_PX << (len(GROWTH) - 1)
-"""Image sides must be multiples of it."""
 START_LOGIT = -3.0
 """Of a fresh network: few pixels are asked for."""
 
 
-class ObjectMaskNet(nn.Module):
+class ObjectMaskNet(ImageUNet):
     """For every pixel the logit of the probability that the prompt asks it to move."""
 
     def __init__(self, width: int, text_width: int) -> None:
-        super().__init__()
         channels = [width * share for share in GROWTH]
-        steps = list(pairwise(channels))
+        super().__init__(channels, lambda level: _blocks(channels[level], BLOCKS[level]))
         self.embedding_width = 2 * width
-        self.input_conv = nn.Conv2d((3 + 2) * FOLDED_PX**2, width, 3, padding=1)
-        self.down_blocks = nn.ModuleList(
-            [_blocks(size, count) for size, count in zip(channels, BLOCKS, strict=True)]
-        )
-        self.downsample = nn.ModuleList([nn.Conv2d(a, b, 2, stride=2) for a, b in steps])
-        self.upsample = nn.ModuleList([nn.Conv2d(b, 4 * a, 1) for a, b in steps])
-        self.up_blocks = nn.ModuleList([ConvBlock(size) for size in channels[:-1]])
         self.embedding = nn.Conv2d(width, self.embedding_width * FOLDED_PX**2, 1)
         self.names = nn.Conv2d(self.embedding_width, len(NOUNS) + len(COLOR_NAMES) + 2, 1)
         self.queries = TextQueries(text_width, TEXT_CHANNELS, self.embedding_width)
@@ -64,17 +51,7 @@ class ObjectMaskNet(nn.Module):
 
     def embed(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h w"]:
         """A vector for every pixel, without a prompt."""
-        inputs = torch.cat([image * 2 - 1, pixel_coordinates(image)], 1)
-        features = self.input_conv(torch.nn.functional.pixel_unshuffle(inputs, FOLDED_PX))
-        skips = []
-        for blocks, downsample in zip(self.down_blocks, self.downsample, strict=False):
-            skips.append(blocks(features))
-            features = downsample(skips[-1])
-        features = self.down_blocks[-1](features)
-        for level in reversed(range(len(self.up_blocks))):
-            upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
-            features = self.up_blocks[level](skips[level] + upsampled)
-        return torch.nn.functional.pixel_shuffle(self.embedding(features), FOLDED_PX)
+        return torch.nn.functional.pixel_shuffle(self.embedding(self.features(image)), FOLDED_PX)
 
     def name_logits(
         self, embedding: Float[Tensor, "b c h w"]

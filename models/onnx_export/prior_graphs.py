@@ -4,9 +4,8 @@ from torch import Tensor, nn
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import MOTION_CELL_PX
-from diff4splat.models.monocular_depth.network import MULTIPLE_PX as DEPTH_MULTIPLE_PX
+from diff4splat.models.image_unet.network import MULTIPLE_PX as IMAGE_MULTIPLE_PX
 from diff4splat.models.motion_unet.unet import MULTIPLE_PX as MOTION_MULTIPLE_PX
-from diff4splat.models.object_mask.network import MULTIPLE_PX as MASK_MULTIPLE_PX
 from diff4splat.models.onnx_export.source import (
     GraphSource,
     TensorFunction,
@@ -38,7 +37,7 @@ def text_encoder_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSo
 def monocular_depth_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image to the raw ray distance of its pixels."""
     del config
-    size = (f"{DEPTH_MULTIPLE_PX}*rows", f"{DEPTH_MULTIPLE_PX}*columns")
+    size = (f"{IMAGE_MULTIPLE_PX}*rows", f"{IMAGE_MULTIPLE_PX}*columns")
     return [
         GraphSource(
             name="monocular_depth",
@@ -74,7 +73,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image and text to the logits of what the text asks to move."""
-    size = (f"{MASK_MULTIPLE_PX}*rows", f"{MASK_MULTIPLE_PX}*columns")
+    size = (f"{IMAGE_MULTIPLE_PX}*rows", f"{IMAGE_MULTIPLE_PX}*columns")
     return [
         GraphSource(
             name="object_mask",

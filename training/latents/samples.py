@@ -65,9 +65,7 @@ class LatentSamples:
         return collate_latents(samples)
 
 
-def open_samples(
-    recipe: StageRecipe, seed: int
-) -> ClipSamples | LatentSamples | RequestSamples:
+def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples | RequestSamples:
     """What the recipe's sources hold: clips, clips that were encoded before, or images of clips.
 
     Raises:

@@ -17,9 +17,9 @@ NO_NAME_WEIGHT = 0.15
 
 
 def cross_entropy(
-    logits: Float[Tensor, "b r h w"], masks: Bool[Tensor, "b r h w"]
+    logits: Float[Tensor, "b *r h w"], masks: Bool[Tensor, "b *r h w"]
 ) -> Float[Tensor, " b"]:
-    """Mean over pixels and prompts."""
+    """Mean over pixels, and over prompts where an image has several."""
     error = torch.nn.functional.binary_cross_entropy_with_logits(
         logits, masks.to(logits), reduction="none"
     )

@@ -25,7 +25,13 @@ RECONSTRUCTION_KINDS = (
     "joint",
 )
 """Kinds whose samples have depth at the key frames that carry Gaussians."""
-CAPTION_KINDS = ("video_diffusion", "video_distillation", "motion_diffusion", "object_mask", "joint")
+CAPTION_KINDS = (
+    "video_diffusion",
+    "video_distillation",
+    "motion_diffusion",
+    "object_mask",
+    "joint",
+)
 """Kinds that read captions, which name left and right."""
 IMAGE_KINDS = ("motion_diffusion", "object_mask")
 """Kinds that look at single images: clips need no frames but key frames."""

@@ -6,7 +6,12 @@ All that recipes ask of a model configuration is here.
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.training.recipe.checks import require
-from diff4splat.training.recipe.kinds import CAPTION_KINDS, IMAGE_KINDS, LATENT_KINDS, RECONSTRUCTION_KINDS
+from diff4splat.training.recipe.kinds import (
+    CAPTION_KINDS,
+    IMAGE_KINDS,
+    LATENT_KINDS,
+    RECONSTRUCTION_KINDS,
+)
 from diff4splat.training.recipe.stage import StageRecipe
 
 

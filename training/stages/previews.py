@@ -168,8 +168,6 @@ def mask_preview(
     )
 
 
-def _dimmed(
-    image: Float[Tensor, "h w 3"], mask: Float[Tensor, "h w"]
-) -> Float[Tensor, "h w 3"]:
+def _dimmed(image: Float[Tensor, "h w 3"], mask: Float[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:
     """Dark where the mask is 0."""
     return image * (0.15 + 0.85 * mask[..., None])

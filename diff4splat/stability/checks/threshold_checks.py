@@ -13,6 +13,7 @@ from torch import Tensor
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.motion_networks import motion_prior
 from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import largest_displacement_px
@@ -126,7 +127,7 @@ def _motion(model: str, noise: float) -> MotionSample:
     request = MotionRequest(
         text=networks.text_encoder.encode_prompt(PROMPT), seed=0, settings=GenerationSettings()
     )
-    return sample_motion(networks.motion_unet, _noisy(noise), 3, request)
+    return sample_motion(motion_prior(networks), _noisy(noise), 3, request)
 
 
 def _depth(model: str, noise: float) -> Float[Tensor, "h w"]:

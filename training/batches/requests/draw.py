@@ -23,6 +23,7 @@ from diff4splat.training.batches.requests.present import PresentObject, named_ob
 from diff4splat.training.batches.targets import INPUT_VIEW
 from diff4splat.training.recipe.data import DataSettings
 
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectRequest:
     """A caption and the motion that it asks for."""

@@ -10,6 +10,7 @@ from jaxtyping import Bool
 from torch import Tensor
 
 from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.random_draws import draw_share
 from diff4splat.captions.requests import (
     absent_object,
     caption_of_absent_object,
@@ -74,7 +75,7 @@ def _chosen(kind: str, objects: list[PresentObject], generator: torch.Generator)
 
 
 def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Generator) -> str:
-    if len(chosen) == 1 and float(torch.rand((), generator=generator)) > GRAMMAR_SHARE:
+    if len(chosen) == 1 and draw_share(generator) > GRAMMAR_SHARE:
         caption = caption_of_object(names, chosen[0], draw_direction(generator), generator)
         if caption is not None:
             return caption
@@ -83,8 +84,8 @@ def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Gener
 
 
 def _absent_caption(names: list[NamedObject], generator: torch.Generator) -> str | None:
-    if float(torch.rand((), generator=generator)) > GRAMMAR_SHARE:
+    if draw_share(generator) > GRAMMAR_SHARE:
         return caption_of_absent_object(names, generator)
-    other_color = bool(torch.rand((), generator=generator) < 0.5)
+    other_color = draw_share(generator) < 0.5
     absent = absent_object(names, generator, other_color=other_color)
     return None if absent is None else caption_of_moving([absent], names, generator)

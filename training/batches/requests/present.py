@@ -38,9 +38,7 @@ class PresentObject:
 def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[PresentObject]:
     """Objects with a noun of captions in an image of ``View.instances``."""
     return [
-        PresentObject(
-            named=NamedObject(note.color, note.name), mask=mask, moves=bool(note.motion)
-        )
+        PresentObject(named=NamedObject(note.color, note.name), mask=mask, moves=bool(note.motion))
         for note, mask in present_objects(clip, instances, PRESENT_SHARE)
         if note.name in NOUNS
     ]
@@ -49,7 +47,7 @@ def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[P
 def name_maps(
     objects: list[PresentObject], empty: Bool[Tensor, "h w"]
 ) -> tuple[UInt8[Tensor, "h w"], UInt8[Tensor, "h w"]]:
-    """Noun and colour of every pixel, as ``RequestBatch`` has them; ``empty`` is the mask of none."""
+    """Noun and colour of every pixel, as ``RequestBatch`` has them; ``empty`` masks nothing."""
     nouns, colors = (torch.zeros(empty.shape, dtype=torch.uint8) for _ in range(2))
     for one in objects:
         nouns[one.mask] = 1 + NOUNS.index(one.named.noun)

@@ -75,7 +75,8 @@ def _random_part(
     view = clip.views[int(torch.randint(len(clip.views), (), generator=generator))]
     if view.instances is None:
         raise InputError(
-            f"clip {clip.note.identifier}: expected masks of objects, got none; leave the source out"
+            f"clip {clip.note.identifier}: expected masks of objects, got none; "
+            "leave the source out"
         )
     frame = int(torch.randint(clip.frames, (), generator=generator))
     mirror, whole, share, top, left = torch.rand(5, generator=generator).tolist()

@@ -10,7 +10,7 @@ No other network of the video model runs or learns.
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.flow.path import add_noise, velocity_from_clean
@@ -20,6 +20,7 @@ from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.coarse_images import enlarged, with_coarse_images
 from diff4splat.training.batches.random_flip import flip_samples
 from diff4splat.training.losses.flow_matching import flow_matching
+from diff4splat.training.losses.object_mask import cross_entropy
 from diff4splat.training.losses.timestep_sampling import (
     LevelDistribution,
     min_level_weights,
@@ -82,7 +83,7 @@ class MotionDiffusionStage(ModelStage):
                 LossTerm(
                     name="motion_mask",
                     weight=losses.motion_mask,
-                    compute=lambda: known * _mask_error(logits, batch.moving),
+                    compute=lambda: known * cross_entropy(logits, batch.moving),
                 ),
             ]
         )
@@ -149,13 +150,3 @@ class MotionDiffusionStage(ModelStage):
     def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
         """Clean motion in one step from noise."""
         return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), EVAL_NOISE))
-
-
-def _mask_error(
-    logits: Float[Tensor, "b h w"], moving: Bool[Tensor, "b h w"]
-) -> Float[Tensor, " b"]:
-    """Cross-entropy of the motion mask."""
-    error = torch.nn.functional.binary_cross_entropy_with_logits(
-        logits, moving.to(logits), reduction="none"
-    )
-    return error.flatten(1).mean(1)

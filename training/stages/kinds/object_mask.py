@@ -3,9 +3,8 @@
     images, with random light ─ object mask ─ embedding ─┐
     captions ─ text encoder (frozen) ─ queries ──────────┴ logits ─ cross-entropy, overlap
 
-Beside it the embedding alone gives noun and colour of every pixel.
-
-Captions name every object of an image in turn, some that it does not show, and none.
+The embedding alone also gives noun and colour of every pixel. Captions name every object of an
+image in turn, some that it does not show, and none.
 """
 
 import torch
@@ -26,9 +25,8 @@ from diff4splat.training.stages.text_conditioning import TextConditioning
 LOG_GAMMA, LOG_GAIN, LOG_BALANCE, NOISE = 0.3, 0.2, 0.06, 0.03
 """Half the ranges of gamma, gain and white balance, as logarithms; largest deviation of noise.
 Small enough that colours keep their names."""
-
-
 NAME_STRIDE = 2
+"""Pixels from one whose name is learnt to the next: neighbours say the same."""
 
 
 class ObjectMaskStage(ModelStage):
@@ -63,7 +61,8 @@ class ObjectMaskStage(ModelStage):
         """Shares over prompts; NaN for images whose prompts are all of the other kind.
 
         ``overlap`` and ``found``: of the objects asked for, mean overlap, and whether the most
-        probable pixel is on them. ``absent_empty``: no pixel is probable where nothing is asked for.
+        probable pixel is on them. ``absent_empty``: none is probable where nothing is
+        asked for.
         """
         logits = self._logits(_rgb(batch.images), batch).flatten(2)
         truth, predicted = batch.masks.flatten(2), logits > 0
@@ -93,12 +92,12 @@ class ObjectMaskStage(ModelStage):
     def _name_error(
         self, embedding: Float[Tensor, "b c h w"], batch: RequestBatch
     ) -> Float[Tensor, " b"]:
-        """Of noun and colour, at every second pixel: neighbours say the same."""
-        coarse = embedding[:, :, ::NAME_STRIDE, ::NAME_STRIDE]
+        """Of noun and colour."""
+        sparse = embedding[:, :, ::NAME_STRIDE, ::NAME_STRIDE]
         truth = (batch.nouns, batch.colors)
         return sum(
             name_error(found, names[:, ::NAME_STRIDE, ::NAME_STRIDE].long())
-            for found, names in zip(self.object_mask.name_logits(coarse), truth, strict=True)
+            for found, names in zip(self.object_mask.name_logits(sparse), truth, strict=True)
         )
 
     def _random_sharpness(self, batch: RequestBatch) -> Float[Tensor, "b 3 h w"]:

@@ -3,11 +3,8 @@
 import pytest
 import torch
 
-from diff4splat.models.monocular_depth.network import (
-    MULTIPLE_PX,
-    MonocularDepthNet,
-    pixel_coordinates,
-)
+from diff4splat.models.image_unet.network import MULTIPLE_PX, pixel_coordinates
+from diff4splat.models.monocular_depth.network import MonocularDepthNet
 
 
 def network() -> MonocularDepthNet:

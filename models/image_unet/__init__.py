@@ -1,0 +1,1 @@
+"""The U-Net of the networks that look at a single image."""
