@@ -56,7 +56,7 @@ class DataSettings:
     view_sides_px: tuple[int, ...] = ()
     """Sides, drawn from at each step. Stage ``monocular_depth``: random views (window, zoom, roll,
     noise) of every image. Stage ``motion_diffusion``: widths to which images are reduced and
-    enlarged again."""
+    enlarged again. Stage ``object_mask``: the same, of square images."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4

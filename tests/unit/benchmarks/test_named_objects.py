@@ -1,0 +1,30 @@
+"""Requests of the benchmark of named objects, and what it measures of a mask."""
+
+import torch
+from oracles_clips import make_clip
+
+from benchmarks.named_objects.__main__ import measure
+from benchmarks.named_objects.requests import asked_image
+from diff4splat.flow.guidance import CallCount
+from diff4splat.generation.motion_sampling import MotionSample
+
+
+def sample(probability: torch.Tensor) -> MotionSample:
+    still = torch.zeros(3, 2, 1, 1)
+    return MotionSample(field=still, mean_field=still, probability=probability, calls=CallCount())
+
+
+def test_a_mask_is_compared_with_the_object_or_with_nothing() -> None:
+    truth = torch.zeros(4, 4, dtype=torch.bool)
+    truth[:2, :2] = True
+    probability = torch.zeros(4, 4)
+    probability[0, :3] = torch.tensor([0.9, 0.8, 0.8])
+    assert measure(sample(probability), truth) == {"overlap": 2 / 5, "found": 1.0, "whole": 0.0}
+    assert measure(sample(probability), truth & False) == {"still": 0.0}
+    assert measure(sample(0 * probability), truth & False) == {"still": 1.0}
+
+
+def test_equal_clips_give_equal_requests() -> None:
+    first, again = asked_image(make_clip()), asked_image(make_clip())
+    assert [text for text, _ in first.requests] == [text for text, _ in again.requests]
+    assert first.requests and not bool(first.requests[-1][1].any())
