@@ -1,5 +1,7 @@
 """Captions that ask for one object of an image by a name that fits no other, or for none."""
 
+from collections.abc import Sequence
+
 import torch
 
 from diff4splat.captions.colors import COLOR_NAMES
@@ -44,14 +46,18 @@ def caption_of_object(
     return _caption(named, draw(kinds, generator), direction, generator)
 
 
-def caption_of_absent_object(objects: list[NamedObject], generator: torch.Generator) -> str | None:
-    """A caption that asks for a noun that no object has, or for another colour of one of them.
+def caption_of_absent_object(
+    objects: list[NamedObject], generator: torch.Generator, nouns: Sequence[str] = NOUNS
+) -> str | None:
+    """A caption that asks for one of ``nouns`` that no object has, or for another colour of one.
 
     None if the image has objects of all nouns and no other colour can be asked for.
     """
     direction = draw(tuple(DIRECTIONS), generator)
     kind = draw(("full", "full", "noun"), generator)
-    found = absent_object(objects, generator, other_color=bool(draw_number(generator) % 2))
+    found = absent_object(
+        objects, generator, other_color=bool(draw_number(generator) % 2), nouns=nouns
+    )
     if found is None:
         return None
     other_color = any(may_be_confused(found.noun, one.noun) for one in objects)
@@ -59,10 +65,14 @@ def caption_of_absent_object(objects: list[NamedObject], generator: torch.Genera
 
 
 def absent_object(
-    objects: list[NamedObject], generator: torch.Generator, *, other_color: bool
+    objects: list[NamedObject],
+    generator: torch.Generator,
+    *,
+    other_color: bool,
+    nouns: Sequence[str] = NOUNS,
 ) -> NamedObject | None:
-    """A noun that no object has, or another colour of one; None if there is neither."""
-    nouns = [n for n in NOUNS if not any(may_be_confused(n, one.noun) for one in objects)]
+    """One of ``nouns`` that no object has, or another colour of one; None if there is neither."""
+    nouns = [n for n in nouns if not any(may_be_confused(n, one.noun) for one in objects)]
     colors = list(COLOR_NAMES)
     if objects and (other_color or not nouns):
         nouns = [draw([one.noun for one in objects], generator)]

@@ -12,7 +12,8 @@ from diff4splat.models.networks import Networks
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
 LEAST_PROBABILITY = 0.35
-"""Of the most probable pixel; below it nothing moves."""
+"""Of the most probable pixel; below it the motion prior's own mask decides: the object mask knows
+objects of its training, and takes others for what is not there."""
 LEAST_SHARE = 0.85
 """Of the highest probability; components below it are other objects, and stay (both chosen on
 validation worlds: docs/log/object-mask.md)."""
@@ -20,7 +21,7 @@ validation worlds: docs/log/object-mask.md)."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaskedMotion:
-    """A motion prior whose mask is that of another network, wherever there is text."""
+    """A motion prior, and an object mask that goes before its own mask."""
 
     motion_unet: MotionPrior
     object_mask: ObjectMask
@@ -45,10 +46,7 @@ class MaskedMotion:
         text_mask: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """The clean motion, and for every pixel the logit that it moves."""
-        if text is None:
-            return self.motion_unet.predict_motion_and_mask(image, noisy, level)
-        motion = self.motion_unet(image, noisy, level, text, text_mask)
-        return motion, self.object_mask(image, text, text_mask)
+        return self.motion_unet.predict_motion_and_mask(image, noisy, level, text, text_mask)
 
 
 def motion_prior(networks: Networks) -> MotionPrior | None:

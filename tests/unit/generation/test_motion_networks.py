@@ -1,4 +1,4 @@
-"""What moves is the object mask's, how it moves the motion U-Net's."""
+"""The networks of a motion prior."""
 
 from dataclasses import replace
 
@@ -22,24 +22,18 @@ def networks() -> Networks:
 
 
 @torch.no_grad()
-def test_motion_of_one_and_mask_of_the_other() -> None:
+def test_motion_and_its_own_mask_are_those_of_the_motion_prior() -> None:
     parts = networks()
-    image, noisy, level = torch.rand(1, 3, 32, 32), torch.randn(1, 3, 1, 8, 8), torch.ones(1)
-    text = torch.randn(1, 5, CONFIG.text.width)
-    both = motion_prior(parts)
-    motion, mask = both.predict_motion_and_mask(image, noisy, level, text)
-    assert torch.equal(motion, parts.motion_unet(image, noisy, level, text))
-    assert torch.equal(motion, both(image, noisy, level, text))
-    assert torch.equal(mask, parts.object_mask(image, text))
-
-
-@torch.no_grad()
-def test_without_text_the_motion_prior_decides() -> None:
-    parts = networks()
-    image, noisy, level = torch.rand(1, 3, 32, 32), torch.randn(1, 3, 1, 8, 8), torch.ones(1)
-    own = parts.motion_unet.predict_motion_and_mask(image, noisy, level)
+    given = (
+        torch.rand(1, 3, 32, 32),
+        torch.randn(1, 3, 1, 8, 8),
+        torch.ones(1),
+        torch.randn(1, 5, CONFIG.text.width),
+    )
+    own, both = parts.motion_unet, motion_prior(parts)
+    assert torch.equal(both(*given), own(*given))
     for one, other in zip(
-        own, motion_prior(parts).predict_motion_and_mask(image, noisy, level), strict=True
+        own.predict_motion_and_mask(*given), both.predict_motion_and_mask(*given), strict=True
     ):
         assert torch.equal(one, other)
 

@@ -1,5 +1,6 @@
 """The motion prior's sample: what moves, seeds and guidance."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -8,11 +9,7 @@ from image_layers import input_image, random_rgb
 
 from diff4splat.flow.guidance import CallCount, Guidance
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.motion_networks import (
-    LEAST_PROBABILITY,
-    LEAST_SHARE,
-    MaskedMotion,
-)
+from diff4splat.generation.motion_networks import LEAST_SHARE, MaskedMotion
 from diff4splat.generation.motion_sampling import (
     MotionRequest,
     MotionSample,
@@ -22,7 +19,6 @@ from diff4splat.generation.motion_sampling import (
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.motion_unet.unet import MotionUNet
-from diff4splat.models.object_mask.network import ObjectMaskNet
 
 SIDE_PX = 32
 
@@ -66,12 +62,6 @@ def test_the_most_probable_moves_where_nothing_is_probable() -> None:
     assert bool(sample_of(probability + 0.6).mask(0.5).all())
 
 
-@pytest.mark.parametrize(("highest", "moves"), [(0.49, False), (0.51, True), (0.0, False)])
-def test_nothing_moves_below_the_least_probability(highest: float, moves: bool) -> None:
-    sample = replace(sample_of(torch.tensor([[highest, 0.1]])), least_probability=0.5)
-    assert sample.mask(0.3).tolist() == [[moves, False]]
-
-
 def test_components_far_below_the_highest_are_other_objects() -> None:
     probability = torch.zeros(5, 9)
     probability[1:4, 1:3], probability[1:4, 4], probability[1:4, 6:8] = 0.9, 0.8, 0.6
@@ -80,13 +70,40 @@ def test_components_far_below_the_highest_are_other_objects() -> None:
     assert torch.equal(sample_of(probability).mask(0.3), probability > 0)
 
 
+class Square:
+    """Finds a square with one probability, whatever the prompt."""
+
+    def __init__(self, probability: float) -> None:
+        self.logit = math.log(probability / (1 - probability))
+
+    def __call__(self, image: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
+        """The logit in the middle, almost nothing elsewhere."""
+        del text
+        logits = torch.full((1, *image.shape[2:]), -9.0)
+        logits[:, 8:24, 8:24] = self.logit
+        return logits
+
+
 @torch.no_grad()
-def test_only_an_object_mask_has_a_least_probability(network: MotionUNet) -> None:
-    masked = MaskedMotion(motion_unet=network, object_mask=ObjectMaskNet(4, 16))
-    assert sample_motion(network, image(), 2, request(text=True)).least_probability == 0
-    sample = sample_motion(masked, image(), 2, request(text=True))
-    assert (sample.least_probability, sample.least_share) == (LEAST_PROBABILITY, LEAST_SHARE)
-    assert not bool(sample.mask(0.3).any())
+@pytest.mark.parametrize(("probability", "found"), [(0.9, True), (0.2, False)])
+def test_the_object_mask_goes_before_the_motion_priors_own(
+    network: MotionUNet, probability: float, found: bool
+) -> None:
+    gray = input_image(torch.full((SIDE_PX, SIDE_PX, 3), 0.5))
+    own = moves_right(network, 1.0)
+    masked = MaskedMotion(motion_unet=own, object_mask=Square(probability))
+    sample = sample_motion(masked, gray, 2, request(text=True))
+    assert sample.least_share == (LEAST_SHARE if found else 0.0)
+    mask = sample.mask(0.3)
+    assert bool(mask[12:20, 12:20].all()) and bool(mask[0, 0]) is not found
+    alone = sample_motion(own, gray, 2, request(text=True))
+    assert found or torch.equal(sample.probability, alone.probability)
+
+
+@torch.no_grad()
+def test_without_text_nothing_is_named(network: MotionUNet) -> None:
+    masked = MaskedMotion(motion_unet=moves_right(network, 1.0), object_mask=Square(0.9))
+    assert bool(sample_motion(masked, image(), 2, request()).mask(0.3).all())
 
 
 @pytest.mark.parametrize(("second", "moves"), [(0.39, False), (0.41, True)])

@@ -19,7 +19,7 @@ from diff4splat.captions.requests import (
 )
 from diff4splat.captions.scene_captions import caption_of_moving, caption_of_static
 from diff4splat.training.batches.requests.displacement import draw_direction
-from diff4splat.training.batches.requests.present import PresentObject
+from diff4splat.training.batches.requests.present import PresentObject, training_nouns
 
 KIND_SHARES = {"named": 0.55, "moving": 0.1, "two": 0.1, "absent": 0.2, "static": 0.05}
 """One named object, one that moves in the clip, two, one that is not there, nothing."""
@@ -85,7 +85,7 @@ def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Gener
 
 def _absent_caption(names: list[NamedObject], generator: torch.Generator) -> str | None:
     if draw_share(generator) > GRAMMAR_SHARE:
-        return caption_of_absent_object(names, generator)
+        return caption_of_absent_object(names, generator, training_nouns())
     other_color = draw_share(generator) < 0.5
-    absent = absent_object(names, generator, other_color=other_color)
+    absent = absent_object(names, generator, other_color=other_color, nouns=training_nouns())
     return None if absent is None else caption_of_moving([absent], names, generator)

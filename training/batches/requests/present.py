@@ -4,6 +4,7 @@ Axes: ``h w`` pixels.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 from jaxtyping import Bool, UInt8
@@ -14,6 +15,8 @@ from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
+from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
+from diff4splat.data_prep.synthetic.splits import load_split
 
 AREA_SHARES = (0.003, 0.4)
 """Smallest and largest share of the image that an object is asked for with."""
@@ -33,6 +36,15 @@ class PresentObject:
         """Whether it is neither too small nor most of the image."""
         least, most = (share * self.mask.numel() for share in AREA_SHARES)
         return least <= int(self.mask.sum()) <= most
+
+
+@cache
+def training_nouns() -> tuple[str, ...]:
+    """Nouns of the objects that procedural worlds of training show.
+
+    A noun that is only ever asked for where it is absent would teach that it is never there.
+    """
+    return tuple(sorted({FAMILIES[name].noun for name in load_split("training").families.names}))
 
 
 def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[PresentObject]:

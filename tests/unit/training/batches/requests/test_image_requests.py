@@ -8,7 +8,7 @@ from diff4splat.captions.synonyms import names
 from diff4splat.errors import InputError
 from diff4splat.training.batches.requests import image_requests
 from diff4splat.training.batches.requests.image_requests import ImageRequest, draw_image_requests
-from diff4splat.training.batches.requests.present import PresentObject
+from diff4splat.training.batches.requests.present import PresentObject, training_nouns
 
 SIDE = 20
 EMPTY = torch.zeros(SIDE, SIDE, dtype=torch.bool)
@@ -90,3 +90,10 @@ def test_all_kinds_have_a_share() -> None:
     assert sum(shares.values()) == 1.0 and min(shares.values()) > 0
     empty = sum(not bool(request.mask.any()) for request in drawn(OBJECTS)) / 300
     assert 0.15 < empty < 0.4
+
+
+def test_absent_nouns_are_those_of_training_worlds() -> None:
+    assert "ball" in training_nouns() and not {"mug", "gear"} & set(training_nouns())
+    captions = " ".join(request.caption for request in drawn([], 300))
+    assert "torus" in captions or "ring" in captions
+    assert not {"gear", "cogwheel", "windmill", "pumpkin"} & set(captions.split())
