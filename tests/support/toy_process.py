@@ -14,6 +14,7 @@ from pathlib import Path
 import torch
 from toy_training import Toy, ToySamples, ToyStage, toy_run, weights
 
+from diff4splat.cli.main import leave
 from diff4splat.training.trainer.checkpoints import store as checkpoint
 from diff4splat.training.trainer.distributed.processes import open_processes
 from diff4splat.training.trainer.loop.fit import fit_stage
@@ -67,6 +68,9 @@ def main() -> None:
     with open_processes("ddp", "cpu", timeout_s=120.0):
         for asked in calls:
             call(asked)
+    # As the command line ends. Threads of Gloo outlive their group, which torch's own modules hold,
+    # and may abort an interpreter that takes itself apart.
+    leave(0)
 
 
 if __name__ == "__main__":
