@@ -20,7 +20,13 @@ from diff4splat.captions.synonyms import (
     SIDES,
     TRAVEL_VERBS,
 )
-from diff4splat.captions.vocabulary import CAMERA_MOVES, NOUNS, PLACES, VERBS
+from diff4splat.captions.vocabulary import (
+    CAMERA_MOVES,
+    NOUNS,
+    PLACES,
+    UNSEEN_NOUNS,
+    VERBS,
+)
 
 NO_OBJECT = "the prompt names no object or colour that the model knows"
 UNKNOWN_OBJECT = "the model does not know the object {!r}"
@@ -98,6 +104,12 @@ def why_static(prompt: str) -> str:
     if words.unknown_object:
         return UNKNOWN_OBJECT.format(words.unknown_object)
     return "" if words.motions else NO_MOTION_WORD
+
+
+def names_unseen_object(prompt: str) -> bool:
+    """Whether ``prompt`` has a noun of ``UNSEEN_NOUNS``, or a synonym of one."""
+    unseen = _of(noun.split()[-1] for noun in _with_synonyms(UNSEEN_NOUNS, NOUN_SYNONYMS))
+    return any(stem(word) in unseen for word in re.findall(r"[^\W\d_]+", prompt.casefold()))
 
 
 def stem(word: str) -> str:

@@ -41,7 +41,7 @@ def caption_of_object(
     named, others = objects[index], objects[:index] + objects[index + 1 :]
     like = any(may_be_confused(named.noun, other.noun) for other in others)
     kinds = ["full", "full", "full"] + ["noun"] * (not like)
-    if not any(_colors_alike(named.color, other.color) for other in others):
+    if not any(colors_alike(named.color, other.color) for other in others):
         kinds.append("color")
     return _caption(named, draw(kinds, generator), direction, generator)
 
@@ -77,7 +77,7 @@ def absent_object(
     if objects and (other_color or not nouns):
         nouns = [draw([one.noun for one in objects], generator)]
         taken = [one.color for one in objects if may_be_confused(nouns[0], one.noun)]
-        colors = [c for c in colors if not any(_colors_alike(c, one) for one in taken)]
+        colors = [c for c in colors if not any(colors_alike(c, one) for one in taken)]
     return NamedObject(draw(colors, generator), draw(nouns, generator)) if colors else None
 
 
@@ -85,7 +85,7 @@ def is_unique(objects: list[NamedObject], index: int) -> bool:
     """Whether colour and noun of the object at ``index`` fit no other."""
     named, others = objects[index], objects[:index] + objects[index + 1 :]
     like = [other for other in others if may_be_confused(named.noun, other.noun)]
-    return not any(_colors_alike(named.color, other.color) for other in like)
+    return not any(colors_alike(named.color, other.color) for other in like)
 
 
 def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Generator) -> str:
@@ -102,5 +102,6 @@ def _name(named: NamedObject, kind: str, choices: Choices) -> str:
     return any_object_name(named.color, choices) if kind == "color" else object_name(named, choices)
 
 
-def _colors_alike(color: str, other: str) -> bool:
+def colors_alike(color: str, other: str) -> bool:
+    """Whether one object may be called both."""
     return color == other or frozenset((color, other)) in LIKE_COLORS

@@ -125,3 +125,8 @@ NOUNS = (
     "wall",
     "windmill",
 )
+UNSEEN_NOUNS = (
+    *("arch", "banner", "barrel", "bottle", "caterpillar", "fir tree", "gear", "heart", "mug"),
+    *("pumpkin", "stool", "windmill"),
+)
+"""Nouns of objects that no procedural world of training shows."""

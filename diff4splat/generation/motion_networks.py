@@ -12,8 +12,7 @@ from diff4splat.models.networks import Networks
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
 LEAST_PROBABILITY = 0.35
-"""Of the most probable pixel; below it the motion prior's own mask decides: the object mask knows
-objects of its training, and takes others for what is not there."""
+"""Of the most probable pixel; below it nothing moves: the object is not there."""
 LEAST_SHARE = 0.85
 """Of the highest probability; components below it are other objects, and stay (both chosen on
 validation worlds: docs/log/object-mask.md)."""

@@ -43,6 +43,9 @@ class MotionRequest:
     """None without a prompt."""
     seed: int
     settings: GenerationSettings
+    unseen_object: bool = False
+    """Whether the text names an object that no training has shown: the object mask takes it for
+    absent, so the motion prior's own mask decides."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,17 +59,21 @@ class MotionSample:
     probability: Float[Tensor, "hh ww"]
     """That a pixel moves."""
     calls: CallCount
+    least_probability: float = 0.0
+    """Of the most probable pixel, for anything to move."""
     least_share: float = 0.0
     """Of the highest probability, for a component to move beside the most probable one."""
 
     def mask(self, threshold: float) -> Bool[Tensor, "hh ww"]:
         """Pixels whose probability is above ``threshold``.
 
-        Where none is, the most probable component moves: the prompt may ask for motion that the
-        image does not suggest. Connected pixels are one component, which moves if some of it is
-        probable enough (hysteresis, Canny 1986).
+        Where none is, the most probable component moves if it has ``least_probability``: the prompt
+        may ask for motion that the image does not suggest. Connected pixels are one component,
+        which moves if some of it is probable enough (hysteresis, Canny 1986).
         """
         highest = float(self.probability.max())
+        if highest < self.least_probability:
+            return torch.zeros_like(self.probability, dtype=torch.bool)
         low = min(threshold, max(highest / 2, HYSTERESIS_LOW))
         component = connected_components(self.probability > low)
         best = self.probability.new_zeros(int(component.max()) + 1)
@@ -107,24 +114,18 @@ def sample_motion(
     # Which pixels move is not sampled: image and text decide.
     level = noise.new_ones(1)
     mean, logits = network.predict_motion_and_mask(rgb, noise, level, request.text)
-    named = _named_probability(network, rgb, request.text)
+    named = (
+        isinstance(network, MaskedMotion) and request.text is not None and not request.unseen_object
+    )
+    logits = network.object_mask(rgb, request.text) if named else logits
     return MotionSample(
         field=_from_first(field),
         mean_field=_from_first(mean),
-        probability=bilateral_smooth(logits.sigmoid(), rgb)[0] if named is None else named,
+        probability=bilateral_smooth(logits.sigmoid(), rgb)[0],
         calls=calls,
-        least_share=0.0 if named is None else LEAST_SHARE,
+        least_probability=LEAST_PROBABILITY if named else 0.0,
+        least_share=LEAST_SHARE if named else 0.0,
     )
-
-
-def _named_probability(
-    network: MotionPrior, rgb: Float[Tensor, "1 3 hh ww"], text: Float[Tensor, "1 s d"] | None
-) -> Float[Tensor, "hh ww"] | None:
-    """Of the object that the text names; None where the object mask finds none, or is missing."""
-    if text is None or not isinstance(network, MaskedMotion):
-        return None
-    found = bilateral_smooth(network.object_mask(rgb, text).sigmoid(), rgb)[0]
-    return found if float(found.max()) >= LEAST_PROBABILITY else None
 
 
 def _from_first(field: Float[Tensor, "1 3 t hc wc"]) -> Float[Tensor, "3 t2 hc wc"]:

@@ -13,13 +13,23 @@ from diff4splat.captions.known_words import (
     NO_OBJECT,
     UNKNOWN_OBJECT,
     known_words,
+    names_unseen_object,
     read_prompt,
     stem,
     why_static,
 )
-from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, NOUNS, PLACES, VERBS
+from diff4splat.captions.vocabulary import (
+    CAMERA_MOVES,
+    DIRECTIONS,
+    NOUNS,
+    PLACES,
+    UNSEEN_NOUNS,
+    VERBS,
+)
 from diff4splat.cli.main import run
 from diff4splat.cli.options.models import prompt_notes
+from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
+from diff4splat.data_prep.synthetic.splits import load_split
 
 OBJECTS = st.tuples(st.sampled_from(COLOR_NAMES), st.sampled_from(NOUNS))
 EVENTS = st.tuples(OBJECTS, st.sampled_from(sorted(VERBS)), st.sampled_from(["", *DIRECTIONS]))
@@ -92,3 +102,23 @@ def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:
     text = " ".join(capsys.readouterr().out.split())
     for words in known_words().values():
         assert all(word in text for word in words)
+
+
+def test_unseen_nouns_are_those_that_training_worlds_leave_out() -> None:
+    trained = {FAMILIES[name].noun for name in load_split("training").families.names}
+    assert set(UNSEEN_NOUNS) == set(NOUNS) & {one.noun for one in FAMILIES.values()} - trained
+
+
+@pytest.mark.parametrize(
+    ("prompt", "unseen"),
+    [
+        ("the red mug moves to the left", True),
+        ("two cups sliding away", True),
+        ("a white archway moves", True),
+        ("the red ball moves to the left", False),
+        ("the blue one moves", False),
+        ("", False),
+    ],
+)
+def test_prompts_about_objects_that_training_never_shows(prompt: str, unseen: bool) -> None:
+    assert names_unseen_object(prompt) is unseen

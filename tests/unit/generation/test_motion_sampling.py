@@ -9,7 +9,7 @@ from image_layers import input_image, random_rgb
 
 from diff4splat.flow.guidance import CallCount, Guidance
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.motion_networks import LEAST_SHARE, MaskedMotion
+from diff4splat.generation.motion_networks import LEAST_PROBABILITY, LEAST_SHARE, MaskedMotion
 from diff4splat.generation.motion_sampling import (
     MotionRequest,
     MotionSample,
@@ -62,6 +62,12 @@ def test_the_most_probable_moves_where_nothing_is_probable() -> None:
     assert bool(sample_of(probability + 0.6).mask(0.5).all())
 
 
+@pytest.mark.parametrize(("highest", "moves"), [(0.49, False), (0.51, True), (0.0, False)])
+def test_nothing_moves_below_the_least_probability(highest: float, moves: bool) -> None:
+    sample = replace(sample_of(torch.tensor([[highest, 0.1]])), least_probability=0.5)
+    assert sample.mask(0.3).tolist() == [[moves, False]]
+
+
 def test_components_far_below_the_highest_are_other_objects() -> None:
     probability = torch.zeros(5, 9)
     probability[1:4, 1:3], probability[1:4, 4], probability[1:4, 6:8] = 0.9, 0.8, 0.6
@@ -86,18 +92,25 @@ class Square:
 
 @torch.no_grad()
 @pytest.mark.parametrize(("probability", "found"), [(0.9, True), (0.2, False)])
-def test_the_object_mask_goes_before_the_motion_priors_own(
+def test_the_object_mask_says_what_moves(
     network: MotionUNet, probability: float, found: bool
 ) -> None:
     gray = input_image(torch.full((SIDE_PX, SIDE_PX, 3), 0.5))
-    own = moves_right(network, 1.0)
-    masked = MaskedMotion(motion_unet=own, object_mask=Square(probability))
+    masked = MaskedMotion(motion_unet=moves_right(network, 1.0), object_mask=Square(probability))
     sample = sample_motion(masked, gray, 2, request(text=True))
-    assert sample.least_share == (LEAST_SHARE if found else 0.0)
+    assert (sample.least_probability, sample.least_share) == (LEAST_PROBABILITY, LEAST_SHARE)
     mask = sample.mask(0.3)
-    assert bool(mask[12:20, 12:20].all()) and bool(mask[0, 0]) is not found
-    alone = sample_motion(own, gray, 2, request(text=True))
-    assert found or torch.equal(sample.probability, alone.probability)
+    assert bool(mask[12:20, 12:20].all()) is found and not bool(mask[0, 0])
+
+
+@torch.no_grad()
+def test_the_motion_priors_own_mask_moves_what_no_training_has_shown(network: MotionUNet) -> None:
+    own = moves_right(network, 1.0)
+    masked = MaskedMotion(motion_unet=own, object_mask=Square(0.9))
+    asked = replace(request(text=True), unseen_object=True)
+    sample, alone = (sample_motion(one, image(), 2, asked) for one in (masked, own))
+    assert torch.equal(sample.probability, alone.probability)
+    assert sample.least_probability == sample.least_share == 0
 
 
 @torch.no_grad()

@@ -20,9 +20,9 @@ from diff4splat.training.batches.requests.displacement import (
     draw_motion,
 )
 from diff4splat.training.batches.requests.present import (
+    TRAINING_NOUNS,
     PresentObject,
     named_objects,
-    training_nouns,
 )
 from diff4splat.training.batches.targets import INPUT_VIEW
 from diff4splat.training.recipe.data import DataSettings
@@ -69,7 +69,7 @@ def _absent_object(
     objects: list[PresentObject], latent_frames: int, generator: torch.Generator
 ) -> ObjectRequest | None:
     """Nothing moves, because the caption names no object of the image."""
-    caption = caption_of_absent_object([one.named for one in objects], generator, training_nouns())
+    caption = caption_of_absent_object([one.named for one in objects], generator, TRAINING_NOUNS)
     if caption is None:
         return None
     motion = torch.zeros(3, latent_frames, *objects[0].mask.shape)

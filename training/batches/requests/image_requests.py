@@ -9,20 +9,31 @@ import torch
 from jaxtyping import Bool
 from torch import Tensor
 
+from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject
-from diff4splat.captions.random_draws import draw_share
+from diff4splat.captions.random_draws import draw, draw_share
 from diff4splat.captions.requests import (
     absent_object,
     caption_of_absent_object,
     caption_of_object,
+    colors_alike,
     is_unique,
 )
 from diff4splat.captions.scene_captions import caption_of_moving, caption_of_static
+from diff4splat.captions.unknown_nouns import caption_of_unknown_noun
 from diff4splat.training.batches.requests.displacement import draw_direction
-from diff4splat.training.batches.requests.present import PresentObject, training_nouns
+from diff4splat.training.batches.requests.present import TRAINING_NOUNS, PresentObject
 
-KIND_SHARES = {"named": 0.55, "moving": 0.1, "two": 0.1, "absent": 0.2, "static": 0.05}
-"""One named object, one that moves in the clip, two, one that is not there, nothing."""
+KIND_SHARES = {
+    "named": 0.45,
+    "moving": 0.1,
+    "two": 0.1,
+    "unknown": 0.15,
+    "absent": 0.15,
+    "static": 0.05,
+}
+"""One named object, one that moves in the clip, two, one whose noun no vocabulary has, one that is
+not there, nothing."""
 GRAMMAR_SHARE = 0.4
 """Share of captions in the grammar; the others are free or plain sentences."""
 
@@ -51,6 +62,8 @@ def _draw(
     empty: Bool[Tensor, "h w"],
     generator: torch.Generator,
 ) -> ImageRequest:
+    if kind == "unknown":
+        return _unknown_noun(objects, empty, generator)
     chosen = _chosen(kind, objects, generator)
     names = [one.named for one in objects]
     if chosen:
@@ -74,6 +87,21 @@ def _chosen(kind: str, objects: list[PresentObject], generator: torch.Generator)
     return [able[index] for index in order[:count]]
 
 
+def _unknown_noun(
+    objects: list[PresentObject], empty: Bool[Tensor, "h w"], generator: torch.Generator
+) -> ImageRequest:
+    """Objects of one colour, or of none; without a colour, those that move in the clip."""
+    shown = {one.named.color for one in objects}
+    absent = [color for color in COLOR_NAMES if not any(colors_alike(color, one) for one in shown)]
+    colors = draw((sorted(shown), sorted(shown), sorted(shown), absent, []), generator)
+    color = draw(colors, generator) if colors else ""
+    asked = [one.mask for one in objects if (one.named.color == color if color else one.moves)]
+    return ImageRequest(
+        caption=caption_of_unknown_noun(color, generator),
+        mask=torch.stack([empty, *asked]).any(0),
+    )
+
+
 def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Generator) -> str:
     if len(chosen) == 1 and draw_share(generator) > GRAMMAR_SHARE:
         caption = caption_of_object(names, chosen[0], draw_direction(generator), generator)
@@ -85,7 +113,7 @@ def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Gener
 
 def _absent_caption(names: list[NamedObject], generator: torch.Generator) -> str | None:
     if draw_share(generator) > GRAMMAR_SHARE:
-        return caption_of_absent_object(names, generator, training_nouns())
+        return caption_of_absent_object(names, generator, TRAINING_NOUNS)
     other_color = draw_share(generator) < 0.5
-    absent = absent_object(names, generator, other_color=other_color, nouns=training_nouns())
+    absent = absent_object(names, generator, other_color=other_color, nouns=TRAINING_NOUNS)
     return None if absent is None else caption_of_moving([absent], names, generator)

@@ -4,7 +4,6 @@ Axes: ``h w`` pixels.
 """
 
 from dataclasses import dataclass
-from functools import cache
 
 import torch
 from jaxtyping import Bool, UInt8
@@ -12,14 +11,15 @@ from torch import Tensor
 
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject
-from diff4splat.captions.vocabulary import NOUNS
+from diff4splat.captions.vocabulary import NOUNS, UNSEEN_NOUNS
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
-from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
-from diff4splat.data_prep.synthetic.splits import load_split
 
 AREA_SHARES = (0.003, 0.4)
 """Smallest and largest share of the image that an object is asked for with."""
+TRAINING_NOUNS = tuple(noun for noun in NOUNS if noun not in UNSEEN_NOUNS)
+"""Nouns that may be asked for where they are absent: one that is only ever asked for so would seem
+to be never there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,15 +36,6 @@ class PresentObject:
         """Whether it is neither too small nor most of the image."""
         least, most = (share * self.mask.numel() for share in AREA_SHARES)
         return least <= int(self.mask.sum()) <= most
-
-
-@cache
-def training_nouns() -> tuple[str, ...]:
-    """Nouns of the objects that procedural worlds of training show.
-
-    A noun that is only ever asked for where it is absent would teach that it is never there.
-    """
-    return tuple(sorted({FAMILIES[name].noun for name in load_split("training").families.names}))
 
 
 def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[PresentObject]:

@@ -1,14 +1,16 @@
 """Prompts for one image: captions and masks agree, and every kind occurs."""
 
+import pytest
 import torch
 from torch import Tensor
 
+from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject, parse_caption
 from diff4splat.captions.synonyms import names
 from diff4splat.errors import InputError
 from diff4splat.training.batches.requests import image_requests
 from diff4splat.training.batches.requests.image_requests import ImageRequest, draw_image_requests
-from diff4splat.training.batches.requests.present import PresentObject, training_nouns
+from diff4splat.training.batches.requests.present import TRAINING_NOUNS, PresentObject
 
 SIDE = 20
 EMPTY = torch.zeros(SIDE, SIDE, dtype=torch.bool)
@@ -30,6 +32,13 @@ OBJECTS = [
     present("green", "bush", _square(0, 10, 1)),
 ]
 """The last is too small to be asked for."""
+
+
+@pytest.fixture
+def known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only nouns of the vocabulary."""
+    shares = image_requests.KIND_SHARES | {"unknown": 0.0}
+    monkeypatch.setattr(image_requests, "KIND_SHARES", shares)
 
 
 def drawn(objects: list[PresentObject], count: int = 300) -> list[ImageRequest]:
@@ -57,6 +66,7 @@ def test_what_a_caption_says_is_what_its_mask_shows() -> None:
     assert seen >= {(0, 0), (1, 0), (1, 1), (2, 2)}
 
 
+@pytest.mark.usefixtures("known")
 def test_free_sentences_ask_for_one_object_or_for_none() -> None:
     free = 0
     for request in drawn(OBJECTS):
@@ -76,6 +86,7 @@ def test_an_image_without_objects_asks_for_nothing() -> None:
     assert not any(bool(request.mask.any()) for request in drawn([], 60))
 
 
+@pytest.mark.usefixtures("known")
 def test_names_that_fit_two_are_asked_for_only_where_one_moves() -> None:
     twins = [
         present("red", "mug", _square(0, 0, 5), moves=True),
@@ -87,13 +98,27 @@ def test_names_that_fit_two_are_asked_for_only_where_one_moves() -> None:
 
 def test_all_kinds_have_a_share() -> None:
     shares = image_requests.KIND_SHARES
-    assert sum(shares.values()) == 1.0 and min(shares.values()) > 0
+    assert sum(shares.values()) == pytest.approx(1) and min(shares.values()) > 0
     empty = sum(not bool(request.mask.any()) for request in drawn(OBJECTS)) / 300
     assert 0.15 < empty < 0.4
 
 
 def test_absent_nouns_are_those_of_training_worlds() -> None:
-    assert "ball" in training_nouns() and not {"mug", "gear"} & set(training_nouns())
+    assert "ball" in TRAINING_NOUNS and not {"mug", "gear"} & set(TRAINING_NOUNS)
     captions = " ".join(request.caption for request in drawn([], 300))
     assert "torus" in captions or "ring" in captions
     assert not {"gear", "cogwheel", "windmill", "pumpkin"} & set(captions.split())
+
+
+def test_of_an_unknown_noun_the_colour_says_what_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(image_requests, "KIND_SHARES", {"unknown": 1.0})
+    colors = {one.named.color: one.mask for one in OBJECTS}
+    seen = set()
+    for request in drawn(OBJECTS):
+        said = set(COLOR_NAMES) & set(request.caption.replace(",", " ").split())
+        color = said.pop() if said else "none"
+        expected = {"none": OBJECTS[0].mask} | colors
+        assert torch.equal(request.mask, expected.get(color, EMPTY)), request.caption
+        assert not said and not {one.named.noun for one in OBJECTS} & set(request.caption.split())
+        seen.add(color)
+    assert seen > {"none", "red", "blue", "green"} and not seen & {"turquoise", "orange"}
