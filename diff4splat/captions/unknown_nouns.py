@@ -10,11 +10,15 @@ from diff4splat.captions.random_draws import draw, draw_number
 from diff4splat.captions.vocabulary import DIRECTIONS
 
 ONSETS = (
-    *"bcdfghjklmnprstvwz",
-    *["bl", "br", "ch", "cl", "cr", "dr", "fl", "fr", "gl", "gr", "pl", "pr", "qu", "sh", "sk", "sl", "sn", "sp", "st", "str", "th", "tr", "tw", "wh"],
+    *("b", "c", "d", "f", "g", "h", "j", "k", "l", "m", "n", "p", "r", "s", "t", "v", "w", "z"),
+    *("bl", "br", "ch", "cl", "cr", "dr", "fl", "fr", "gl", "gr", "pl", "pr", "qu", "sh", "sk"),
+    *("sl", "sn", "sp", "st", "str", "th", "tr", "tw", "wh"),
 )
-VOWELS = (*"aeiouy", "ai", "ea", "ee", "oa", "oo", "ou")
-ENDINGS = ("", *"bdgklmnprstx", *["ck", "ll", "nd", "ng", "nk", "nt", "rd", "rk", "rn", "sh", "st"])
+VOWELS = ("a", "e", "i", "o", "u", "y", "ai", "ea", "ee", "oa", "oo", "ou")
+ENDINGS = (
+    *("", "b", "d", "g", "k", "l", "m", "n", "p", "r", "s", "t", "x", "ck", "ll", "nd", "ng"),
+    *("nk", "nt", "rd", "rk", "rn", "sh", "st"),
+)
 SECOND_ENDINGS = ("le", "er", "el", "in", "on", "ey", "et", "illar", "mill", "pot")
 
 
