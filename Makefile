@@ -31,7 +31,7 @@ gallery: $(VENV)/ready  ## a dozen scenes on one page, gallery/index.html; minut
 	$(BIN)/python -m examples.gallery --out gallery
 
 test: $(VENV)/ready  ## in less than ten minutes on two cores: all that needs no GPU and is not marked slow
-	$(PARALLEL) $(BIN)/pytest -q -m "not slow" -n auto --dist loadfile
+	$(PARALLEL) $(BIN)/pytest -q -m "not slow" -n auto --dist loadfile --durations=40 --durations-min=4
 
 test-all: $(VENV)/ready  ## the same and the slow tests
 	$(PARALLEL) $(BIN)/pytest -q -n auto --dist loadfile
