@@ -16,11 +16,13 @@ from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritte
 from diff4splat.errors import ConfigError, MissingExtraError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from diff4splat.data.capture.capture import Capture
     from diff4splat.fitting.fit_types import FitRequest, FitResult
+    from diff4splat.fitting.results import FitReport
     from diff4splat.fitting.settings import FitSettings
+    from diff4splat.progress.run_log import RunLog
     from diff4splat.scene.scene import Scene
 
 DEFAULT_LIVE_PORT = 8080
@@ -124,36 +126,47 @@ class Fit:
     def _fit(self, settings: "FitSettings") -> None:
         """Read, fit, write."""
         from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.cli.common.installation import single_gaussian
-        from diff4splat.cli.common.precompile import precompile_renderer, precompile_tracer
-        from diff4splat.cli.limits.fitting import promise
-        from diff4splat.cli.limits.stopwatch import Stopwatch
-        from diff4splat.fitting.checkpoints.checkpoint import CHECKPOINT_FILE
-        from diff4splat.fitting.fit_types import FitRequest
-        from diff4splat.fitting.frames.frame_renderer import FrameRenderer
         from diff4splat.fitting.results import FitReport, write_results
         from diff4splat.progress.run_log import RunLog
 
-        log, device = RunLog(phases=ConsolePhases()), render_device(self.device)
-        capture, initial = self.capture(), self.initial_scene()
+        log = RunLog(phases=ConsolePhases())
+        request = self._request(settings, log)
+        forecast = self._promised(request)
+        self._precompile_tracer(request)
+        if self.restart:
+            self._checkpoint().unlink(missing_ok=True)
+        result = self._fit_in_view(request)
+        report = FitReport(
+            result=result,
+            capture=request.capture,
+            settings=settings,
+            inputs=self.inputs(),
+            forecast=forecast,
+        )
+        scene, scene_file = write_results(report, self.out, log, self.compression)
+        moving = len(scene.motion.moving_index)
+        for line in (
+            *closing_lines(report),
+            f"scene file: {scene_file}",
+            f"wrote {self.out} ({len(scene.gaussians):,} Gaussians, {moving:,} of them moving)",
+        ):
+            note(line)
+        if not result.finished:
+            note("time is up; the same command goes on")
+
+    def _request(self, settings: "FitSettings", log: "RunLog") -> "FitRequest":
+        """What is fitted, and how; the data are read, and the renderer is compiled."""
+        from diff4splat.cli.common.console import note
+        from diff4splat.cli.common.installation import single_gaussian
+        from diff4splat.cli.common.precompile import precompile_renderer
+        from diff4splat.fitting.fit_types import FitRequest
+
+        device, capture, initial = render_device(self.device), self.capture(), self.initial_scene()
         for line in capture.notes:
             note(line)
-        usual = self.dtype == "float32"
-        if usual and self.renderer in ("auto", "raster"):
+        if self._is_usual() and self.renderer in ("auto", "raster"):
             precompile_renderer(single_gaussian("cpu"), log.phases)
-        promised = promise(self, settings, capture) if usual else None
-        watch = Stopwatch.of_process()
-        if promised and (self.restart or not (self.out / CHECKPOINT_FILE).is_file()):
-            for line in promised.lines():
-                note(line)
-        renderer = FrameRenderer(
-            capture=capture, backend=self.renderer, settings=settings.camera, device=device
-        )
-        if usual and renderer.traced:
-            precompile_tracer(log.phases)
-        if self.restart:
-            (self.out / CHECKPOINT_FILE).unlink(missing_ok=True)
-        request = FitRequest(
+        return FitRequest(
             capture=capture,
             settings=settings,
             folder=self.out,
@@ -164,25 +177,45 @@ class Fit:
             phases=log.phases,
             note=note,
         )
-        result = self._fit_in_view(request)
-        report = FitReport(
-            result=result,
-            capture=capture,
-            settings=settings,
-            inputs=self.inputs(),
-            forecast=(lambda: promised.record(watch.read())) if promised else None,
+
+    def _promised(self, request: "FitRequest") -> "Callable[[], dict] | None":
+        """Say what the fit will cost; returns what compares that with the truth, in the end."""
+        from diff4splat.cli.limits.fitting import promise
+        from diff4splat.cli.limits.stopwatch import Stopwatch
+
+        promised = None
+        if self._is_usual():
+            promised = promise(self, request.settings, request.capture)
+        watch = Stopwatch.of_process()
+        if promised is None:
+            return None
+        if self.restart or not self._checkpoint().is_file():
+            for line in promised.lines():
+                request.note(line)
+        return lambda: promised.record(watch.read())
+
+    def _precompile_tracer(self, request: "FitRequest") -> None:
+        """If the frames are traced."""
+        from diff4splat.cli.common.precompile import precompile_tracer
+        from diff4splat.fitting.frames.frame_renderer import FrameRenderer
+
+        renderer = FrameRenderer(
+            capture=request.capture,
+            backend=self.renderer,
+            settings=request.settings.camera,
+            device=request.device,
         )
-        scene, scene_file = write_results(report, self.out, log, self.compression)
-        for line in result.skipped_work:
-            note(f"left out: {line}")
-        for line in recovered(result.learned):
-            note(line)
-        note(summary(report))
-        note(f"scene file: {scene_file}")
-        moving = len(scene.motion.moving_index)
-        note(f"wrote {self.out} ({len(scene.gaussians):,} Gaussians, {moving:,} of them moving)")
-        if not result.finished:
-            note("time is up; the same command goes on")
+        if self._is_usual() and renderer.traced:
+            precompile_tracer(request.phases)
+
+    def _is_usual(self) -> bool:
+        """Float32: what is compiled, and what forecasts were measured for."""
+        return self.dtype == "float32"
+
+    def _checkpoint(self) -> Path:
+        from diff4splat.fitting.checkpoints.checkpoint import CHECKPOINT_FILE
+
+        return self.out / CHECKPOINT_FILE
 
     def _fit_in_view(self, request: "FitRequest") -> "FitResult":
         """Fit, and serve the live view meanwhile if it is asked for."""
@@ -241,6 +274,12 @@ class Fit:
         }
 
 
+def closing_lines(report: "FitReport") -> list[str]:
+    """What was left out, what was learned, and how good the fit is."""
+    left_out = [f"left out: {line}" for line in report.result.skipped_work]
+    return [*left_out, *recovered(report.result.learned), summary(report)]
+
+
 def recovered(learned: "Mapping[str, Mapping[str, object]]") -> list[str]:
     """One line per learned camera parameter."""
     return [
@@ -256,7 +295,7 @@ def format_value(value: "float | list[float]") -> str:
     return ", ".join(f"{one:.4g}" for one in values)
 
 
-def summary(report) -> str:
+def summary(report: "FitReport") -> str:
     """Quality in one line."""
     from diff4splat.fitting.results import quality_summary
 

@@ -47,6 +47,14 @@ class MaskedMotion:
         """The clean motion, and for every pixel the logit that it moves."""
         return self.motion_unet.predict_motion_and_mask(image, noisy, level, text, text_mask)
 
+    def object_logits(self, image: Tensor, text: Tensor) -> Tensor:
+        """For every pixel the logit that the text asks it to move: a mean with the mirror image.
+
+        Sides in a text are those of motion, so its object is the same in both.
+        """
+        mirrored = self.object_mask(image.flip(-1), text).flip(-1)
+        return (self.object_mask(image, text) + mirrored) / 2
+
 
 def motion_prior(networks: Networks) -> MotionPrior | None:
     """The motion prior of a model; None if it has none, or none is loaded."""

@@ -94,30 +94,20 @@ def sample_motion(
     Raises:
         ConfigError: an unknown sampler or schedule.
     """
-    calls, rgb = CallCount(), image.rgb.movedim(-1, 0)[None]
-    grid = tuple(side // MOTION_CELL_PX for side in image.camera.size_px)
-    # Drawn on the CPU, so every device starts alike.
-    generator = torch.Generator().manual_seed(request.seed)
-    noise = torch.randn(1, 3, frames - 1, *grid, generator=generator).to(rgb)
-    settings = request.settings
-    fixed = settings.sampler == FITTED
-    fixed = fixed or (settings.sampler == ADAPTIVE and settings.motion.steps == 1)
+    calls, rgb, settings = CallCount(), image.rgb.movedim(-1, 0)[None], request.settings
+    noise = _noise(image, frames, request.seed)
     field = solve(
-        # One step is the mean of all samples, which no tolerance is asked about; steps are fitted
-        # to the video model.
-        FIXED_DEFAULT if fixed else settings.sampler,
+        _sampler(settings),
         _velocity(network, rgb, request, calls),
         noise,
         SolverPath(levels=settings.motion.levels, control=settings.step_control),
         advance,
     )
     # Which pixels move is not sampled: image and text decide.
-    level = noise.new_ones(1)
-    mean, logits = network.predict_motion_and_mask(rgb, noise, level, request.text)
-    named = (
-        isinstance(network, MaskedMotion) and request.text is not None and not request.unseen_object
-    )
-    logits = network.object_mask(rgb, request.text) if named else logits
+    mean, logits = network.predict_motion_and_mask(rgb, noise, noise.new_ones(1), request.text)
+    named = _is_named(network, request)
+    if named:
+        logits = network.object_logits(rgb, request.text)
     return MotionSample(
         field=_from_first(field),
         mean_field=_from_first(mean),
@@ -126,6 +116,28 @@ def sample_motion(
         least_probability=LEAST_PROBABILITY if named else 0.0,
         least_share=LEAST_SHARE if named else 0.0,
     )
+
+
+def _noise(image: InputImage, frames: int, seed: int) -> Float[Tensor, "1 3 t hc wc"]:
+    """Drawn on the CPU, so every device starts alike."""
+    grid = tuple(side // MOTION_CELL_PX for side in image.camera.size_px)
+    generator = torch.Generator().manual_seed(seed)
+    return torch.randn(1, 3, frames - 1, *grid, generator=generator).to(image.rgb)
+
+
+def _sampler(settings: GenerationSettings) -> str:
+    """Of the settings, where it says something about motion."""
+    # One step is the mean of all samples, which no tolerance is asked about; fitted steps are those
+    # of the video model.
+    fixed = settings.sampler == ADAPTIVE and settings.motion.steps == 1
+    return FIXED_DEFAULT if fixed or settings.sampler == FITTED else settings.sampler
+
+
+def _is_named(network: MotionPrior, request: MotionRequest) -> bool:
+    """Whether the object mask says what moves."""
+    if request.text is None or request.unseen_object:
+        return False
+    return isinstance(network, MaskedMotion)
 
 
 def _from_first(field: Float[Tensor, "1 3 t hc wc"]) -> Float[Tensor, "3 t2 hc wc"]:

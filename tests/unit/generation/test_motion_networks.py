@@ -42,3 +42,13 @@ def test_models_without_an_object_mask_or_without_motion() -> None:
     parts = networks()
     assert motion_prior(replace(parts, object_mask=None)) is parts.motion_unet
     assert motion_prior(replace(parts, motion_unet=None)) is None
+
+
+@torch.no_grad()
+def test_an_image_and_its_mirror_image_give_the_same_mask() -> None:
+    prior = motion_prior(networks())
+    image, text = torch.rand(1, 3, 32, 32), torch.randn(1, 5, CONFIG.text.width)
+    logits = prior.object_logits(image, text)
+    torch.testing.assert_close(prior.object_logits(image.flip(-1), text), logits.flip(-1))
+    own = (prior.object_mask(image, text), prior.object_mask(image.flip(-1), text).flip(-1))
+    torch.testing.assert_close(logits, torch.stack(own).mean(0))
