@@ -186,7 +186,7 @@ def _motion_diffusion(video: StageRecipe) -> StageRecipe:
         kind="motion_diffusion",
         steps=4_000,
         trained=("motion_unet",),
-        losses=MotionDiffusionLosses(min_level_weighting=0.4, motion_mask=10.0),
+        losses=MotionDiffusionLosses(min_level_weighting=0.4, motion_mask=10.0, paraphrase=1.0),
         data=replace(video.data, keyframes_only=True),
         timestep_shift=16.0,
     )

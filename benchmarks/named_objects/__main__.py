@@ -6,6 +6,8 @@ overlap   of the mask with the object that was asked for
 found     the most probable pixel is on it
 whole     four fifths of it are in the mask
 still     no pixel moves where the sentence asks for an object that is not there
+
+``--unknown-nouns`` asks by colour and a noun that no training shows.
 """
 
 import argparse
@@ -79,10 +81,12 @@ def main() -> None:
     parser.add_argument("clips", type=Path)
     parser.add_argument("model")
     parser.add_argument("--most", type=int, default=120)
+    parser.add_argument("--unknown-nouns", action="store_true")
     options = parser.parse_args()
     model, folder = load_model(options.model, parts=MOTION_PARTS), ClipFolder(options.clips)
     count = min(len(folder), options.most)
-    images = [asked_image(folder.clip(index)) for index in range(count)]
+    unknown = options.unknown_nouns
+    images = [asked_image(folder.clip(index), unknown_nouns=unknown) for index in range(count)]
     print("| images |", " | ".join(COLUMNS), "|\n|---|" + "---:|" * len(COLUMNS))
     for name, values in rows(model, images).items():
         print(f"| {name} |", " | ".join(f"{values[column]:.3f}" for column in COLUMNS), "|")

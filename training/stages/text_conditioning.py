@@ -37,10 +37,15 @@ class TextConditioning:
     ) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
         """States of the captions, and the mask of real tokens."""
         captions = [caption or DEFAULT_CAPTION for caption in self._captions(batch, training)]
+        return self.encode_captions(captions, batch.sample_index.device)
+
+    def encode_captions(
+        self, captions: list[str], device: torch.device
+    ) -> tuple[Float[Tensor, "b s d"], Bool[Tensor, "b s"]]:
+        """The same of any captions."""
         if isinstance(self.encoder, Umt5Encoder):
             return self.encoder.encode_prompts(captions)
         tokens, mask = tokenize(captions, self.plan.model.text.max_bytes)
-        device = batch.sample_index.device
         tokens, mask = tokens.to(device), mask.to(device)
         return self._by_length(tokens, mask), mask
 

@@ -1,12 +1,15 @@
 """Requests of the benchmark of named objects, and what it measures of a mask."""
 
+import pytest
 import torch
 from oracles_clips import make_clip
 
 from benchmarks.named_objects.__main__ import measure
 from benchmarks.named_objects.requests import asked_image
+from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.flow.guidance import CallCount
 from diff4splat.generation.motion_sampling import MotionSample
+from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
 
 def sample(probability: torch.Tensor) -> MotionSample:
@@ -24,7 +27,15 @@ def test_a_mask_is_compared_with_the_object_or_with_nothing() -> None:
     assert measure(sample(0 * probability), truth & False) == {"still": 1.0}
 
 
-def test_equal_clips_give_equal_requests() -> None:
-    first, again = asked_image(make_clip()), asked_image(make_clip())
+@pytest.mark.parametrize("unknown", [False, True])
+def test_equal_clips_give_equal_requests(unknown: bool) -> None:
+    first, again = (asked_image(make_clip(), unknown_nouns=unknown) for _ in range(2))
     assert [text for text, _ in first.requests] == [text for text, _ in again.requests]
     assert first.requests and not bool(first.requests[-1][1].any())
+
+
+def test_unknown_nouns_stand_beside_the_colour_of_one_object() -> None:
+    for text, truth in asked_image(make_clip(), unknown_nouns=True).requests:
+        known = set(TRAINING_NOUNS) & set(text.split())
+        assert not known and any(noun in text for noun in UNSEEN_NOUNS)
+        assert truth.dtype == torch.bool

@@ -28,6 +28,7 @@ from diff4splat.training.losses.timestep_sampling import (
 )
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
+from diff4splat.training.stages.paraphrases import paraphrase_error
 from diff4splat.training.stages.previews import motion_preview
 from diff4splat.training.stages.text_conditioning import TextConditioning
 from diff4splat.training.stages.video_flow import EVAL_LEVELS, EVAL_NOISE
@@ -65,7 +66,7 @@ class MotionDiffusionStage(ModelStage):
         self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
 
     def forward(self, batch: ClipBatch) -> Terms:
-        """The terms ``flow`` and ``motion_mask``."""
+        """The terms ``flow``, ``motion_mask`` and ``paraphrase``."""
         batch, losses = self._augmented(self._enlarged(batch)), self.plan.recipe.losses
         uniform = self.random.uniform(batch, "level")
         level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
@@ -84,6 +85,16 @@ class MotionDiffusionStage(ModelStage):
                     name="motion_mask",
                     weight=losses.motion_mask,
                     compute=lambda: known * cross_entropy(logits, batch.moving),
+                ),
+                LossTerm(
+                    name="paraphrase",
+                    weight=losses.paraphrase,
+                    compute=lambda: paraphrase_error(
+                        self.motion_unet,
+                        self._text,
+                        _first_images(batch),
+                        self.random.per_sample(batch, "sentences"),
+                    ),
                 ),
             ]
         )
@@ -141,8 +152,7 @@ class MotionDiffusionStage(ModelStage):
 
     def _inputs(self, batch: ClipBatch, noisy: NoisyMotion) -> tuple[Tensor | None, ...]:
         text, mask = self._text.encode_or_drop(batch, self.training)
-        rgb = unit_rgb(batch.video[:, 0]).movedim(-1, 1)
-        return rgb, noisy.motion, noisy.level, text, mask
+        return _first_images(batch), noisy.motion, noisy.level, text, mask
 
     def _clean(self, batch: ClipBatch, noisy: NoisyMotion) -> Float[Tensor, "b 3 t1 hc wc"]:
         return self.motion_unet(*self._inputs(batch, noisy))
@@ -150,3 +160,7 @@ class MotionDiffusionStage(ModelStage):
     def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
         """Clean motion in one step from noise."""
         return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), EVAL_NOISE))
+
+
+def _first_images(batch: ClipBatch) -> Float[Tensor, "b 3 hh ww"]:
+    return unit_rgb(batch.video[:, 0]).movedim(-1, 1)

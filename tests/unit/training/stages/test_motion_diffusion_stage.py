@@ -51,6 +51,17 @@ def test_terms_and_gradients_are_finite_and_only_the_motion_network_learns() -> 
     assert all(bool(gradient.isfinite().all()) for gradient in gradients.values())
 
 
+def test_sentences_of_one_meaning_are_compared_where_the_recipe_says_so() -> None:
+    recipe = replace(motion_recipe(), losses=MotionDiffusionLosses(paraphrase=1.0))
+    stage = make_stage(recipe, model=MODEL)
+    shake_heads(stage)
+    terms = stage(moving_batch(recipe))
+    assert set(terms) == {"flow", "paraphrase", TOTAL}
+    assert terms["paraphrase"].shape == (2,) and bool((terms["paraphrase"] > 0).all())
+    alone = stage(moving_batch(recipe, (1,)))["paraphrase"]
+    torch.testing.assert_close(alone, terms["paraphrase"][1:], rtol=1e-3, atol=1e-9)
+
+
 def test_images_are_as_sharp_as_a_side_that_the_recipe_names() -> None:
     recipe = motion_recipe()
     sides = (16, recipe.data.size_px[1])

@@ -1,0 +1,48 @@
+"""Two sentences of one meaning: the free one names the same object and side."""
+
+import torch
+
+from diff4splat.captions.known_words import read_prompt
+from diff4splat.captions.phrasings import VALIDATION
+from diff4splat.captions.synonyms import COLOR_SYNONYMS, SIDES, names
+from diff4splat.captions.vocabulary import DIRECTIONS
+from diff4splat.training.batches.requests.present import TRAINING_NOUNS
+from diff4splat.training.batches.requests.sentence_pairs import SentencePair, draw_sentence_pair
+
+
+def drawn(count: int = 300) -> list[SentencePair]:
+    generator = torch.Generator().manual_seed(0)
+    return [draw_sentence_pair(generator) for _ in range(count)]
+
+
+def _side(sentence: str) -> str:
+    return next(side for side, phrase in DIRECTIONS.items() if sentence.endswith(f" {phrase}"))
+
+
+def test_both_name_one_side() -> None:
+    seen = set()
+    for pair in drawn():
+        side = _side(pair.plain)
+        assert any(phrase in pair.free for phrase in SIDES[side]), pair
+        seen.add(side)
+    assert seen == set(DIRECTIONS)
+
+
+def test_both_name_one_object() -> None:
+    for pair in drawn():
+        name = pair.plain.removeprefix("the ").partition(" moves ")[0]
+        color, _, noun = name.partition(" ")
+        colors = (color, *COLOR_SYNONYMS.get(color, ()))
+        assert noun in TRAINING_NOUNS
+        assert any(word in pair.free for word in (*names(noun), *colors)), pair
+        assert any(word in pair.plain for word in read_prompt(pair.plain).objects)
+
+
+def test_free_sentences_are_many_and_in_no_phrasing_of_validation() -> None:
+    pairs = drawn()
+    assert len({pair.free for pair in pairs}) > 250
+    starts = [template.partition(" {")[0] for template in VALIDATION]
+    kept_back = [start for start in starts if len(start.split()) > 2]
+    assert kept_back
+    assert not any(pair.free.startswith(start) for pair in pairs for start in kept_back)
+    assert 0.1 < sum(pair.free == pair.plain for pair in pairs) / len(pairs) < 0.4
