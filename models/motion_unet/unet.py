@@ -134,6 +134,16 @@ class MotionUNet(nn.Module):
         middle = self.middle_out(middle + _upsample(self.up_2(coarse)), condition)
         return self.fine_out(fine + _upsample(self.up_1(middle)), condition)
 
+    def text_condition(
+        self, text: Float[Tensor, "b s e"], text_mask: Bool[Tensor, "b s"] | None = None
+    ) -> Float[Tensor, "b d"]:
+        """What the text adds to the condition of every block."""
+        return self._text_condition(self._adapt(text_tokens(text, text_mask)))
+
+    def _text_condition(self, tokens: TextTokens | None) -> Float[Tensor, "*b d"]:
+        null = self.null_text_embedding
+        return self.pooled_text(null if tokens is None else tokens.pooled(null))
+
     def _motion(
         self, features: Float[Tensor, "n c hc wc"], noisy: Float[Tensor, "b 3 t hc wc"]
     ) -> Float[Tensor, "b 3 t hc wc"]:
@@ -148,11 +158,8 @@ class MotionUNet(nn.Module):
     ) -> Float[Tensor, "n d"]:
         """Noise level and text of a sample, and the time of each latent frame in the clip."""
         time = torch.arange(1, frames + 1, device=level.device) / frames
-        pooled = (
-            self.null_text_embedding if tokens is None else tokens.pooled(self.null_text_embedding)
-        )
         by_sample = self.level_mlp(level_embedding(level, self.frequency_width))
-        by_sample = by_sample + self.pooled_text(pooled)
+        by_sample = by_sample + self._text_condition(tokens)
         by_frame = self.time_mlp(level_embedding(time, self.frequency_width))
         return (by_sample[:, None] + by_frame).flatten(0, 1)
 

@@ -130,7 +130,7 @@ class MotionDiffusionLosses:
     """Cross-entropy of the motion mask (ours): most pixels are static, so a squared error alone
     learns the moving ones slowly."""
     paraphrase: float = 0.0
-    """Difference of the motions that a plain and a free sentence of one meaning give (ours)."""
+    """Difference of what the network reads in a plain and a free sentence of one meaning (ours)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -90,10 +90,7 @@ class MotionDiffusionStage(ModelStage):
                     name="paraphrase",
                     weight=losses.paraphrase,
                     compute=lambda: paraphrase_error(
-                        self.motion_unet,
-                        self._text,
-                        _first_images(batch),
-                        self.random.per_sample(batch, "sentences"),
+                        self.motion_unet, self._text, self.random.per_sample(batch, "sentences")
                     ),
                 ),
             ]
@@ -152,7 +149,8 @@ class MotionDiffusionStage(ModelStage):
 
     def _inputs(self, batch: ClipBatch, noisy: NoisyMotion) -> tuple[Tensor | None, ...]:
         text, mask = self._text.encode_or_drop(batch, self.training)
-        return _first_images(batch), noisy.motion, noisy.level, text, mask
+        rgb = unit_rgb(batch.video[:, 0]).movedim(-1, 1)
+        return rgb, noisy.motion, noisy.level, text, mask
 
     def _clean(self, batch: ClipBatch, noisy: NoisyMotion) -> Float[Tensor, "b 3 t1 hc wc"]:
         return self.motion_unet(*self._inputs(batch, noisy))
@@ -160,7 +158,3 @@ class MotionDiffusionStage(ModelStage):
     def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
         """Clean motion in one step from noise."""
         return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), EVAL_NOISE))
-
-
-def _first_images(batch: ClipBatch) -> Float[Tensor, "b 3 hh ww"]:
-    return unit_rgb(batch.video[:, 0]).movedim(-1, 1)
