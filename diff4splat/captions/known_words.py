@@ -1,16 +1,14 @@
 """The words of a prompt that the motion prior and the object mask know: those of their captions.
 
 A prompt moves something if it has a word for an object (a noun or a colour) and one for a motion (a
-verb or a direction). A colour alone is an object, but not that of a noun that the model does not
-know: of a "purple sofa" it would move whatever it likes. Endings do not count: ``moving`` is
-``moves``.
+verb or a direction). A colour is enough, even beside a noun that the model does not know. Endings
+do not count: ``moving`` is ``moves``.
 """
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.synonyms import (
@@ -20,16 +18,9 @@ from diff4splat.captions.synonyms import (
     SIDES,
     TRAVEL_VERBS,
 )
-from diff4splat.captions.vocabulary import (
-    CAMERA_MOVES,
-    NOUNS,
-    PLACES,
-    UNSEEN_NOUNS,
-    VERBS,
-)
+from diff4splat.captions.vocabulary import CAMERA_MOVES, NOUNS, PLACES, VERBS
 
 NO_OBJECT = "the prompt names no object or colour that the model knows"
-UNKNOWN_OBJECT = "the model does not know the object {!r}"
 NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
 STATIC = "nothing moves"
 _ENDINGS = ("ing", "ed", "es", "s", "e")
@@ -51,8 +42,6 @@ class PromptWords:
     objects: tuple[str, ...]
     motions: tuple[str, ...]
     unknown: tuple[str, ...]
-    unknown_object: str
-    """The unknown word after a colour, where no noun is known; else empty."""
 
 
 def known_words() -> dict[str, tuple[str, ...]]:
@@ -82,18 +71,7 @@ def read_prompt(prompt: str) -> PromptWords:
         objects=tuple(word for word in words if stem(word) in objects),
         motions=tuple(word for word in words if stem(word) in motions),
         unknown=tuple(word for word in words if stem(word) not in objects | motions | others),
-        unknown_object=_unknown_object(words, objects | motions | others),
     )
-
-
-def _unknown_object(words: list[str], known: frozenset[str]) -> str:
-    colors = _of(known_words()["colours"])
-    nouns = _of(noun.split()[-1] for noun in known_words()["objects"]) - colors
-    if any(stem(word) in nouns for word in words):
-        return ""
-    pairs = pairwise(words)
-    after = (word for color, word in pairs if stem(color) in colors and stem(word) not in known)
-    return next(after, "")
 
 
 def why_static(prompt: str) -> str:
@@ -101,15 +79,7 @@ def why_static(prompt: str) -> str:
     words = read_prompt(prompt)
     if not words.objects:
         return NO_OBJECT
-    if words.unknown_object:
-        return UNKNOWN_OBJECT.format(words.unknown_object)
     return "" if words.motions else NO_MOTION_WORD
-
-
-def names_unseen_object(prompt: str) -> bool:
-    """Whether ``prompt`` has a noun of ``UNSEEN_NOUNS``, or a synonym of one."""
-    unseen = _of(noun.split()[-1] for noun in _with_synonyms(UNSEEN_NOUNS, NOUN_SYNONYMS))
-    return any(stem(word) in unseen for word in re.findall(r"[^\W\d_]+", prompt.casefold()))
 
 
 def stem(word: str) -> str:

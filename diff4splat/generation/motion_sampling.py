@@ -43,9 +43,6 @@ class MotionRequest:
     """None without a prompt."""
     seed: int
     settings: GenerationSettings
-    unseen_object: bool = False
-    """Whether the text names an object that no training has shown: the object mask takes it for
-    absent, so the motion prior's own mask decides."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +102,7 @@ def sample_motion(
     )
     # Which pixels move is not sampled: image and text decide.
     mean, logits = network.predict_motion_and_mask(rgb, noise, noise.new_ones(1), request.text)
-    named = _is_named(network, request)
+    named = request.text is not None and isinstance(network, MaskedMotion)
     if named:
         logits = network.object_logits(rgb, request.text)
     return MotionSample(
@@ -131,13 +128,6 @@ def _sampler(settings: GenerationSettings) -> str:
     # of the video model.
     fixed = settings.sampler == ADAPTIVE and settings.motion.steps == 1
     return FIXED_DEFAULT if fixed or settings.sampler == FITTED else settings.sampler
-
-
-def _is_named(network: MotionPrior, request: MotionRequest) -> bool:
-    """Whether the object mask says what moves."""
-    if request.text is None or request.unseen_object:
-        return False
-    return isinstance(network, MaskedMotion)
 
 
 def _from_first(field: Float[Tensor, "1 3 t hc wc"]) -> Float[Tensor, "3 t2 hc wc"]:

@@ -16,7 +16,6 @@ from typing import Literal
 import torch
 
 from diff4splat import __version__
-from diff4splat.captions.known_words import names_unseen_object
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage
@@ -137,12 +136,7 @@ class Diff4SplatPipeline:
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread(), self._autocast():
             text = self._text_states(request, log)
-            motion = MotionRequest(
-                text=text.prompt,
-                seed=request.seed,
-                settings=request.settings,
-                unseen_object=names_unseen_object(request.prompt or ""),
-            )
+            motion = MotionRequest(text=text.prompt, seed=request.seed, settings=request.settings)
             maps = image_maps(model, copies, frames, motion, log)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(

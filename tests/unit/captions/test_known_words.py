@@ -11,9 +11,7 @@ from diff4splat.captions.grammar import CaptionFacts, Event, NamedObject, descri
 from diff4splat.captions.known_words import (
     NO_MOTION_WORD,
     NO_OBJECT,
-    UNKNOWN_OBJECT,
     known_words,
-    names_unseen_object,
     read_prompt,
     stem,
     why_static,
@@ -67,8 +65,8 @@ def test_every_training_caption_is_known_word_by_word(
         ("a gear is spinning", ""),
         ("nothing moves", ""),
         ("the blue one moves", ""),
-        ("the blue ostrich walks", UNKNOWN_OBJECT.format("ostrich")),
-        ("a purple zebra flies away", UNKNOWN_OBJECT.format("zebra")),
+        ("the blue ostrich walks", ""),
+        ("a purple zebra flies away", ""),
         ("the sofa beside the red car moves", ""),
     ],
 )
@@ -89,10 +87,9 @@ def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     (line,) = notes("an ostrich sings")
     assert "nothing moves: the prompt names no object" in line
     assert "diff4splat inspect words" in line
-    (line,) = notes("the red ostrich moves")
-    assert "nothing moves: the model does not know the object 'ostrich'" in line
-    unknown = "words of the prompt that the model does not know: quickly"
-    assert notes("the red car moves quickly") == [unknown]
+    unknown = "words of the prompt that the model does not know: {}"
+    assert notes("the red ostrich moves") == [unknown.format("ostrich")]
+    assert notes("the red car moves quickly") == [unknown.format("quickly")]
     assert notes("the red car moves to the left") == notes(None) == []
     assert notes("an ostrich sings", model="test") == []
 
@@ -107,18 +104,3 @@ def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:
 def test_unseen_nouns_are_those_that_training_worlds_leave_out() -> None:
     trained = {FAMILIES[name].noun for name in load_split("training").families.names}
     assert set(UNSEEN_NOUNS) == set(NOUNS) & {one.noun for one in FAMILIES.values()} - trained
-
-
-@pytest.mark.parametrize(
-    ("prompt", "unseen"),
-    [
-        ("the red mug moves to the left", True),
-        ("two cups sliding away", True),
-        ("a white archway moves", True),
-        ("the red ball moves to the left", False),
-        ("the blue one moves", False),
-        ("", False),
-    ],
-)
-def test_prompts_about_objects_that_training_never_shows(prompt: str, unseen: bool) -> None:
-    assert names_unseen_object(prompt) is unseen

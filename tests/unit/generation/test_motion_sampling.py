@@ -104,16 +104,6 @@ def test_the_object_mask_says_what_moves(
 
 
 @torch.no_grad()
-def test_the_motion_priors_own_mask_moves_what_no_training_has_shown(network: MotionUNet) -> None:
-    own = moves_right(network, 1.0)
-    masked = MaskedMotion(motion_unet=own, object_mask=Square(0.9))
-    asked = replace(request(text=True), unseen_object=True)
-    sample, alone = (sample_motion(one, image(), 2, asked) for one in (masked, own))
-    assert torch.equal(sample.probability, alone.probability)
-    assert sample.least_probability == sample.least_share == 0
-
-
-@torch.no_grad()
 def test_without_text_nothing_is_named(network: MotionUNet) -> None:
     masked = MaskedMotion(motion_unet=moves_right(network, 1.0), object_mask=Square(0.9))
     assert bool(sample_motion(masked, image(), 2, request()).mask(0.3).all())
