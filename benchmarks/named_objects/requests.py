@@ -14,10 +14,14 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.phrasings import VALIDATION, Choices, request
 from diff4splat.captions.random_draws import draw, draw_number
-from diff4splat.captions.requests import caption_of_absent_object, colors_alike, is_unique
+from diff4splat.captions.requests import (
+    caption_of_absent_object,
+    colors_alike,
+    colors_unlike,
+    is_unique,
+)
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.data.clip import Clip
 from diff4splat.io.pixels import unit_rgb
@@ -69,7 +73,7 @@ def _by_color(objects: list[PresentObject], generator: torch.Generator) -> Itera
     ]
     for one in _some(able, generator):
         yield _sentence(f"{one.named.color} {draw(UNSEEN_NOUNS, generator)}", generator), one
-    absent = [one for one in COLOR_NAMES if not any(colors_alike(one, other) for other in colors)]
+    absent = colors_unlike(colors)
     if absent:
         name = f"{draw(absent, generator)} {draw(UNSEEN_NOUNS, generator)}"
         yield _sentence(name, generator), None

@@ -1,6 +1,6 @@
 """Captions that ask for one object of an image by a name that fits no other, or for none."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import torch
 
@@ -73,12 +73,17 @@ def absent_object(
 ) -> NamedObject | None:
     """One of ``nouns`` that no object has, or another colour of one; None if there is neither."""
     nouns = [n for n in nouns if not any(may_be_confused(n, one.noun) for one in objects)]
-    colors = list(COLOR_NAMES)
+    colors = COLOR_NAMES
     if objects and (other_color or not nouns):
         nouns = [draw([one.noun for one in objects], generator)]
         taken = [one.color for one in objects if may_be_confused(nouns[0], one.noun)]
-        colors = [c for c in colors if not any(colors_alike(c, one) for one in taken)]
+        colors = colors_unlike(taken)
     return NamedObject(draw(colors, generator), draw(nouns, generator)) if colors else None
+
+
+def plain_caption(named: NamedObject, direction: str) -> str:
+    """``the red ball moves to the left``."""
+    return f"the {named.color} {named.noun} moves {DIRECTIONS[direction]}"
 
 
 def is_unique(objects: list[NamedObject], index: int) -> bool:
@@ -90,7 +95,7 @@ def is_unique(objects: list[NamedObject], index: int) -> bool:
 
 def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Generator) -> str:
     if draw_share(generator) < PLAIN_SHARE and kind == "full":
-        return f"the {named.color} {named.noun} moves {DIRECTIONS[direction]}"
+        return plain_caption(named, direction)
     choices = Choices(draw_number(generator))
     return request(_name(named, kind, choices), direction, choices)
 
@@ -105,3 +110,9 @@ def _name(named: NamedObject, kind: str, choices: Choices) -> str:
 def colors_alike(color: str, other: str) -> bool:
     """Whether one object may be called both."""
     return color == other or frozenset((color, other)) in LIKE_COLORS
+
+
+def colors_unlike(taken: Iterable[str]) -> list[str]:
+    """Colours that no object of the ``taken`` ones may be called."""
+    taken = set(taken)
+    return [color for color in COLOR_NAMES if not any(colors_alike(color, one) for one in taken)]

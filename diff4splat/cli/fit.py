@@ -183,9 +183,7 @@ class Fit:
         from diff4splat.cli.limits.fitting import promise
         from diff4splat.cli.limits.stopwatch import Stopwatch
 
-        promised = None
-        if self._is_usual():
-            promised = promise(self, request.settings, request.capture)
+        promised = promise(self, request.settings, request.capture) if self._is_usual() else None
         watch = Stopwatch.of_process()
         if promised is None:
             return None

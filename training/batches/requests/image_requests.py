@@ -9,14 +9,13 @@ import torch
 from jaxtyping import Bool
 from torch import Tensor
 
-from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.random_draws import draw, draw_share
 from diff4splat.captions.requests import (
     absent_object,
     caption_of_absent_object,
     caption_of_object,
-    colors_alike,
+    colors_unlike,
     is_unique,
 )
 from diff4splat.captions.scene_captions import caption_of_moving, caption_of_static
@@ -92,8 +91,8 @@ def _unknown_noun(
 ) -> ImageRequest:
     """Objects of one colour, or of none; without a colour, those that move in the clip."""
     shown = {one.named.color for one in objects}
-    absent = [color for color in COLOR_NAMES if not any(colors_alike(color, one) for one in shown)]
-    colors = draw((sorted(shown), sorted(shown), sorted(shown), absent, []), generator)
+    named = sorted(shown)
+    colors = draw((named, named, named, colors_unlike(shown), []), generator)
     color = draw(colors, generator) if colors else ""
     asked = [one.mask for one in objects if (one.named.color == color if color else one.moves)]
     return ImageRequest(

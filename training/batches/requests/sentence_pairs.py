@@ -7,8 +7,7 @@ import torch
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.random_draws import draw
-from diff4splat.captions.requests import caption_of_object
-from diff4splat.captions.vocabulary import DIRECTIONS
+from diff4splat.captions.requests import caption_of_object, plain_caption
 from diff4splat.training.batches.requests.displacement import draw_direction
 from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
@@ -28,6 +27,6 @@ def draw_sentence_pair(generator: torch.Generator) -> SentencePair:
     named = NamedObject(draw(COLOR_NAMES, generator), draw(TRAINING_NOUNS, generator))
     direction = draw_direction(generator)
     return SentencePair(
-        plain=f"the {named.color} {named.noun} moves {DIRECTIONS[direction]}",
+        plain=plain_caption(named, direction),
         free=caption_of_object([named], 0, direction, generator),
     )
