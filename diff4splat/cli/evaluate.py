@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.models import FeatureFiles, ModelName
 from diff4splat.errors import ConfigError
+from diff4splat.evaluation.systems.network_names import NETWORKS, Network
 
 if TYPE_CHECKING:
     from diff4splat.evaluation.measures.videos import VideoNetworks
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from diff4splat.evaluation.systems.variants import Variant
     from diff4splat.generation.settings import GenerationSettings
 
-Without = tuple[Literal["depth", "motion", "text", "video", "ldrm", "deformation", "all"], ...]
+Without = tuple[Network | Literal["all"], ...]
 """Networks of ablations."""
 
 
@@ -57,8 +58,8 @@ class Evaluate:
     dtype: Literal["float32", "bfloat16", "float16"] = "float32"
     """What they compute in."""
     without: Without = ()
-    """Also measure the same scenes without a network, in a row each: depth, motion, text, video,
-    ldrm (with the VAE), deformation; `all` is all of them."""
+    """Also measure the same scenes without a network, in a row each: depth, motion, object-mask,
+    text, video, ldrm (with the VAE), deformation; `all` is all of them."""
     seeds: Annotated[int, Number(least=1, most=64)] = 1
     """Generate each scene with this many seeds, and measure how much they differ."""
     fresh: bool = False
@@ -169,7 +170,7 @@ class Evaluate:
 
     def variants(self, system: "EvaluatedSystem") -> "tuple[Variant, ...]":
         """The same system without the networks that ``--without`` names."""
-        from diff4splat.evaluation.systems.variants import NETWORKS, ablations
+        from diff4splat.evaluation.systems.variants import ablations
 
         if not self.without:
             return ()

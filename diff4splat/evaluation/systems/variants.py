@@ -6,12 +6,10 @@ again, and its row differs by exactly 0.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 from diff4splat.evaluation.systems.evaluated_system import Generator
+from diff4splat.evaluation.systems.network_names import NETWORKS, Network
 
-Network = Literal["depth", "motion", "object-mask", "text", "video", "ldrm", "deformation"]
-"""Names of ablations, as on the command line."""
 REMOVED_PARTS: dict[Network, tuple[str, ...]] = {
     "depth": ("monocular_depth",),
     "motion": ("motion_unet",),
@@ -31,7 +29,6 @@ ABLATION_ROWS: dict[Network, str] = {
     "ldrm": "without VAE and LDRM",
     "deformation": "without deformation",
 }
-NETWORKS: tuple[Network, ...] = get_args(Network)
 EXTENSION = "border extension"
 
 

@@ -22,6 +22,7 @@ from diff4splat.evaluation.protocols.protocol_json import (
 )
 from diff4splat.evaluation.protocols.sample import make_sample
 from diff4splat.evaluation.systems.evaluated_system import Generator
+from diff4splat.evaluation.systems.network_names import NETWORKS
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 
@@ -207,5 +208,5 @@ def test_options_that_need_others_are_refused(change: dict[str, object], says: s
 def test_the_command_line_reads_the_options() -> None:
     from diff4splat.cli.common.parser import parse
 
-    command = parse(["eval", "--without", "depth", "all", "--seeds", "3"])
-    assert (command.without, command.seeds) == (("depth", "all"), 3)
+    command = parse(["eval", "--without", *NETWORKS, "all", "--seeds", "3"])
+    assert (command.without, command.seeds) == ((*NETWORKS, "all"), 3)

@@ -15,10 +15,10 @@ from diff4splat.evaluation.report.summary import FILLS, summarize
 from diff4splat.evaluation.runner import Outcome
 from diff4splat.evaluation.systems.evaluated_system import Generator
 from diff4splat.evaluation.systems.inpainting import METHODS, inpainted
+from diff4splat.evaluation.systems.network_names import NETWORKS
 from diff4splat.evaluation.systems.variants import (
     ABLATION_ROWS,
     EXTENSION,
-    NETWORKS,
     ablations,
     border_extension,
     unfilled,

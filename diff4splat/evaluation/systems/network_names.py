@@ -1,0 +1,7 @@
+"""Names of the networks that an ablation leaves out; loads nothing."""
+
+from typing import Literal, get_args
+
+Network = Literal["depth", "motion", "object-mask", "text", "video", "ldrm", "deformation"]
+"""As on the command line, in the order of the table."""
+NETWORKS: tuple[Network, ...] = get_args(Network)
