@@ -13,7 +13,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import jaxtyping
 import pytest
 import torch
+import type_checks
 from hypothesis import HealthCheck, settings
+
+type_checks.install()
 
 # Benchmarks are run from the root and belong to no package.
 sys.path.append(str(Path(__file__).parents[1]))

@@ -21,7 +21,7 @@ from diff4splat.generation.layered_image.border_extension import (
     push_behind_surface,
 )
 from diff4splat.generation.layered_image.depth_smoothing import smooth_maps
-from diff4splat.generation.layered_image.disoccluded_layer import disoccluded_layer
+from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
     inpaint_border,

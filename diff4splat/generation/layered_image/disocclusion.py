@@ -86,8 +86,9 @@ def fill_from_neighbours(
 
 def grown(mask: Bool[Tensor, "h w"], margin_px: int = GROWN_PX) -> Bool[Tensor, "h w"]:
     """The mask with a margin around it."""
-    side = 2 * margin_px + 1
-    return torch.nn.functional.max_pool2d(mask.float()[None, None], side, 1, margin_px)[0, 0] > 0
+    side, plane = 2 * margin_px + 1, mask.float()[None, None]
+    rows = torch.nn.functional.max_pool2d(plane, (side, 1), 1, (margin_px, 0))
+    return torch.nn.functional.max_pool2d(rows, (1, side), 1, (0, margin_px))[0, 0] > 0
 
 
 def _inpaints(static: Bool[Tensor, "h w"]) -> bool:

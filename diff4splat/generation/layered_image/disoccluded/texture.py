@@ -1,0 +1,112 @@
+"""Colours of a disoccluded layer: an even surface with the fine detail of shifted patches (ours).
+
+Axes: ``h w`` pixels of the image, ``hs ws`` of the smaller copy in which shifts are sought.
+"""
+
+import math
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+from torch.nn.functional import avg_pool2d, interpolate
+
+from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
+from diff4splat.generation.layered_image.disoccluded.shift_map import shift_map
+from diff4splat.generation.layered_image.disocclusion import grown
+
+DETAIL_SHARE = 1 / 16
+"""Of the image's longer side: the window over whose mean detail is what remains."""
+LIMIT = 2.0
+"""Standard deviations of the detail beside the hole."""
+CONTEXT = (0.1, 1.0)
+"""Where patches are sought above and below the hole, and beside it, over its longer side: what
+stands on a ground stands there on either side."""
+MAX_SIDE_PX = 96
+"""Shifts are sought in a copy of at most this side; patches keep all pixels of the image."""
+
+
+def textured(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:
+    """``rgb`` where ``known``; else the colours around it extended evenly, with fine detail.
+
+    Only the fine detail of patches is taken: whole ones may show another object.
+    """
+    if bool(known.all()):
+        return rgb
+    even = torch.stack([extended_evenly(channel, known) for channel in rgb.unbind(-1)], -1)
+    rgb = torch.where(known[..., None], rgb, even)
+    means = _means_of_known(rgb, known)
+    rows, columns = _window(~known)
+    detail = torch.where(known[..., None], rgb - means, 0.0)
+    detail = _bounded(detail, known)
+    shifts = _shifts(*(image[rows, columns] for image in (rgb, even, means, known)))
+    result = even.clone()
+    result[rows, columns] += shifted(detail[rows, columns], known[rows, columns], shifts)
+    return torch.where(known[..., None], rgb, result.clamp(0, 1))
+
+
+def _shifts(
+    rgb: Float[Tensor, "h w 3"],
+    even: Float[Tensor, "h w 3"],
+    means: Float[Tensor, "h w 3"],
+    known: Bool[Tensor, "h w"],
+) -> Int[Tensor, "h w 2"]:
+    """Sought in a smaller copy."""
+    step = math.ceil(max(known.shape) / MAX_SIDE_PX)
+    complete = _reduced(known[..., None].to(rgb), step)[..., 0] == 1
+    found = shift_map(*(_reduced(image, step) for image in (rgb, even, means)), complete)
+    return _enlarged(found * step, step, known.shape)
+
+
+def shifted(
+    image: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"], shifts: Int[Tensor, "h w 2"]
+) -> Float[Tensor, "h w 3"]:
+    """At unknown pixels the known one that lies ``shifts`` (rows, columns) away; else zero."""
+    height, width = known.shape
+    rows = torch.arange(height, device=image.device)[:, None] + shifts[..., 0]
+    columns = torch.arange(width, device=image.device) + shifts[..., 1]
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    source = rows.clamp(0, height - 1), columns.clamp(0, width - 1)
+    return torch.where((inside & known[source] & ~known)[..., None], image[source], 0.0)
+
+
+def _bounded(detail: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:
+    """No stronger than beside the hole, or it shows an object from elsewhere."""
+    ring = grown(~known, math.ceil(DETAIL_SHARE * max(known.shape))) & known
+    bound = LIMIT * detail[ring].square().mean().sqrt()
+    return detail.clamp(-bound, bound)
+
+
+def _reduced(image: Float[Tensor, "h w c"], step: int) -> Float[Tensor, "hs ws c"]:
+    """Means of ``step`` × ``step`` pixels."""
+    planes = image.movedim(-1, 0)[None]
+    small = avg_pool2d(planes, step, ceil_mode=True, count_include_pad=False)
+    return small[0].movedim(0, -1)
+
+
+def _enlarged(shifts: Int[Tensor, "hs ws 2"], step: int, shape: torch.Size) -> Int[Tensor, "h w 2"]:
+    planes = shifts.movedim(-1, 0)[None].double()
+    large = interpolate(planes, scale_factor=float(step), mode="nearest")[0].movedim(0, -1)
+    return large[: shape[0], : shape[1]].long()
+
+
+def _means_of_known(
+    rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]
+) -> Float[Tensor, "h w 3"]:
+    """Of the window around each pixel; zero where nothing in it is known."""
+    half = math.ceil(DETAIL_SHARE * max(rgb.shape[:2]) / 2)
+    planes = torch.cat([rgb, torch.ones_like(rgb[..., :1])], -1) * known[..., None]
+    sums = planes.movedim(-1, 0)[None]
+    for window, around in (((2 * half + 1, 1), (half, 0)), ((1, 2 * half + 1), (0, half))):
+        sums = avg_pool2d(sums, window, 1, around)
+    return (sums[0, :3] / sums[0, 3].clamp_min(1e-6)).movedim(0, -1)
+
+
+def _window(hole: Bool[Tensor, "h w"]) -> tuple[slice, slice]:
+    """Rows and columns of the hole and of what is around it."""
+    spans = [hole.any(1).nonzero()[:, 0], hole.any(0).nonzero()[:, 0]]
+    longer = max(int(span[-1] - span[0]) + 1 for span in spans)
+    around = [math.ceil(share * longer) for share in CONTEXT]
+    return tuple(
+        slice(max(int(span[0]) - more, 0), int(span[-1]) + 1 + more)
+        for span, more in zip(spans, around, strict=True)
+    )

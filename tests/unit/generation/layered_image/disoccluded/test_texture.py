@@ -1,0 +1,68 @@
+"""Holes get the colours around them and the fine detail of patches, and equal images equal ones."""
+
+import pytest
+import torch
+from torch import Tensor
+
+from diff4splat.generation.layered_image.disoccluded.texture import shifted, textured
+
+SIDE = 48
+
+
+def _box() -> Tensor:
+    mask = torch.zeros(SIDE, SIDE, dtype=torch.bool)
+    mask[18:30, 14:30] = True
+    return mask
+
+
+def _stripes() -> Tensor:
+    """Six pixels wide, upright."""
+    dark = (torch.arange(SIDE) // 3 % 2).float()
+    return (0.3 + 0.4 * dark)[None, :, None].expand(SIDE, SIDE, 3).clone()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 2), (2, 2), (3, 7), (30, 4), (16, 16), (130, 20)])
+def test_holes_of_any_size_are_filled(size: tuple[int, int]) -> None:
+    rgb = torch.rand(*size, 3, generator=torch.Generator().manual_seed(0))
+    for number in {0, 1, rgb[..., 0].numel() // 2, rgb[..., 0].numel() - 1}:
+        known = torch.arange(rgb[..., 0].numel()).view(size) >= number
+        if bool(known.any()):
+            found = textured(torch.where(known[..., None], rgb, torch.nan), known)
+            assert torch.equal(found[known], rgb[known])
+            assert bool(((found >= 0) & (found <= 1)).all())
+
+
+def test_a_pattern_goes_on_in_phase() -> None:
+    stripes = _stripes()
+    found = textured(torch.where(_box()[..., None], torch.nan, stripes), ~_box())
+    assert float((found - stripes)[_box()].abs().mean()) < 0.1  # 0.2 without it
+
+
+def test_without_a_pattern_the_hole_is_even() -> None:
+    found = textured(
+        torch.where(_box()[..., None], torch.nan, torch.full((SIDE, SIDE, 3), 0.4)), ~_box()
+    )
+    torch.testing.assert_close(found, torch.full_like(found, 0.4))
+
+
+def test_nothing_in_the_hole_is_read() -> None:
+    rgb = torch.rand(SIDE, SIDE, 3, generator=torch.Generator().manual_seed(0))
+    other = torch.where(_box()[..., None], 0.9, rgb)
+    assert torch.equal(textured(rgb, ~_box()), textured(other, ~_box()))
+
+
+def test_another_object_beside_the_hole_is_not_copied_into_it() -> None:
+    image = torch.full((SIDE, SIDE, 3), 0.5)
+    image[16:32, 36:46] = torch.tensor([0.1, 0.1, 0.9])
+    assert float((textured(image, ~_box())[_box()] - 0.5).abs().mean()) < 0.05
+
+
+def test_shifts_out_of_the_image_or_into_the_hole_give_nothing() -> None:
+    image, known = torch.ones(3, 4, 3), torch.ones(3, 4, dtype=torch.bool)
+    known[1, 1:3] = False
+    shifts = torch.zeros(3, 4, 2, dtype=torch.long)
+    for row, column, expected in ((0, 1, 0), (-2, 0, 0), (0, -1, 1)):
+        shifts[1, 1] = torch.tensor([row, column])
+        found = shifted(image, known, shifts)
+        assert float(found[1, 1, 0]) == expected
+        assert float(found[known].abs().sum()) == 0
