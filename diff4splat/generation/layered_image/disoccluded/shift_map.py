@@ -26,7 +26,7 @@ SWEEPS = 6
 """Passes over the pixels; seams hardly move after them."""
 FAR = 1e3
 """Cost where a shift ends outside of what is known."""
-OWN_WEIGHT = 0.3
+MEANS_WEIGHT = 0.3
 SPREAD_PX = 8
 """Around a pixel: a shift is judged by a piece of what it copies, or it would copy crumbs."""
 UNSEEN = 0.03
@@ -48,7 +48,7 @@ def shift_map(
         return shifts.new_zeros(*known.shape, 2)
     source, valid = _shifted(rgb, known, shifts)
     unlike = _spread((_shifted(means, known, shifts)[0] - even).square().sum(-1))
-    cost = torch.where(valid, OWN_WEIGHT * unlike, FAR)
+    cost = torch.where(valid, MEANS_WEIGHT * unlike, FAR)
     label = _weakest_seams(torch.where(known[..., None], rgb, even), known, source, cost)
     fits = valid.gather(0, label[None])[0] & ~known
     return torch.where(fits[..., None], shifts[label], 0)
