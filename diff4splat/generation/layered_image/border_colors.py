@@ -14,13 +14,20 @@ DECAY = 5
 """Less takes over far colours, more leaves streaks (docs/log/appearance-and-depth.md)."""
 
 
-def continue_colors(rgb: Float[Tensor, "h w 3"], margin: int) -> Float[Tensor, "hs ws 3"]:
-    """The image with ``margin`` cells around it; inside it stays as it is."""
+def continue_colors(
+    rgb: Float[Tensor, "h w 3"], margin: int, static: Bool[Tensor, "h w"] | None = None
+) -> Float[Tensor, "hs ws 3"]:
+    """The image with ``margin`` cells around it; inside it stays as it is.
+
+    Only ``static`` cells of the border are continued, or all where none is.
+    """
     height, width = rgb.shape[:2]
     size = (height + 2 * margin, width + 2 * margin)
     inside = torch.zeros(size, dtype=torch.bool, device=rgb.device)
     inside[margin : margin + height, margin : margin + width] = True
     edge = _edge(height, width).to(rgb.device)
+    if static is not None and bool((edge & static).any()):
+        edge &= static
     border, outside = edge.nonzero() + margin, (~inside).nonzero()
     weights = torch.cdist(outside.to(rgb), border.to(rgb)) ** -DECAY
     colors = rgb.new_empty(*inside.shape, 3)

@@ -1,7 +1,7 @@
 """From an image, its depth and its displacement to all layers.
 
     image and maps ─ upsample ─ smooth ─ pixels ─ subpixel infill       the image shows these
-    pixels ─ disoccluded layer                                            these extend them into
+    pixels ─ disoccluded layer ─ fine border                              these extend them into
     smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving   what the image hides
                            └─ border extension ─┘  objects disocclude
 
@@ -27,6 +27,7 @@ from diff4splat.generation.layered_image.disocclusion import (
     inpaint_border,
     without_disoccluded,
 )
+from diff4splat.generation.layered_image.fine_border import fine_border
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
 from diff4splat.generation.layered_image.upsampling import upsample_maps
@@ -74,6 +75,8 @@ def build_layered_image(
     if (disoccluded := disoccluded_layer(pixels)) is not None:
         moving = _moving(maps)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
+    if border_cells:
+        hidden.append(fine_border(pixels, disoccluded))
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))

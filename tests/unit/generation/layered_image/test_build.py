@@ -44,19 +44,15 @@ def moving_block() -> Tensor:
 
 
 def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
-    pixels, infill, background, border = built().layers
-    assert [pixels.in_image, infill.in_image, background.in_image, border.in_image] == [
-        True,
-        True,
-        False,
-        False,
-    ]
+    pixels, infill, background, border, fine = built().layers
+    assert [layer.in_image for layer in built().layers] == [True, True, False, False, False]
     assert torch.equal(pixels.rgb, random_rgb(*SIZE_PX))
     assert (pixels.opacity, pixels.footprint_px) == (OPAQUE, PIXEL_FOOTPRINT_PX)
     assert pixels.pixel_index.flatten().tolist() == list(range(16 * 24))
     assert infill.depth.shape == (31, 47)
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
+    assert fine.depth.shape == (16 + 2 * 3, 24 + 2 * 3)
     assert built().visible_count == 31 * 47
 
 
@@ -105,7 +101,7 @@ def test_what_moves_takes_its_background_with_it_and_leaves_a_disoccluded_layer(
     block = wide.any(-1).any(0)
     assert bool(block[2::4, 2::4].any()), "some cells of the border extension are behind it"
     assert bool(moving.layers[0].displacement.any()) and bool(moving.layers[1].displacement.any())
-    disoccluded, background, border = moving.layers[2:]
+    disoccluded, background, border, fine = moving.layers[2:]
     shown = moving.layers[0].displacement.any(-1).any(0)
     assert disoccluded.displacement is None and bool(disoccluded.mask[shown].all())
     assert torch.equal(background.displacement, wide)
@@ -117,7 +113,7 @@ def test_what_moves_takes_its_background_with_it_and_leaves_a_disoccluded_layer(
     area[inner, inner] = grown(block)[2::4, 2::4]
     assert bool(area.any())
     assert torch.equal((border.rgb != still.layers[3].rgb).any(-1), area)
-    assert border.displacement is None
+    assert border.displacement is None and fine.displacement is None
 
 
 def test_gaussians_of_displaced_layers_move_and_no_others() -> None:
