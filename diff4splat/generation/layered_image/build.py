@@ -76,7 +76,9 @@ def build_layered_image(
         moving = _moving(maps)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
     if border_cells:
-        hidden.append(fine_border(pixels, disoccluded))
+        seen = small.rgb if maps.fine is None else maps.fine.rgb
+        texture = seen.shape != image.rgb.shape
+        hidden.append(fine_border(pixels, disoccluded, texture))
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))

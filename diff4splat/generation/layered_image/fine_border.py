@@ -16,11 +16,12 @@ from torch.nn.functional import avg_pool2d, pad
 
 from diff4splat.generation.layered_image.background_layer import BEHIND
 from diff4splat.generation.layered_image.border_colors import continue_colors
+from diff4splat.generation.layered_image.disoccluded.texture import with_detail
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 
-MAX_SIDE = 128
+MAX_SIDE = 256
 """Cells along the longer side of an image: more cost bytes and show no more."""
 MARGIN_SHARE = 1 / 8
 """Of the longer side; twice as much is no better on worlds with the usual camera paths."""
@@ -28,8 +29,14 @@ FOOTPRINT_CELLS = 0.5
 
 
 @torch.no_grad()
-def fine_border(pixels: ImageLayer, disoccluded: ImageLayer | None) -> ImageLayer:
-    """The static layer around ``pixels``; ``disoccluded`` is the one behind what moves of them."""
+def fine_border(
+    pixels: ImageLayer, disoccluded: ImageLayer | None, texture: bool = False
+) -> ImageLayer:
+    """The static layer around ``pixels``; ``disoccluded`` is the one behind what moves of them.
+
+    With ``texture`` its colours have the fine detail of the image, which photographs need to look
+    whole. In small images that costs 1.3 dB out of the frame, for which a mean is best.
+    """
     source = pixels if disoccluded is None else disoccluded
     step = _cell_px(pixels.camera.size_px)
     moving = torch.zeros_like(pixels.mask) if disoccluded is None else disoccluded.mask
@@ -40,9 +47,12 @@ def fine_border(pixels: ImageLayer, disoccluded: ImageLayer | None) -> ImageLaye
     camera = pixels.camera.resized((height, width))
     camera = camera.cropped((-margin, -margin), (height + 2 * margin, width + 2 * margin))
     outside = pad(torch.zeros_like(cells[0]), (margin,) * 4, value=1.0) > 0
+    rgb = continue_colors(cells[:3].movedim(0, -1), margin, cells[4] == 0)
+    if texture:
+        rgb = with_detail(rgb, ~outside, rgb)
     return ImageLayer(
         camera=camera,
-        rgb=continue_colors(cells[:3].movedim(0, -1), margin, cells[4] == 0),
+        rgb=rgb,
         depth=BEHIND / _replicated(cells[3], margin),
         mask=outside & is_drawable(camera),
         opacity=OPAQUE,

@@ -33,6 +33,13 @@ def textured(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[T
     if bool(known.all()):
         return rgb
     even = torch.stack([extended_evenly(channel, known) for channel in rgb.unbind(-1)], -1)
+    return with_detail(rgb, known, even)
+
+
+def with_detail(
+    rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"], even: Float[Tensor, "h w 3"]
+) -> Float[Tensor, "h w 3"]:
+    """``rgb`` where ``known``, not everywhere; else the ``even`` colours with fine detail."""
     rgb = torch.where(known[..., None], rgb, even)
     means = _means_of_known(rgb, known)
     rows, columns = _window(~known)

@@ -68,13 +68,22 @@ def test_what_moves_at_the_border_is_not_continued() -> None:
 
 @pytest.mark.parametrize(
     ("size_px", "cells"),
-    [((64, 64), (64, 64)), ((512, 384), (128, 96)), ((130, 2), (65, 1)), ((1, 1), (1, 1))],
+    [((64, 64), (64, 64)), ((512, 384), (256, 192)), ((258, 2), (129, 1)), ((1, 1), (1, 1))],
 )
 def test_large_images_have_larger_cells(size_px: tuple[int, int], cells: tuple[int, int]) -> None:
     found = fine_border(_pixels(torch.ones(size_px)), None)
     margin = math.ceil(max(cells) / 8)
     assert max(cells) <= MAX_SIDE
     assert found.mask.shape == tuple(side + 2 * margin for side in cells)
+
+
+def test_texture_goes_on_beside_the_border_and_nothing_else_changes() -> None:
+    pixels = _pixels(torch.full(SIZE_PX, 4.0))
+    plain, textured = (fine_border(pixels, None, texture) for texture in (False, True))
+    assert float(textured.rgb[textured.mask].std()) > 1.5 * float(plain.rgb[plain.mask].std())
+    assert bool(((textured.rgb >= 0) & (textured.rgb <= 1)).all())
+    assert torch.equal(textured.rgb[_inner()], plain.rgb[_inner()])
+    assert torch.equal(textured.depth, plain.depth) and torch.equal(textured.mask, plain.mask)
 
 
 @pytest.mark.parametrize("limits", FAR_RANGES)
