@@ -57,8 +57,9 @@ def shift_map(
 def candidate_shifts(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Int[Tensor, "k 2"]:
     """The shifts under which the ring around the hole differs least from the image."""
     ring = grown(~known, RING_PX) & known
-    wrong, overlap, coverage = shift_errors(rgb, known, ring)
-    usable = (overlap > 0.5) & (coverage > 0)
+    # Rounded, so that equal shifts keep their order whatever the last bits of the transforms are.
+    wrong, overlap, coverage = (each.float() for each in shift_errors(rgb, known, ring))
+    usable = (overlap > 0.5) & (coverage > 1e-6)
     if bool((usable & (coverage >= LEAST_COVERAGE)).any()):
         usable &= coverage >= LEAST_COVERAGE
     score = torch.where(usable, -(wrong + NOISE**2) / coverage.clamp_min(1e-6), -torch.inf)
