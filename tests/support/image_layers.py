@@ -43,6 +43,13 @@ def layer(depth: Tensor, **changes: object) -> ImageLayer:
     return ImageLayer(**fields | changes)
 
 
+def box_mask(side: int = 48) -> Tensor:
+    """A box of 12 × 16 pixels."""
+    mask = torch.zeros(side, side, dtype=torch.bool)
+    mask[18:30, 14:30] = True
+    return mask
+
+
 def layered(*layers: ImageLayer) -> LayeredImage:
     return LayeredImage(layers=layers)
 

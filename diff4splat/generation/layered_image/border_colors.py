@@ -12,28 +12,32 @@ from torch import Tensor
 
 DECAY = 5
 """Less takes over far colours, more leaves streaks (docs/log/appearance-and-depth.md)."""
+CHUNK = 1024
+"""Cells at a time: all at once would take 300 MB for a photograph."""
 
 
-def continue_colors(
-    rgb: Float[Tensor, "h w 3"], margin: int, static: Bool[Tensor, "h w"] | None = None
-) -> Float[Tensor, "hs ws 3"]:
-    """The image with ``margin`` cells around it; inside it stays as it is.
-
-    Only ``static`` cells of the border are continued, or all where none is.
-    """
+def continue_colors(rgb: Float[Tensor, "h w 3"], margin: int) -> Float[Tensor, "hs ws 3"]:
+    """The image with ``margin`` cells around it; inside it stays as it is."""
     height, width = rgb.shape[:2]
     size = (height + 2 * margin, width + 2 * margin)
     inside = torch.zeros(size, dtype=torch.bool, device=rgb.device)
     inside[margin : margin + height, margin : margin + width] = True
     edge = _edge(height, width).to(rgb.device)
-    if static is not None and bool((edge & static).any()):
-        edge &= static
     border, outside = edge.nonzero() + margin, (~inside).nonzero()
-    weights = torch.cdist(outside.to(rgb), border.to(rgb)) ** -DECAY
+    chunks = outside.to(rgb).split(CHUNK)
     colors = rgb.new_empty(*inside.shape, 3)
     colors[inside] = rgb.flatten(0, 1)
-    colors[~inside] = (weights @ rgb[edge]) / weights.sum(1, keepdim=True)
+    colors[~inside] = torch.cat([_mixed(chunk, border.to(rgb), rgb[edge]) for chunk in chunks])
     return colors
+
+
+def _mixed(
+    cells: Float[Tensor, "n 2"], border: Float[Tensor, "m 2"], rgb: Float[Tensor, "m 3"]
+) -> Float[Tensor, "n 3"]:
+    """Colours of ``cells`` from those of the ``border``."""
+    squared = sum((at[:, None] - to).square_() for at, to in zip(cells.mT, border.mT, strict=True))
+    weights = squared.square().mul_(squared.sqrt_()).reciprocal_()  # d^-5: half the time of pow
+    return (weights @ rgb) / weights.sum(1, keepdim=True)
 
 
 def _edge(height: int, width: int) -> Bool[Tensor, "h w"]:

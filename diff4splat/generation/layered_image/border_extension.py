@@ -53,9 +53,9 @@ def push_behind_surface(layer: ImageLayer, depth: Float[Tensor, "h w"], margin: 
     return replace(layer, depth=torch.maximum(layer.depth, farthest))
 
 
-def extended_camera(camera: Camera, margin: int) -> Camera:
-    """The input view in cells of 4 pixels, ``margin`` of them beyond each side."""
-    height, width = (side // CELL_PX for side in camera.size_px)
+def extended_camera(camera: Camera, margin: int, cell_px: int = CELL_PX) -> Camera:
+    """The input view in cells of ``cell_px`` pixels, ``margin`` of them beyond each side."""
+    height, width = (side // cell_px for side in camera.size_px)
     grid = camera.resized((height, width))
     return grid.cropped((-margin, -margin), (height + 2 * margin, width + 2 * margin))
 

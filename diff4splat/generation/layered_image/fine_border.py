@@ -10,16 +10,16 @@ has cells of 4 pixels of a smaller copy and reaches farther; this layer lies bef
 import math
 
 import torch
-from jaxtyping import Float
-from torch import Tensor
 from torch.nn.functional import avg_pool2d, pad
 
 from diff4splat.generation.layered_image.background_layer import BEHIND
 from diff4splat.generation.layered_image.border_colors import continue_colors
+from diff4splat.generation.layered_image.border_extension import extended_camera
 from diff4splat.generation.layered_image.disoccluded.texture import with_detail
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.models.ldrm.plane_prior import OPAQUE
+from diff4splat.models.ldrm.refinement.heads import replicate_border
 
 MAX_SIDE = 256
 """Cells along the longer side of an image: more cost bytes and show no more."""
@@ -39,21 +39,18 @@ def fine_border(
     """
     source = pixels if disoccluded is None else disoccluded
     step = _cell_px(pixels.camera.size_px)
-    moving = torch.zeros_like(pixels.mask) if disoccluded is None else disoccluded.mask
-    maps = torch.cat([source.rgb, (1 / source.depth)[..., None], moving[..., None]], -1)
-    cells = avg_pool2d(maps.movedim(-1, 0)[None], step)[0]
-    height, width = cells.shape[1:]
-    margin = math.ceil(MARGIN_SHARE * max(height, width))
-    camera = pixels.camera.resized((height, width))
-    camera = camera.cropped((-margin, -margin), (height + 2 * margin, width + 2 * margin))
-    outside = pad(torch.zeros_like(cells[0]), (margin,) * 4, value=1.0) > 0
-    rgb = continue_colors(cells[:3].movedim(0, -1), margin, cells[4] == 0)
+    maps = torch.cat([source.rgb, (1 / source.depth)[..., None]], -1)
+    cells = avg_pool2d(maps.movedim(-1, 0)[None], step)
+    margin = math.ceil(MARGIN_SHARE * max(cells.shape[2:]))
+    camera = extended_camera(pixels.camera, margin, step)
+    outside = pad(torch.zeros_like(cells[0, 0]), (margin,) * 4, value=1.0) > 0
+    rgb = continue_colors(cells[0, :3].movedim(0, -1), margin)
     if texture:
         rgb = with_detail(rgb, ~outside, rgb)
     return ImageLayer(
         camera=camera,
         rgb=rgb,
-        depth=BEHIND / _replicated(cells[3], margin),
+        depth=BEHIND / replicate_border(cells[:, 3:], margin)[0, 0],
         mask=outside & is_drawable(camera),
         opacity=OPAQUE,
         footprint_px=FOOTPRINT_CELLS,
@@ -65,7 +62,3 @@ def _cell_px(size_px: tuple[int, int]) -> int:
     common = math.gcd(*size_px)
     fitting = (side for side in range(1, common) if common % side == 0)
     return next((side for side in fitting if max(size_px) <= side * MAX_SIDE), common)
-
-
-def _replicated(values: Float[Tensor, "h w"], margin: int) -> Float[Tensor, "hs ws"]:
-    return pad(values[None, None], (margin,) * 4, mode="replicate")[0, 0]

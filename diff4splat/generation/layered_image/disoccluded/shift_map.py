@@ -27,8 +27,9 @@ SWEEPS = 6
 FAR = 1e3
 """Cost where a shift ends outside of what is known."""
 MEANS_WEIGHT = 0.3
+"""Of the colours around the source against the guess, beside the seams."""
 SPREAD_PX = 8
-"""Around a pixel: a shift is judged by a piece of what it copies, or it would copy crumbs."""
+"""Window around a pixel over which means are compared; pixel by pixel, labels are noise."""
 UNSEEN = 0.03
 """Squared difference from a neighbour where the shift ends outside: neither good nor bad."""
 
@@ -46,10 +47,12 @@ def shift_map(
     shifts = candidate_shifts(rgb, known)
     if bool(known.all()) or not len(shifts):
         return shifts.new_zeros(*known.shape, 2)
-    source, valid = _shifted(rgb, known, shifts)
-    unlike = _spread((_shifted(means, known, shifts)[0] - even).square().sum(-1))
+    everywhere = shifts[:, None, None].expand(-1, *known.shape, -1)
+    rows, columns, valid = source_pixels(known, everywhere)
+    unlike = _spread((means[rows, columns] - even).square().sum(-1))
     cost = torch.where(valid, MEANS_WEIGHT * unlike, FAR)
-    label = _weakest_seams(torch.where(known[..., None], rgb, even), known, source, cost)
+    start = torch.where(known[..., None], rgb, even)
+    label = _weakest_seams(start, known, rgb[rows, columns], cost)
     fits = valid.gather(0, label[None])[0] & ~known
     return torch.where(fits[..., None], shifts[label], 0)
 
@@ -97,16 +100,16 @@ def _correlation(left: Float[Tensor, "h w"], right: Float[Tensor, "h w"]) -> Flo
     return values.roll([side - 1 for side in left.shape], (0, 1))
 
 
-def _shifted(
-    rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"], shifts: Int[Tensor, "k 2"]
-) -> tuple[Float[Tensor, "k h w 3"], Bool[Tensor, "k h w"]]:
-    """Per shift, the colours at its end, and where they are known."""
-    (height, width), device = known.shape, rgb.device
-    rows = (torch.arange(height, device=device) + shifts[:, :1])[:, :, None]
-    columns = (torch.arange(width, device=device) + shifts[:, 1:])[:, None]
+def source_pixels(
+    known: Bool[Tensor, "h w"], shifts: Int[Tensor, "*k h w 2"]
+) -> tuple[Int[Tensor, "*k h w"], Int[Tensor, "*k h w"], Bool[Tensor, "*k h w"]]:
+    """Row and column at the end of every shift, within the image, and whether it is known there."""
+    height, width = known.shape
+    rows = torch.arange(height, device=known.device)[:, None] + shifts[..., 0]
+    columns = torch.arange(width, device=known.device) + shifts[..., 1]
     inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    at = rows.clamp(0, height - 1), columns.clamp(0, width - 1)
-    return rgb[at], known[at] & inside
+    rows, columns = rows.clamp(0, height - 1), columns.clamp(0, width - 1)
+    return rows, columns, inside & known[rows, columns]
 
 
 def _spread(cost: Float[Tensor, "k h w"]) -> Float[Tensor, "k h w"]:

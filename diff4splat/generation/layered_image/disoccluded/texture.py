@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d, interpolate
 
 from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
-from diff4splat.generation.layered_image.disoccluded.shift_map import shift_map
+from diff4splat.generation.layered_image.disoccluded.shift_map import shift_map, source_pixels
 from diff4splat.generation.layered_image.disocclusion import grown
 
 DETAIL_SHARE = 1 / 16
@@ -43,8 +43,7 @@ def with_detail(
     rgb = torch.where(known[..., None], rgb, even)
     means = _means_of_known(rgb, known)
     rows, columns = _window(~known)
-    detail = torch.where(known[..., None], rgb - means, 0.0)
-    detail = _bounded(detail, known)
+    detail = _bounded(torch.where(known[..., None], rgb - means, 0.0), known)
     shifts = _shifts(*(image[rows, columns] for image in (rgb, even, means, known)))
     result = even.clone()
     result[rows, columns] += shifted(detail[rows, columns], known[rows, columns], shifts)
@@ -68,12 +67,8 @@ def shifted(
     image: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"], shifts: Int[Tensor, "h w 2"]
 ) -> Float[Tensor, "h w 3"]:
     """At unknown pixels the known one that lies ``shifts`` (rows, columns) away; else zero."""
-    height, width = known.shape
-    rows = torch.arange(height, device=image.device)[:, None] + shifts[..., 0]
-    columns = torch.arange(width, device=image.device) + shifts[..., 1]
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    source = rows.clamp(0, height - 1), columns.clamp(0, width - 1)
-    return torch.where((inside & known[source] & ~known)[..., None], image[source], 0.0)
+    rows, columns, valid = source_pixels(known, shifts)
+    return torch.where((valid & ~known)[..., None], image[rows, columns], 0.0)
 
 
 def _bounded(detail: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:

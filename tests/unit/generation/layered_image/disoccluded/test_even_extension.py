@@ -1,25 +1,19 @@
 """A smooth surface goes on through a hole and stays within the known values."""
 
 import torch
-from torch import Tensor
+from image_layers import box_mask
 
 from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
 
 SIDE = 48
 
 
-def _box() -> Tensor:
-    mask = torch.zeros(SIDE, SIDE, dtype=torch.bool)
-    mask[18:30, 14:30] = True
-    return mask
-
-
 def test_a_plane_goes_on_through_a_hole() -> None:
     rows = torch.arange(SIDE, dtype=torch.float64)
     plane = (0.1 + 0.01 * rows)[:, None] + 0.002 * rows
-    found = extended_evenly(torch.where(_box(), 9.0, plane), ~_box())
-    assert torch.equal(found[~_box()], plane[~_box()])
-    assert float((found - plane)[_box()].abs().max()) < 0.015
+    found = extended_evenly(torch.where(box_mask(), 9.0, plane), ~box_mask())
+    assert torch.equal(found[~box_mask()], plane[~box_mask()])
+    assert float((found - plane)[box_mask()].abs().max()) < 0.015
 
 
 def test_extension_stays_within_the_known_values() -> None:

@@ -51,6 +51,22 @@ def test_the_period_of_a_pattern_is_the_first_candidate() -> None:
         assert not bool((shift % 8).any())
 
 
+def test_shifts_point_to_where_the_hole_is_shown_again() -> None:
+    left = _rgb(20, 20)
+    rgb, known = torch.cat([left, left], 1), torch.ones(20, 40, dtype=torch.bool)
+    known[6:14, 6:14] = False
+    assert candidate_shifts(rgb, known)[0].tolist() == [0, 20]
+    shifts = shift_map(rgb, rgb, rgb, known)[~known]
+    assert torch.equal(shifts, torch.tensor([0, 20]).expand_as(shifts))
+
+
+def test_last_bits_do_not_change_the_order_of_shifts() -> None:
+    """Transforms may round otherwise from run to run."""
+    rgb, hole = _rgb(8, 8).double().repeat(4, 4, 1), _hole(32, 32)
+    noise = 1e-13 * torch.rand(rgb.shape, dtype=rgb.dtype)
+    assert torch.equal(candidate_shifts(rgb, ~hole), candidate_shifts(rgb + noise, ~hole))
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1), (9, 12), (40, 33)])
 def test_every_shift_ends_at_a_known_pixel(size: tuple[int, int]) -> None:
     generator = torch.Generator().manual_seed(1)

@@ -2,17 +2,12 @@
 
 import pytest
 import torch
+from image_layers import box_mask
 from torch import Tensor
 
 from diff4splat.generation.layered_image.disoccluded.texture import shifted, textured
 
 SIDE = 48
-
-
-def _box() -> Tensor:
-    mask = torch.zeros(SIDE, SIDE, dtype=torch.bool)
-    mask[18:30, 14:30] = True
-    return mask
 
 
 def _stripes() -> Tensor:
@@ -34,27 +29,27 @@ def test_holes_of_any_size_are_filled(size: tuple[int, int]) -> None:
 
 def test_a_pattern_goes_on_in_phase() -> None:
     stripes = _stripes()
-    found = textured(torch.where(_box()[..., None], torch.nan, stripes), ~_box())
-    assert float((found - stripes)[_box()].abs().mean()) < 0.1  # 0.2 without it
+    found = textured(torch.where(box_mask()[..., None], torch.nan, stripes), ~box_mask())
+    assert float((found - stripes)[box_mask()].abs().mean()) < 0.1  # 0.2 without it
 
 
 def test_without_a_pattern_the_hole_is_even() -> None:
     found = textured(
-        torch.where(_box()[..., None], torch.nan, torch.full((SIDE, SIDE, 3), 0.4)), ~_box()
+        torch.where(box_mask()[..., None], torch.nan, torch.full((SIDE, SIDE, 3), 0.4)), ~box_mask()
     )
     torch.testing.assert_close(found, torch.full_like(found, 0.4))
 
 
 def test_nothing_in_the_hole_is_read() -> None:
     rgb = torch.rand(SIDE, SIDE, 3, generator=torch.Generator().manual_seed(0))
-    other = torch.where(_box()[..., None], 0.9, rgb)
-    assert torch.equal(textured(rgb, ~_box()), textured(other, ~_box()))
+    other = torch.where(box_mask()[..., None], 0.9, rgb)
+    assert torch.equal(textured(rgb, ~box_mask()), textured(other, ~box_mask()))
 
 
 def test_another_object_beside_the_hole_is_not_copied_into_it() -> None:
     image = torch.full((SIDE, SIDE, 3), 0.5)
     image[16:32, 36:46] = torch.tensor([0.1, 0.1, 0.9])
-    assert float((textured(image, ~_box())[_box()] - 0.5).abs().mean()) < 0.05
+    assert float((textured(image, ~box_mask())[box_mask()] - 0.5).abs().mean()) < 0.05
 
 
 def test_shifts_out_of_the_image_or_into_the_hole_give_nothing() -> None:
