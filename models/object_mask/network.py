@@ -3,8 +3,11 @@
 Axes: ``b`` images, ``r`` prompts of an image, ``h w`` pixels, ``c`` channels, ``q`` queries. Image
 and prompt meet in a product of vectors, so one pass over an image serves many prompts:
 
-    image ─ image U-Net ─ embedding ─┐
-    prompt ─ text queries ───────────┴ · ─ logits
+    image ─ image U-Net ─ features ─ embedding ─┐
+    prompt ─ text queries ──────────────────────┴ · ─ logits
+
+The embedding of a pixel is linear in the features of its cell of two pixels, so queries are taken
+through its weights instead, and vectors of pixels are never stored.
 """
 
 import math
@@ -47,30 +50,38 @@ class ObjectMaskNet(ImageUNet):
         text_mask: Bool[Tensor, "b s"] | None = None,
     ) -> Float[Tensor, "b h w"]:
         """Logits of one prompt per image; ``image`` is RGB in [0, 1], its sides multiples of 16."""
-        return self.logits(self.embed(image), text_tokens(text, text_mask))[:, 0]
-
-    def embed(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h w"]:
-        """A vector for every pixel, without a prompt."""
-        return torch.nn.functional.pixel_shuffle(self.embedding(self.features(image)), FOLDED_PX)
+        return self.logits(self.features(image), text_tokens(text, text_mask))[:, 0]
 
     def name_logits(
-        self, embedding: Float[Tensor, "b c h w"]
-    ) -> tuple[Float[Tensor, "b n h w"], Float[Tensor, "b k h w"]]:
-        """Of the nouns and colours of what pixels show; the first of each is none of them.
+        self, features: Float[Tensor, "b c h2 w2"]
+    ) -> tuple[Float[Tensor, "b n h2 w2"], Float[Tensor, "b k h2 w2"]]:
+        """Of the noun and colour of every cell's first pixel; the first of each is none of them.
 
         For training alone: vectors that tell names apart are easily asked for by name.
         """
+        weight, bias = self._pixel_embedding()
+        embedding = torch.nn.functional.conv2d(features, weight[:, 0, :, None, None], bias[:, 0])
         return self.names(embedding).split([len(NOUNS) + 1, len(COLOR_NAMES) + 1], 1)
 
     def logits(
-        self, embedding: Float[Tensor, "b c h w"], text: TextTokens
+        self, features: Float[Tensor, "b c h2 w2"], text: TextTokens
     ) -> Float[Tensor, "b r h w"]:
         """Of the prompts of every image; those of one image follow each other in ``text``."""
         queries, biases = self.queries(text)
-        queries = queries.unflatten(0, (len(embedding), -1)) / math.sqrt(self.embedding_width)
-        biases = biases.unflatten(0, (len(embedding), -1))[..., None, None]
-        found = torch.einsum("brqc,bchw->brqhw", queries, embedding) + biases
-        return torch.logsumexp(found, 2) + START_LOGIT
+        queries = queries.unflatten(0, (len(features), -1)) / math.sqrt(self.embedding_width)
+        biases = biases.unflatten(0, (len(features), -1))
+        weight, bias = self._pixel_embedding()
+        of_features = torch.einsum("brqe,epc->brqpc", queries, weight)
+        constant = torch.einsum("brqe,ep->brqp", queries, bias) + biases[..., None]
+        found = torch.einsum("brqpc,bchw->brqphw", of_features, features)
+        found = torch.logsumexp(found + constant[..., None, None], 2) + START_LOGIT
+        return torch.nn.functional.pixel_shuffle(found, FOLDED_PX)[:, :, 0]
+
+    def _pixel_embedding(self) -> tuple[Float[Tensor, "e p c"], Float[Tensor, "e p"]]:
+        """Weight and bias of every pixel ``p`` of a cell."""
+        shape = (self.embedding_width, FOLDED_PX**2)
+        weight, bias = self.embedding.weight, self.embedding.bias
+        return weight.unflatten(0, shape)[..., 0, 0], bias.unflatten(0, shape)
 
 
 def _blocks(channels: int, count: int) -> nn.Sequential:

@@ -1,18 +1,12 @@
-"""Samples of the object mask: any frame of a clip, a random part of it, and prompts for it.
+"""Samples of the object mask: an image, some objects of it pasted or repainted, and prompts."""
 
-Axes: ``h w`` pixels.
-"""
-
-import cv2
-import numpy as np
 import torch
-from jaxtyping import UInt8
-from torch import Tensor
 
-from diff4splat.data.clip import Clip
-from diff4splat.errors import InputError
 from diff4splat.training.batches.requests.image_requests import draw_image_requests
-from diff4splat.training.batches.requests.present import name_maps, named_objects
+from diff4splat.training.batches.requests.object_image import ObjectImage, random_object_image
+from diff4splat.training.batches.requests.paste import paste
+from diff4splat.training.batches.requests.present import name_maps
+from diff4splat.training.batches.requests.repaint import repaint
 from diff4splat.training.batches.requests.request_batch import RequestBatch, collate_requests
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.recipe.stage import StageRecipe
@@ -20,8 +14,10 @@ from diff4splat.training.stage import SampleKey
 
 REQUESTS = 5
 """Prompts per image: they cost little beside the image."""
-WHOLE_SHARE, LEAST_PART = 0.5, 0.55
-"""Share of images that are shown whole; least side of a part, as a share of the image's."""
+PASTED_SHARE = 0.4
+"""Share of images with an object of another image."""
+OTHERS = 1_000
+"""The other image is one of so many that follow."""
 
 
 class RequestSamples:
@@ -45,51 +41,32 @@ class RequestSamples:
         Raises:
             Diff4SplatError: the clip cannot be used; another index may do.
         """
-        clip, source = self.clips.clip(sample_index)
         key = SampleKey(self.clips.seed, self.recipe.name, sample_index, "requests")
         generator = key.generator()
-        image, instances = _random_part(clip, self.recipe.data.size_px, generator)
-        objects = named_objects(clip.note, instances)
-        empty = torch.zeros(instances.shape, dtype=torch.bool)
-        requests = draw_image_requests(objects, empty, REQUESTS, generator)
-        nouns, colors = name_maps(objects, empty)
+        seen, source = self._image(sample_index, generator)
+        if float(torch.rand((), generator=generator)) < PASTED_SHARE:
+            offset = 1 + int(torch.randint(OTHERS, (), generator=generator))
+            other, _ = self._image(sample_index + offset, generator)
+            seen = paste(seen, other, generator)
+        seen = repaint(seen, generator)
+        empty = torch.zeros(seen.image.shape[:2], dtype=torch.bool)
+        requests = draw_image_requests(seen.objects, empty, REQUESTS, generator)
+        nouns, colors = name_maps(seen.objects, empty)
         return RequestBatch(
             sample_index=torch.tensor([sample_index]),
             source=(source,),
-            images=image[None],
+            images=seen.image[None],
             masks=torch.stack([request.mask for request in requests])[None],
             nouns=nouns[None],
             colors=colors[None],
             captions=tuple(request.caption for request in requests),
         )
 
+    def _image(self, index: int, generator: torch.Generator) -> tuple[ObjectImage, str]:
+        """A random image of a clip, and the name of the clip's source."""
+        clip, source = self.clips.clip(index)
+        return random_object_image(clip, self.recipe.data.size_px, generator), source
+
     def collate(self, samples: list[RequestBatch]) -> RequestBatch:
         """Samples as one batch."""
         return collate_requests(samples)
-
-
-def _random_part(
-    clip: Clip, size_px: tuple[int, int], generator: torch.Generator
-) -> tuple[UInt8[Tensor, "h w 3"], UInt8[Tensor, "h w"]]:
-    """A part of some frame, mirrored half of the time, with its instances."""
-    view = clip.views[int(torch.randint(len(clip.views), (), generator=generator))]
-    if view.instances is None:
-        raise InputError(
-            f"clip {clip.note.identifier}: expected masks of objects, got none; "
-            "leave the source out"
-        )
-    frame = int(torch.randint(clip.frames, (), generator=generator))
-    mirror, whole, share, top, left = torch.rand(5, generator=generator).tolist()
-    share = 1.0 if whole < WHOLE_SHARE else LEAST_PART + (1 - LEAST_PART) * share
-    height, width = (round(share * side) for side in clip.size_px)
-    top, left = round(top * (clip.size_px[0] - height)), round(left * (clip.size_px[1] - width))
-    window = slice(top, top + height), slice(left, left + width)
-    maps = [view.rgb[frame][window].numpy(), view.instances[frame][window].numpy()]
-    if mirror < 0.5:
-        maps = [np.ascontiguousarray(one[:, ::-1]) for one in maps]
-    kinds = (cv2.INTER_AREA if height > size_px[0] else cv2.INTER_CUBIC, cv2.INTER_NEAREST)
-    rgb, instances = (
-        cv2.resize(one, size_px[::-1], interpolation=kind)
-        for one, kind in zip(maps, kinds, strict=True)
-    )
-    return torch.from_numpy(rgb), torch.from_numpy(instances)

@@ -1,9 +1,9 @@
 """The object mask: the pixels that prompts ask to move, many prompts for every image.
 
-    images, with random light ─ object mask ─ embedding ─┐
-    captions ─ text encoder (frozen) ─ queries ──────────┴ logits ─ cross-entropy, overlap
+    images, with random light ─ object mask ─ features ─┐
+    captions ─ text encoder (frozen) ─ queries ─────────┴ logits ─ cross-entropy, overlap
 
-The embedding alone also gives noun and colour of every pixel. Captions name every object of an
+The features alone also give noun and colour of every pixel. Captions name every object of an
 image in turn, some that it does not show, and none.
 """
 
@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.image_unet.network import FOLDED_PX
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.coarse_images import coarse
@@ -25,8 +26,6 @@ from diff4splat.training.stages.text_conditioning import TextConditioning
 LOG_GAMMA, LOG_GAIN, LOG_BALANCE, NOISE = 0.3, 0.2, 0.06, 0.03
 """Half the ranges of gamma, gain and white balance, as logarithms; largest deviation of noise.
 Small enough that colours keep their names."""
-NAME_STRIDE = 2
-"""Pixels from one whose name is learnt to the next: neighbours say the same."""
 
 
 class ObjectMaskStage(ModelStage):
@@ -42,12 +41,12 @@ class ObjectMaskStage(ModelStage):
         """The terms ``cross_entropy``, ``dice`` and ``names``."""
         losses = self.plan.recipe.losses
         rgb = self._random_light(self._random_sharpness(batch), batch)
-        embedding = self.object_mask.embed(rgb)
-        logits = self.object_mask.logits(embedding, self._tokens(batch))
+        features = self.object_mask.features(rgb)
+        logits = self.object_mask.logits(features, self._tokens(batch))
         errors = {
             "cross_entropy": lambda: cross_entropy(logits, batch.masks),
             "dice": lambda: dice_error(logits, batch.masks),
-            "names": lambda: self._name_error(embedding, batch),
+            "names": lambda: self._name_error(features, batch),
         }
         return weighted_sum(
             [
@@ -84,20 +83,19 @@ class ObjectMaskStage(ModelStage):
     def _logits(
         self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
     ) -> Float[Tensor, "b r h w"]:
-        return self.object_mask.logits(self.object_mask.embed(rgb), self._tokens(batch))
+        return self.object_mask.logits(self.object_mask.features(rgb), self._tokens(batch))
 
     def _tokens(self, batch: RequestBatch) -> TextTokens:
         return text_tokens(*self._text.encode(batch, training=False))
 
     def _name_error(
-        self, embedding: Float[Tensor, "b c h w"], batch: RequestBatch
+        self, features: Float[Tensor, "b c h2 w2"], batch: RequestBatch
     ) -> Float[Tensor, " b"]:
-        """Of noun and colour."""
-        sparse = embedding[:, :, ::NAME_STRIDE, ::NAME_STRIDE]
+        """Of noun and colour, one pixel of every cell: neighbours say the same."""
         truth = (batch.nouns, batch.colors)
         return sum(
-            name_error(found, names[:, ::NAME_STRIDE, ::NAME_STRIDE].long())
-            for found, names in zip(self.object_mask.name_logits(sparse), truth, strict=True)
+            name_error(found, names[:, ::FOLDED_PX, ::FOLDED_PX].long())
+            for found, names in zip(self.object_mask.name_logits(features), truth, strict=True)
         )
 
     def _random_sharpness(self, batch: RequestBatch) -> Float[Tensor, "b 3 h w"]:

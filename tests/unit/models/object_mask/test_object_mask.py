@@ -5,6 +5,7 @@ import torch
 from oracles_models import randomised
 from torch import Tensor
 
+from diff4splat.models.image_unet.network import FOLDED_PX
 from diff4splat.models.motion_unet.text_tokens import text_tokens
 from diff4splat.models.object_mask.network import START_LOGIT, ObjectMaskNet
 from diff4splat.models.object_mask.text_queries import QUERIES
@@ -29,7 +30,7 @@ def text(count: int = 2, tokens: int = 7) -> Tensor:
 
 def test_prompts_of_one_image_do_not_touch_each_other() -> None:
     net, images, texts = network(), image(), text(6)
-    together = net.logits(net.embed(images), text_tokens(texts, None))
+    together = net.logits(net.features(images), text_tokens(texts, None))
     assert together.shape == (2, 3, 32, 16)
     for index in range(6):
         own = net(images[index // 3][None], texts[index][None])
@@ -39,7 +40,9 @@ def test_prompts_of_one_image_do_not_touch_each_other() -> None:
 @torch.no_grad()
 def test_logits_are_products_of_queries_and_embedding() -> None:
     net, images, texts = network(), image(1), text(1)
-    embedding, (queries, biases) = net.embed(images), net.queries(text_tokens(texts, None))
+    shuffled = torch.nn.functional.pixel_shuffle
+    embedding = shuffled(net.embedding(net.features(images)), FOLDED_PX)
+    queries, biases = net.queries(text_tokens(texts, None))
     scale = net.embedding_width**0.5
     row, column = 17, 5
     products = [
@@ -48,6 +51,15 @@ def test_logits_are_products_of_queries_and_embedding() -> None:
     ]
     expected = torch.tensor(products).double().exp().sum().log() + START_LOGIT
     assert float(net(images, texts)[0, row, column]) == pytest.approx(float(expected), abs=1e-5)
+
+
+@torch.no_grad()
+def test_names_are_read_from_the_first_pixel_of_every_cell() -> None:
+    net, images = network(), image(1)
+    features = net.features(images)
+    embedding = torch.nn.functional.pixel_shuffle(net.embedding(features), FOLDED_PX)
+    expected = net.names(embedding[:, :, ::FOLDED_PX, ::FOLDED_PX])
+    torch.testing.assert_close(torch.cat(net.name_logits(features), 1), expected)
 
 
 def test_padding_changes_nothing() -> None:
