@@ -5,6 +5,7 @@ and the part alone: not on the caller's random state, nor on which other parts a
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -143,6 +144,7 @@ class _NoInitialValues(TorchFunctionMode):
         return func(*args, **kwargs)
 
 
+@cache
 def parameter_counts(config: ModelConfig) -> Mapping[str, int]:
     """Trainable weights per part, counted without allocating anything."""
     parts = create_networks(config, "meta").parts()

@@ -18,6 +18,9 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError
 
+MOST_DRAWS = 1 << 20
+"""Values drawn at a time: all at once would take too much memory."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
@@ -59,10 +62,11 @@ def bootstrap_interval(
 
 def _resampled_means(values: Tensor, resamples: int, seed: int) -> Tensor:
     generator = torch.Generator().manual_seed(seed)
-    count = len(values)
-    # One at a time: all at once would take resamples times the memory.
-    draws = (torch.randint(count, (count,), generator=generator) for _ in range(resamples))
-    return torch.stack([values[draw].mean() for draw in draws])
+    rows = max(MOST_DRAWS // len(values), 1)
+    counts = [min(rows, resamples - first) for first in range(0, resamples, rows)]
+    shapes = [(count, len(values)) for count in counts]
+    draws = (torch.randint(len(values), shape, generator=generator) for shape in shapes)
+    return torch.cat([values[draw].mean(1) for draw in draws])
 
 
 def _accelerated_quantiles(values: Tensor, means: Tensor, level: float) -> tuple[float, float]:

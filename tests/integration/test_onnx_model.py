@@ -7,6 +7,7 @@ errors.
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
 
@@ -21,6 +22,8 @@ from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.io.scene_files.scene_file import load_scene
 from diff4splat.metrics.image import psnr
+from diff4splat.models.config.sizes import test_size
+from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
 from diff4splat.models.onnx.graph import OnnxModel
 from diff4splat.models.onnx.manifest import MANIFEST_FILE, read_manifest
@@ -42,8 +45,13 @@ def _as_shipped(module_as_shipped: None) -> None:
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
-    """The ``test`` size with noise on all weights."""
-    noisy = load_model("test")
+    """The ``test`` size, with noise on all weights.
+
+    Of equal blocks one is enough: tracing takes most of the time.
+    """
+    config = test_size()
+    config = replace(config, dit=replace(config.dit, blocks=1), ldrm=replace(config.ldrm, blocks=1))
+    noisy = Model(config=config, networks=create_networks(config))
     generator = torch.Generator().manual_seed(1)
     with torch.no_grad():
         for _, part in noisy.networks.parts():

@@ -41,6 +41,10 @@ SHORT_STEPS = {
 More remains when cameras are exchanged, when motion is not rendered or when the noise is not that
 of the target.
 """
+SHORT_STAGES = [
+    pytest.param(name, marks=pytest.mark.slow) if name == "dynamic" else name for name in STAGES
+]
+"""``joint`` renders motion as well."""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 
@@ -97,7 +101,7 @@ def remaining(losses: list[float], last: int) -> float:
 
 
 @pytest.mark.usefixtures("as_shipped")
-@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("name", SHORT_STAGES)
 def test_the_loss_of_one_clip_falls(name: str, tmp_path: Path) -> None:
     steps, limit = SHORT_STEPS[name]
     losses = overfit(name, steps, tmp_path)

@@ -1,8 +1,6 @@
 """Clips whose every number is exact: what cameras see of the world of ``oracles_clip_world``."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 import torch
@@ -132,25 +130,20 @@ def _tensors(**arrays: np.ndarray) -> dict[str, torch.Tensor]:
     return {name: torch.from_numpy(array) for name, array in arrays.items()}
 
 
-def _pixels(hits: list[list[Hits]]) -> Iterator[tuple[int, int, int, int]]:
-    """(view, frame, row, column) of everything that is not sky."""
-    for view, frame in product(range(len(hits)), range(len(hits[0]))):
-        for row, column in np.argwhere(hits[view][frame].which >= 0):
-            yield view, frame, int(row), int(column)
-
-
 def _choose_points(hits: list[list[Hits]], count: int, rng: np.random.Generator) -> _Points:
     """Random pixel centres, from each object in turn as long as any are left."""
-    pixels = list(_pixels(hits))
-    rng.shuffle(pixels)
-    which = np.array([hits[v][f].which[r, c] for v, f, r, c in pixels])
+    which = np.stack([[one.which for one in view] for view in hits])
+    local = np.stack([[one.local for one in view] for view in hits])
+    pixels = np.argwhere(which >= 0)
+    order = np.arange(len(pixels))
+    rng.shuffle(order)
+    pixels = pixels[order]
+    which, local = (values[tuple(pixels.T)] for values in (which, local))
     rank = np.zeros(len(pixels), int)
     for index in range(len(KINDS)):
         rank[which == index] = np.arange((which == index).sum())
     chosen = np.argsort(rank, kind="stable")[:count]
-    local = [hits[v][f].local[r, c] for v, f, r, c in (pixels[index] for index in chosen)]
-    found_at = np.array([pixels[index][:2] for index in chosen], np.int64).reshape(-1, 2)
-    return _Points(which[chosen], np.array(local).reshape(-1, 3), found_at)
+    return _Points(which[chosen], local[chosen].reshape(-1, 3), pixels[chosen, :2])
 
 
 def _make_tracks(points: _Points, world: np.ndarray) -> Tracks:
