@@ -58,6 +58,16 @@ def stages_before(
     }
 
 
+def parts_left_random(
+    stage: StageRecipe, sources: Mapping[str, StageRecipe], start: Model | None
+) -> list[str]:
+    """Parts whose weights in ``start`` are not used, because they are not trained to the end."""
+    if start is None or start.folder is None:
+        return []
+    unready = [part for part in stage.trained if part not in start.trained and part not in sources]
+    return [part for part in unready if part_file(start.folder, part).is_file()]
+
+
 def require_prerequisites(
     recipe: Recipe, sources: Mapping[str, StageRecipe], folder: Path, ignore_gates: bool
 ) -> None:

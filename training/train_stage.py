@@ -25,6 +25,7 @@ from diff4splat.training.prerequisites import (
     continued_stage,
     kept_parts,
     last_checkpoint,
+    parts_left_random,
     require_prerequisites,
     sharded_networks,
     stages_before,
@@ -77,9 +78,8 @@ def train_stage(request: StageRequest) -> StageResult:
     recipe, stage_recipe = request.recipe, request.recipe.stage(request.stage)
     sources = stages_before(recipe, stage_recipe, request.folder, request.start)
     require_prerequisites(recipe, sources, request.folder, request.ignore_gates)
-    if recipe.removed_stages and is_main_process():
-        removed = ", ".join(recipe.removed_stages)
-        request.note(f"stages {removed} are left out: their kinds no longer exist")
+    if is_main_process():
+        _note_start(request, stage_recipe)
     samples = open_samples(stage_recipe, recipe.seed)
     networks, fill = _networks(request, stage_recipe)
     plan = StagePlan(
@@ -97,6 +97,21 @@ def train_stage(request: StageRequest) -> StageResult:
     if is_main_process():
         _hand_over(request, stage_recipe, samples)
     return result
+
+
+def _note_start(request: StageRequest, stage: StageRecipe) -> None:
+    """What a user might not expect of the recipe and of the first weights."""
+    recipe, start = request.recipe, request.start
+    if recipe.removed_stages:
+        removed = ", ".join(recipe.removed_stages)
+        request.note(f"stages {removed} are left out: their kinds no longer exist")
+    if (request.folder / stage.name / RECIPE_FILE).exists():
+        return
+    sources = stages_before(recipe, stage, request.folder, start)
+    for part in parts_left_random(stage, sources, start):
+        request.note(
+            f"{part} begins with random weights: those in {start.folder} are not trained to the end"
+        )
 
 
 def _networks(

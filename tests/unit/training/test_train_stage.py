@@ -246,3 +246,26 @@ def test_only_the_first_process_hands_over(monkeypatch: pytest.MonkeyPatch) -> N
     assert is_main_process()
     monkeypatch.setenv("RANK", "1")
     assert not is_main_process()
+
+
+def test_weights_that_are_not_trained_to_the_end_are_named(course: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "model"
+    shutil.copytree(course.folder / MODEL_FOLDER, folder)
+    file = folder / "provenance.json"
+    known = json.loads(file.read_text())
+    known["trained"] = [part for part in known["trained"] if part != "vae"]
+    file.write_text(json.dumps(known))
+    notes: list[str] = []
+    asked = StageRequest(
+        recipe=course.recipe,
+        stage="vae",
+        folder=tmp_path / "run",
+        start=load_model(folder, parts=()),
+        stop_after_steps=1,
+        note=notes.append,
+    )
+    train_stage(asked)
+    told = f"vae begins with random weights: those in {folder} are not trained to the end"
+    assert notes.count(told) == 1
+    train_stage(asked)
+    assert notes.count(told) == 1
