@@ -134,11 +134,20 @@ class MotionUNet(nn.Module):
         middle = self.middle_out(middle + _upsample(self.up_2(coarse)), condition)
         return self.fine_out(fine + _upsample(self.up_1(middle)), condition)
 
-    def text_condition(
-        self, text: Float[Tensor, "b s e"], text_mask: Bool[Tensor, "b s"] | None = None
-    ) -> Float[Tensor, "b d"]:
-        """What the text adds to the condition of every block."""
-        return self._text_condition(self._adapt(text_tokens(text, text_mask)))
+    def text_readings(
+        self,
+        text: Float[Tensor, "b s e"],
+        text_mask: Bool[Tensor, "b s"] | None,
+        generator: torch.Generator,
+    ) -> list[Float[Tensor, "b r"]]:
+        """All that a text adds: to the condition of every block, and to random features.
+
+        For training alone: texts of one meaning should add the same to any image.
+        """
+        tokens = self._adapt(text_tokens(text, text_mask))
+        levels = (self.fine, self.middle, self.coarse)
+        of_features = [level.text_attention.added_to_random(tokens, generator) for level in levels]
+        return [self._text_condition(tokens), *of_features]
 
     def _text_condition(self, tokens: TextTokens | None) -> Float[Tensor, "*b d"]:
         null = self.null_text_embedding

@@ -8,7 +8,7 @@ from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.random_draws import draw
 from diff4splat.captions.requests import caption_of_object, plain_caption
-from diff4splat.training.batches.requests.displacement import draw_direction
+from diff4splat.captions.vocabulary import DIRECTIONS
 from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
 
@@ -25,7 +25,7 @@ class SentencePair:
 def draw_sentence_pair(generator: torch.Generator) -> SentencePair:
     """An object and a side at random; no image is needed."""
     named = NamedObject(draw(COLOR_NAMES, generator), draw(TRAINING_NOUNS, generator))
-    direction = draw_direction(generator)
+    direction = draw(tuple(DIRECTIONS), generator)
     return SentencePair(
         plain=plain_caption(named, direction),
         free=caption_of_object([named], 0, direction, generator),

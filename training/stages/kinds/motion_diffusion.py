@@ -89,11 +89,17 @@ class MotionDiffusionStage(ModelStage):
                 LossTerm(
                     name="paraphrase",
                     weight=losses.paraphrase,
-                    compute=lambda: paraphrase_error(
-                        self.motion_unet, self._text, self.random.per_sample(batch, "sentences")
-                    ),
+                    compute=lambda: self._paraphrase_error(batch),
                 ),
             ]
+        )
+
+    def _paraphrase_error(self, batch: ClipBatch) -> Float[Tensor, " b"]:
+        return paraphrase_error(
+            self.motion_unet,
+            self._text,
+            self.random.per_sample(batch, "sentences"),
+            self.random.per_step(batch, "features"),
         )
 
     def _enlarged(self, batch: ClipBatch) -> ClipBatch:

@@ -31,12 +31,13 @@ class Reader(nn.Module):
         self.weight, self.reads = nn.Parameter(torch.ones(3)), reads
         self.learning: list[bool] = []
 
-    def text_condition(self, text: Tensor, mask: Tensor) -> Tensor:
-        """Width 3."""
+    def text_readings(self, text: Tensor, mask: Tensor, features: torch.Generator) -> list[Tensor]:
+        """A reading of width 3, and the same by random features of width 2."""
         assert text.shape[:2] == mask.shape
         self.learning.append(torch.is_grad_enabled())
         said = text.sum((1, 2)) if self.reads else text.new_ones(len(text))
-        return said[:, None] * self.weight
+        random = torch.rand(2, generator=features).to(said)
+        return [said[:, None] * self.weight, said[:, None] * self.weight[:2] * random]
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +51,13 @@ def generators(*seeds: int) -> list[torch.Generator]:
 
 
 def test_a_network_that_does_not_read_has_no_error(text: TextConditioning) -> None:
-    error = paraphrase_error(Reader(reads=False), text, generators(0, 1))
+    error = paraphrase_error(Reader(reads=False), text, generators(0, 1), *generators(9))
     assert error.shape == (2,) and not bool(error.any())
 
 
 def test_only_free_sentences_teach(text: TextConditioning) -> None:
     network = Reader(reads=True)
-    error = paraphrase_error(network, text, generators(0, 1))
+    error = paraphrase_error(network, text, generators(0, 1), *generators(9))
     assert bool((error > 0).all()) and network.learning == [False, True]
     error.sum().backward()
     assert bool(network.weight.grad.isfinite().all()) and bool(network.weight.grad.any())
@@ -64,21 +65,28 @@ def test_only_free_sentences_teach(text: TextConditioning) -> None:
 
 def test_a_sample_has_its_error_in_any_batch_and_at_any_scale(text: TextConditioning) -> None:
     network = Reader(reads=True)
-    both = paraphrase_error(network, text, generators(0, 1)).detach()
-    torch.testing.assert_close(paraphrase_error(network, text, generators(1)).detach(), both[1:])
+    both = paraphrase_error(network, text, generators(0, 1), *generators(9)).detach()
+    torch.testing.assert_close(
+        paraphrase_error(network, text, generators(1), *generators(9)).detach(), both[1:]
+    )
     network.weight.data *= 10
-    torch.testing.assert_close(paraphrase_error(network, text, generators(0, 1)).detach(), both)
+    torch.testing.assert_close(
+        paraphrase_error(network, text, generators(0, 1), *generators(9)).detach(), both
+    )
 
 
 def test_the_error_is_that_of_its_definition(text: TextConditioning) -> None:
     network, seen = Reader(reads=True).double(), []
-    read = network.text_condition
-    network.text_condition = lambda *given: seen.append(read(*given)) or seen[-1]
-    error = paraphrase_error(network, text, generators(4))
-    plain, free = (one.detach() for one in seen)
-    assert plain.shape == (PAIRS, 3)
-    expected = (free - plain).square().mean() / plain.var(0).mean()
-    torch.testing.assert_close(error.detach(), expected[None])
+    read = network.text_readings
+    network.text_readings = lambda *given: seen.append(read(*given)) or seen[-1]
+    error = paraphrase_error(network, text, generators(4), *generators(9))
+    plain, free = ([one.detach() for one in readings] for readings in seen)
+    assert [one.shape for one in plain] == [(PAIRS, 3), (PAIRS, 2)]
+    expected = [
+        (said - meant).square().mean() / meant.var(0).mean()
+        for said, meant in zip(free, plain, strict=True)
+    ]
+    torch.testing.assert_close(error.detach(), torch.stack(expected).mean()[None])
 
 
 def test_the_text_adapter_learns_and_both_come_closer() -> None:
@@ -89,7 +97,7 @@ def test_the_text_adapter_learns_and_both_come_closer() -> None:
     adapter = stage.motion_unet.text_adapter
     optimizer, errors = torch.optim.Adam(adapter.parameters(), lr=1e-2), []
     for _ in range(12):
-        error = paraphrase_error(stage.motion_unet, text, generators(5, 6)).mean()
+        error = paraphrase_error(stage.motion_unet, text, generators(5, 6), *generators(9)).mean()
         optimizer.zero_grad()
         error.backward()
         optimizer.step()
