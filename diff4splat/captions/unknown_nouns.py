@@ -28,6 +28,13 @@ def draw_unknown_noun(generator: torch.Generator) -> str:
     return word + draw(SECOND_ENDINGS, generator) if draw_number(generator) % 2 else word
 
 
+def with_unknown_words(sentence: str, generator: torch.Generator) -> str:
+    """A sentence after, or before, one to four words that mean nothing."""
+    count = 1 + draw_number(generator) % 4
+    words = " ".join(draw_unknown_noun(generator) for _ in range(count))
+    return f"{words} {sentence}" if draw_number(generator) % 2 else f"{sentence} {words}"
+
+
 def caption_of_unknown_noun(color: str, generator: torch.Generator) -> str:
     """A sentence in which an object of ``color``, or of none, moves to one side."""
     name = f"{color} {draw_unknown_noun(generator)}".strip()

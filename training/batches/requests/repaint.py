@@ -1,8 +1,8 @@
 """Objects in other colours, and objects of two colours.
 
 Worlds have few pairs of noun and colour, and few objects of several colours; a network that learns
-from them alone takes the part of one colour for the object. Shading stays: a pixel keeps its
-luminance, as a share of the mean of what is painted. Axes: ``h w`` pixels.
+from them alone takes the part of one colour for the object. Light, shade and texture stay: linear
+pixels are multiplied by the new colour over the old one. Axes: ``h w`` pixels.
 """
 
 from dataclasses import replace
@@ -19,14 +19,12 @@ from diff4splat.captions.srgb import linear_from_srgb, srgb_from_linear
 from diff4splat.training.batches.requests.object_image import ObjectImage
 from diff4splat.training.batches.requests.present import PresentObject
 
-REPAINTED_SHARE, TWO_COLORED_SHARE = 0.25, 0.25
+REPAINTED_SHARE, TWO_COLORED_SHARE = 0.15, 0.2
 """Shares of objects that get another colour, and a second one."""
 PART_SHARES = (0.1, 0.45)
 """Of the object that the second colour covers: less than half, so that the first names it."""
-EXPOSURES = (0.6, 1.2)
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-LEAST_LUMINANCE = 0.01
-LARGEST_SHADE = 2.5
+LARGEST_GAIN = 12.0
+"""Black cannot become white without its noise."""
 
 
 def repaint(original: ObjectImage, generator: torch.Generator) -> ObjectImage:
@@ -44,32 +42,23 @@ def _repaint_object(
     whole, part = torch.rand(2, generator=generator).tolist()
     if whole < REPAINTED_SHARE:
         named = replace(named, color=draw(COLOR_NAMES, generator))
-        _paint(image, one.mask, named.color, generator)
+        _paint(image, one.mask, one.named.color, draw(color_anchors(named.color), generator))
     if part < TWO_COLORED_SHARE:
-        second = draw(colors_unlike([named.color]), generator)
-        _paint(image, _random_part(one, generator), second, generator)
+        second = draw(color_anchors(draw(colors_unlike([named.color]), generator)), generator)
+        _paint(image, _random_part(one, generator), named.color, second)
     return replace(one, named=named)
 
 
 def _paint(
     image: UInt8[Tensor, "h w 3"],
     mask: Bool[Tensor, "h w"],
-    color: str,
-    generator: torch.Generator,
+    before: str,
+    after: Float64[np.ndarray, "3"],
 ) -> None:
-    """Give the pixels of ``mask`` a colour of this name, in place."""
-    least, most = EXPOSURES
-    exposure = least + (most - least) * float(torch.rand((), generator=generator))
-    pixels = linear_from_srgb(image[mask].numpy() / 255)
-    painted = exposure * _shade(pixels) * draw(color_anchors(color), generator)
-    srgb = np.rint(255 * srgb_from_linear(painted.clip(0, 1)))
-    image[mask] = torch.from_numpy(srgb.astype(np.uint8))
-
-
-def _shade(pixels: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 1"]:
-    """Luminance of every pixel over the mean."""
-    luminance = pixels @ LUMINANCE + LEAST_LUMINANCE
-    return (luminance / luminance.mean()).clip(0, LARGEST_SHADE)[:, None]
+    """Turn the pixels of ``mask`` from a colour called ``before`` to a linear one, in place."""
+    gain = (after / np.mean(color_anchors(before), 0)).clip(0, LARGEST_GAIN)
+    painted = (gain * linear_from_srgb(image[mask].numpy() / 255)).clip(0, 1)
+    image[mask] = torch.from_numpy(np.rint(255 * srgb_from_linear(painted)).astype(np.uint8))
 
 
 def _random_part(one: PresentObject, generator: torch.Generator) -> Bool[Tensor, "h w"]:

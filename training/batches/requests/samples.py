@@ -14,7 +14,7 @@ from diff4splat.training.stage import SampleKey
 
 REQUESTS = 5
 """Prompts per image: they cost little beside the image."""
-PASTED_SHARE = 0.4
+PASTED_SHARE = 0.25
 """Share of images with an object of another image."""
 OTHERS = 1_000
 """The other image is one of so many that follow."""
