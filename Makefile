@@ -30,7 +30,7 @@ endif
 gallery: $(VENV)/ready  ## a dozen scenes on one page, gallery/index.html; minutes; goes on after a stop
 	$(BIN)/python -m examples.gallery --out gallery
 
-test: $(VENV)/ready  ## all that needs no GPU and is not marked slow: 19 minutes on two slow, busy cores
+test: $(VENV)/ready  ## all that needs no GPU and is not marked slow: a quarter of an hour on two slow cores
 	$(PARALLEL) $(BIN)/pytest -q -m "not slow" -n auto --dist loadfile --durations=40 --durations-min=4
 
 test-all: $(VENV)/ready  ## the same and the slow tests
