@@ -110,7 +110,7 @@ def _note_start(request: StageRequest, stage: StageRecipe) -> None:
     sources = stages_before(recipe, stage, request.folder, start)
     for part in parts_left_random(stage, sources, start):
         request.note(
-            f"{part} begins with random weights: those in {start.folder} are not trained to the end"
+            f"{part} starts from random weights: those in {start.folder} are not fully trained"
         )
 
 

@@ -45,4 +45,9 @@ def present_objects(
 ) -> list[tuple[ObjectNote, Bool[Tensor, "h w"]]]:
     """Objects that fill ``least_share`` of an image or more, with the pixels of all parts."""
     masks = [(one.note, one.mask(instances)) for one in clip_objects(clip)]
-    return [(note, mask) for note, mask in masks if float(mask.double().mean()) >= least_share]
+    return [(note, mask) for note, mask in masks if fills(mask, least_share)]
+
+
+def fills(mask: Bool[Tensor, "h w"], least_share: float) -> bool:
+    """Whether a mask has ``least_share`` of the image or more."""
+    return float(mask.double().mean()) >= least_share

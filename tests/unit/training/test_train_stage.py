@@ -248,7 +248,7 @@ def test_only_the_first_process_hands_over(monkeypatch: pytest.MonkeyPatch) -> N
     assert not is_main_process()
 
 
-def test_weights_that_are_not_trained_to_the_end_are_named(course: Run, tmp_path: Path) -> None:
+def test_weights_that_are_not_fully_trained_are_named(course: Run, tmp_path: Path) -> None:
     folder = tmp_path / "model"
     shutil.copytree(course.folder / MODEL_FOLDER, folder)
     file = folder / "provenance.json"
@@ -265,7 +265,7 @@ def test_weights_that_are_not_trained_to_the_end_are_named(course: Run, tmp_path
         note=notes.append,
     )
     train_stage(asked)
-    told = f"vae begins with random weights: those in {folder} are not trained to the end"
-    assert notes.count(told) == 1
+    message = f"vae starts from random weights: those in {folder} are not fully trained"
+    assert notes.count(message) == 1
     train_stage(asked)
-    assert notes.count(told) == 1
+    assert notes.count(message) == 1

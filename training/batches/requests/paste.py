@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Bool, UInt8
 from torch import Tensor
 
-from diff4splat.data.clip_objects import PRESENT_SHARE
+from diff4splat.data.clip_objects import PRESENT_SHARE, fills
 from diff4splat.training.batches.requests.object_image import ObjectImage
 from diff4splat.training.batches.requests.present import PresentObject
 
@@ -34,7 +34,7 @@ def paste(background: ObjectImage, other: ObjectImage, generator: torch.Generato
     pasted = PresentObject(named=one.named, mask=mask, moves=False)
     return ObjectImage(
         image=torch.where(mask[..., None], image, background.image),
-        objects=[below for below in [*covered, pasted] if _is_present(below.mask)],
+        objects=[below for below in [*covered, pasted] if fills(below.mask, PRESENT_SHARE)],
     )
 
 
@@ -64,7 +64,3 @@ def _placed(
 def _is_cut(mask: Bool[Tensor, "h w"]) -> bool:
     """Whether it reaches the border of the image."""
     return bool(mask[0].any() | mask[-1].any() | mask[:, 0].any() | mask[:, -1].any())
-
-
-def _is_present(mask: Bool[Tensor, "h w"]) -> bool:
-    return float(mask.double().mean()) >= PRESENT_SHARE

@@ -10,7 +10,7 @@ from torch import Tensor
 from diff4splat.errors import ConfigError, ShapeError
 from diff4splat.models.blocks.attention import Attention
 from diff4splat.models.config.networks import TextConfig
-from diff4splat.models.motion_unet.layers import ModulatedConvBlock
+from diff4splat.models.motion_unet.layers import RANDOM_CELLS, ModulatedConvBlock
 from diff4splat.models.motion_unet.text_tokens import text_tokens
 from diff4splat.models.motion_unet.unet import MotionUNet, cell_coordinates
 
@@ -267,3 +267,34 @@ def test_it_learns_which_square_the_text_names() -> None:
         losses.append(float(loss.detach()))
     # Half is what a network reaches that ignores the text.
     assert losses[-1] < losses[0] / 3
+
+
+def readings(network: MotionUNet, text: Tensor, mask: Tensor | None = None) -> list[Tensor]:
+    return network.text_readings(text, mask, torch.Generator().manual_seed(3))
+
+
+@torch.no_grad()
+def test_readings_are_what_a_text_adds_to_the_condition_and_to_features() -> None:
+    network, text = motion_unet(), some_text()
+    condition, *added = readings(network, text)
+    assert condition.shape[0] == 2 and len(added) == 3
+    random = torch.Generator().manual_seed(3)
+    tokens = network._adapt(text_tokens(text, None))
+    for level, found in zip((network.fine, network.middle, network.coarse), added, strict=True):
+        width = len(level.text_attention.norm.gain)
+        features = torch.randn(width, RANDOM_CELLS, 1, generator=random).expand(2, -1, -1, -1)
+        expected = level.text_attention(features, tokens) - features
+        torch.testing.assert_close(found, expected.flatten(1), rtol=1e-3, atol=1e-5)
+        assert bool((found[0] != found[1]).any())
+
+
+@torch.no_grad()
+def test_readings_of_padded_and_empty_texts() -> None:
+    network, text = motion_unet(), some_text()
+    mask = torch.ones(2, TOKENS, dtype=torch.bool)
+    mask[0, 3:], mask[1] = False, False
+    padded = readings(network, text, mask)
+    short = readings(network, text[:1, :3])
+    for one, other in zip(padded, short, strict=True):
+        torch.testing.assert_close(one[:1], other)
+    assert not any(bool(added[1].any()) for added in padded[1:])

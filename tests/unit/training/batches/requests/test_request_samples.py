@@ -145,9 +145,23 @@ def test_an_image_without_named_objects_asks_for_nothing() -> None:
     assert not bool(samples(bare)[0].masks.any())
 
 
-def test_objects_are_pasted_and_repainted() -> None:
+def test_objects_are_repainted() -> None:
     source = samples()
-    batches = [source[index] for index in range(30)]
-    counts = {int((batch.nouns[0] == 1 + NOUNS.index("box")).sum()) for batch in batches}
-    assert len(counts) > 8
-    assert len({int(number) for batch in batches for number in batch.colors.unique()}) > 4
+    numbers = {int(number) for index in range(30) for number in source[index].colors.unique()}
+    assert len(numbers) > 4
+
+
+class FirstAreBare:
+    """The first clips have no named objects, the others have."""
+
+    def clip(self, index: int) -> Clip:
+        given = clip()
+        return replace(given, note=replace(given.note, objects=())) if index < 20 else given
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_objects_are_pasted_from_other_clips(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(request_samples, "PASTED_SHARE", share)
+    source = RequestSamples(ClipSamples(RECIPE, 0, [FirstAreBare()]))
+    pasted = [bool(source[index].nouns.any()) for index in range(20)]
+    assert sum(pasted) > 8 if share else not any(pasted)

@@ -27,6 +27,11 @@ def test_both_name_one_side() -> None:
     assert seen == set(DIRECTIONS)
 
 
+def test_every_side_is_asked_for_alike() -> None:
+    sides = [_side(pair.plain) for pair in drawn()]
+    assert all(0.18 < sides.count(side) / len(sides) < 0.32 for side in DIRECTIONS)
+
+
 def test_both_name_one_object() -> None:
     for pair in drawn():
         name = pair.plain.removeprefix("the ").partition(" moves ")[0]
