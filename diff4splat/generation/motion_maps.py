@@ -12,7 +12,7 @@ from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.build import FineMaps, ImageMaps
-from diff4splat.generation.layered_image.upsampling import upsample_maps
+from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 
 
 def depth_at(maps: ImageMaps, small: InputImage, image: InputImage) -> Float[Tensor, "y x"]:

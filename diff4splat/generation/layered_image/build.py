@@ -1,8 +1,9 @@
 """From an image, its depth and its displacement to all layers.
 
-    image and maps ─ upsample ─ smooth ─ pixels ─ subpixel infill       the image shows these
-    pixels ─ disoccluded layer ─ fine border                              these extend them into
-    smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving   what the image hides
+    image and maps ─ upsample ─ smooth ─ grow foreground ─ pixels ─ subpixel infill     these show
+    pixels ─┬─ occluded layer                                    the image; all others extend
+            └─ disoccluded layer ─ fine border                       it into what it hides
+    smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving
                            └─ border extension ─┘  objects disocclude
 
 A new way of filling hidden regions belongs into ``hidden_layers``.
@@ -20,17 +21,19 @@ from diff4splat.generation.layered_image.border_extension import (
     border_extension,
     push_behind_surface,
 )
-from diff4splat.generation.layered_image.depth_smoothing import smooth_maps
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
+from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
     inpaint_border,
     without_disoccluded,
 )
 from diff4splat.generation.layered_image.fine_border import fine_border
+from diff4splat.generation.layered_image.pixel_maps.depth_smoothing import smooth_maps
+from diff4splat.generation.layered_image.pixel_maps.foreground import grow_foreground
+from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
-from diff4splat.generation.layered_image.upsampling import upsample_maps
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 
 PIXEL_FOOTPRINT_PX = 0.25
@@ -69,15 +72,16 @@ def build_layered_image(
     Without ``infill`` between the pixels, theirs are twice as wide.
     """
     pixels = pixel_layer(small, image, maps)
-    hidden = hidden_layers(small, maps, border_cells)
-    if small.camera.size_px != image.camera.size_px:
+    hidden, is_reduced = hidden_layers(small, maps, border_cells), _is_reduced(small, image)
+    if is_reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
     if (disoccluded := disoccluded_layer(pixels)) is not None:
         moving = _moving(maps)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
+    if is_reduced and (occluded := occluded_layer(pixels)) is not None:
+        hidden.append(occluded)
     if border_cells:
-        seen = small.rgb if maps.fine is None else maps.fine.rgb
-        texture = seen.shape != image.rgb.shape
+        texture = _finest(small, maps).shape != image.rgb.shape
         hidden.append(fine_border(pixels, disoccluded, texture))
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
@@ -100,9 +104,11 @@ def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list
 def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageLayer:
     """One opaque cell per pixel of the image."""
     depth, displacement = _pixel_maps(small.rgb, image.rgb, maps)
-    shows_cells = small.camera.size_px != image.camera.size_px
-    if shows_cells and (maps.fine is None or maps.fine.smooth):
+    if _is_reduced(small, image) and (maps.fine is None or maps.fine.smooth):
         depth, displacement = smooth_maps(depth, displacement, image.rgb)
+    # Edges of a map are as wide as its cells.
+    cell_px = len(image.rgb) // len(_finest(small, maps))
+    depth, displacement = grow_foreground(depth, displacement, cell_px)
     return ImageLayer(
         camera=image.camera,
         rgb=image.rgb,
@@ -128,6 +134,16 @@ def _pixel_maps(
         depth, displacement = upsample_maps(maps.depth, maps.displacement, (small, fine.rgb))
         displacement = displacement * (fine.depth / depth)[..., None]
     return upsample_maps(fine.depth, displacement, (fine.rgb, full))
+
+
+def _is_reduced(small: InputImage, image: InputImage) -> bool:
+    """Whether networks see less than the image's pixels."""
+    return small.camera.size_px != image.camera.size_px
+
+
+def _finest(small: InputImage, maps: ImageMaps) -> Float[Tensor, "h w 3"]:
+    """The largest copy that depth belongs to."""
+    return small.rgb if maps.fine is None else maps.fine.rgb
 
 
 def _moving(maps: ImageMaps) -> Bool[Tensor, "h w"]:

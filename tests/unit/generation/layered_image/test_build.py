@@ -44,14 +44,15 @@ def moving_block() -> Tensor:
 
 
 def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
-    pixels, infill, background, border, fine = built().layers
-    assert [layer.in_image for layer in built().layers] == [True, True, False, False, False]
+    pixels, infill, background, border, occluded, fine = built().layers
+    assert [layer.in_image for layer in built().layers] == [True, True, *[False] * 4]
     assert torch.equal(pixels.rgb, random_rgb(*SIZE_PX))
     assert (pixels.opacity, pixels.footprint_px) == (OPAQUE, PIXEL_FOOTPRINT_PX)
     assert pixels.pixel_index.flatten().tolist() == list(range(16 * 24))
     assert infill.depth.shape == (31, 47)
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
+    assert occluded.depth.shape == SIZE_PX
     assert fine.depth.shape == (16 + 2 * 3, 24 + 2 * 3)
     assert built().visible_count == 31 * 47
 
@@ -71,8 +72,28 @@ def test_pixels_take_the_depth_of_the_larger_copy() -> None:
     torch.testing.assert_close(moved, torch.full_like(moved, 0.5 * 7 / 4))
 
 
+def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:
+    image = input_image(random_rgb(*SIZE_PX))
+    maps = ImageMaps(depth=random_depth(*SIZE_PX, (2.0, 9.0)), displacement=None)
+    assert len(build_layered_image(image, image, maps, MARGIN).layers) == 5
+
+
+@pytest.mark.parametrize(("side", "grown_px"), [(16, 1), (8, 2), (4, 4)])
+def test_the_foreground_grows_by_a_cell_of_the_depth_map(side: int, grown_px: int) -> None:
+    image = input_image(torch.full((16, 16, 3), 0.5))
+    depth = torch.full((side, side), 8.0)
+    depth[:, : side // 2] = 2.0
+    maps = ImageMaps(
+        depth=torch.full((4, 4), 4.0),
+        displacement=None,
+        fine=FineMaps(rgb=downsample(image, 16 // side).rgb, depth=depth, smooth=False),
+    )
+    near = pixel_layer(downsample(image, 4), image, maps).depth < 3
+    assert near.sum(1).tolist() == [8 + grown_px] * 16
+
+
 def test_without_border_cells_there_is_no_border_layer() -> None:
-    assert len(built(border_cells=0).layers) == 3
+    assert len(built(border_cells=0).layers) == 4
 
 
 def test_coarse_layers_match_no_pixel_of_a_larger_image() -> None:

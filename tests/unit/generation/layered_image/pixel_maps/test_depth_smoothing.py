@@ -5,8 +5,8 @@ import pytest
 import torch
 from image_layers import FAR_RANGES, random_depth, random_rgb
 
-from diff4splat.generation.layered_image.depth_smoothing import smooth_depth, smooth_maps
-from diff4splat.generation.layered_image.upsampling import upsample_maps
+from diff4splat.generation.layered_image.pixel_maps.depth_smoothing import smooth_depth, smooth_maps
+from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 
 SIDE_PX = 24
 

@@ -7,7 +7,7 @@ import torch
 from image_layers import FAR_RANGES, random_depth, random_rgb
 from torch import Tensor
 
-from diff4splat.generation.layered_image.upsampling import SAME_SURFACE, upsample_maps
+from diff4splat.generation.layered_image.pixel_maps.upsampling import SAME_SURFACE, upsample_maps
 from diff4splat.models.blocks.bilateral_upsampling import COLOR_SIGMA, DISTANCE_SIGMA
 
 GRID, SIDE = (3, 5), 4

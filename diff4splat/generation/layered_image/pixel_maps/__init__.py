@@ -1,0 +1,1 @@
+"""Depth and displacement of the image's own pixels, from maps of cells."""
