@@ -55,6 +55,7 @@ def test_a_sequence_goes_out_and_comes_back_as_key_frames(scene_file: Path, tmp_
     assert isinstance(motion, KeyframeMotion) and len(motion.key_times_s) == 11
 
 
+@pytest.mark.slow
 def test_spacetime_gaussians_become_lines_and_key_frames_on_demand(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,7 +1,7 @@
 """Every network as ONNX graphs: equal outputs at any size, equal scenes, and what is refused.
 
-The ``test`` size is exported once, with noise on all weights: layers that start at zero would hide
-errors.
+The ``test`` size has noise on all weights: layers that start at zero would hide errors. Tracing
+takes most of the time: the text encoder and the DiT are always exported, the rest in slow tests.
 """
 
 import json
@@ -36,6 +36,8 @@ from diff4splat.render.api import render
 
 TOLERANCE = 1e-4
 """Relative, in float32."""
+EVERYTHING = pytest.param(None, marks=pytest.mark.slow)
+"""All networks."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -62,17 +64,21 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return load_model(folder)
 
 
-@pytest.fixture(scope="module")
-def exported(model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", params=[("text_encoder", "dit"), EVERYTHING])
+def exported(
+    request: pytest.FixtureRequest, model: Model, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     folder = tmp_path_factory.mktemp("onnx") / "test"
-    rows = export_model(model, folder, ExportSettings(triton=True))
+    rows = export_model(model, folder, ExportSettings(triton=True, parts=request.param))
     assert all(max(row.errors.values()) < TOLERANCE for row in rows)
     return folder
 
 
 @pytest.fixture(scope="module")
-def sources(model: Model) -> list[GraphSource]:
-    return graph_sources(with_parts(model, model.parts).networks, model.config)
+def sources(model: Model, exported: Path) -> list[GraphSource]:
+    names = [entry.name for entry in read_manifest(exported).graphs]
+    networks = with_parts(model, model.parts).networks
+    return [source for source in graph_sources(networks, model.config) if source.name in names]
 
 
 @pytest.fixture
@@ -104,6 +110,7 @@ def test_every_graph_equals_its_network_at_any_size(
             assert error < TOLERANCE, (source.name, spec.name, sizes)
 
 
+@pytest.mark.parametrize("exported", [EVERYTHING], indirect=True)
 @pytest.mark.parametrize("prompt", [None, "a cube slides to the left"])
 def test_both_runtimes_give_one_scene(
     model: Model, exported: Path, photo: Path, prompt: str | None
@@ -124,6 +131,7 @@ def test_both_runtimes_give_one_scene(
     assert first.provenance.weights_sha256 != second.provenance.weights_sha256
 
 
+@pytest.mark.parametrize("exported", [EVERYTHING], indirect=True)
 def test_the_command_runs_what_it_wrote(exported: Path, photo: Path, tmp_path: Path) -> None:
     out = tmp_path / "scene"
     command = [
@@ -152,6 +160,7 @@ assert "torch" not in sys.modules and "onnx" not in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.parametrize("exported", [EVERYTHING], indirect=True)
 def test_generation_imports_no_network_code(exported: Path, photo: Path, tmp_path: Path) -> None:
     code = f"""
 import sys
@@ -176,7 +185,7 @@ def test_a_changed_folder_is_refused_before_anything_runs(
     elif damage == "config":
         (folder / "config.json").write_text((folder / "config.json").read_text() + " ")
     elif damage == "swapped":
-        (folder / "ldrm.onnx").write_bytes((folder / "text_encoder.onnx").read_bytes())
+        (folder / "dit_conditions.onnx").write_bytes((folder / "text_encoder.onnx").read_bytes())
     else:
         (folder / MANIFEST_FILE).write_text("{}")
     out = tmp_path / "scene"
@@ -185,6 +194,7 @@ def test_a_changed_folder_is_refused_before_anything_runs(
     assert not out.exists()
 
 
+@pytest.mark.parametrize("exported", [EVERYTHING], indirect=True)
 def test_shapes_that_the_network_refuses_are_refused(exported: Path) -> None:
     encoder = OnnxModel(exported)["vae_encoder"]
     for shape in ((1, 3, 4, 32, 32), (1, 3, 5, 30, 32), (1, 1, 5, 32, 32)):

@@ -18,7 +18,7 @@ def restore_threads() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
-@pytest.mark.parametrize("side_px", [64, 192])
+@pytest.mark.parametrize("side_px", [64, pytest.param(192, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("prompt", [None, "the blue ball moves to the left"])
 def test_the_scene_file_has_the_same_bytes(
     side_px: int, prompt: str | None, tmp_path: Path

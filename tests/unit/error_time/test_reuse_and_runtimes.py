@@ -61,6 +61,7 @@ def test_names_of_reuse_differ() -> None:
     assert len({(one.series, one.label) for one in CACHINGS}) == len(CACHINGS)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("as_shipped")
 def test_converted_graphs_are_those_of_the_manifest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -1,11 +1,11 @@
-"""The foreground grown at depth edges: it takes the pixels of mixed colour along (ours, ADR 31).
+"""The foreground grown at depth edges, over the pixels of mixed colour (ours, ADR 31).
 
 Axes: ``h w`` pixels, ``t`` latent frames. A pixel on an edge shows a bit of both sides. Left on the
-far side it stays behind as an outline when the camera or the object moves.
+far side it stays behind as an outline when the camera moves.
 """
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 DEPTH_STEP = 0.06
@@ -15,23 +15,38 @@ DEPTH_STEP = 0.06
 def grow_foreground(
     depth: Float[Tensor, "h w"], displacement: Float[Tensor, "t h w 3"] | None, times: int
 ) -> tuple[Float[Tensor, "h w"], Float[Tensor, "t h w 3"] | None]:
-    """Both maps with the foreground grown by a pixel, ``times`` times; depth is above 0."""
+    """Both maps with the foreground grown by a pixel, ``times`` times; depth is above 0.
+
+    What moves has its rim already: static pixels do not join it.
+    """
     for _ in range(times):
-        source = foreground_source(depth)
+        source = foreground_source(depth, _moving(depth, displacement))
         depth = depth.flatten()[source]
         if displacement is not None:
             displacement = displacement.flatten(1, 2)[:, source]
     return depth, displacement
 
 
-def foreground_source(depth: Float[Tensor, "h w"]) -> Int[Tensor, "h w"]:
+def foreground_source(
+    depth: Float[Tensor, "h w"], moving: Bool[Tensor, "h w"]
+) -> Int[Tensor, "h w"]:
     """Flat index of the pixel whose surface each pixel belongs to: a neighbour's or its own."""
     log_depth = depth.log()
     own = torch.arange(depth.numel(), device=depth.device).view_as(depth)
     near = _with_neighbours(log_depth, torch.inf)
     nearest = near.min(0)
     pixels = _with_neighbours(own, 0.0).gather(0, nearest.indices[None])[0]
-    return torch.where(log_depth - nearest.values > DEPTH_STEP, pixels, own)
+    joins = log_depth - nearest.values > DEPTH_STEP
+    joins &= moving | ~moving.flatten()[pixels]
+    return torch.where(joins, pixels, own)
+
+
+def _moving(
+    depth: Float[Tensor, "h w"], displacement: Float[Tensor, "t h w 3"] | None
+) -> Bool[Tensor, "h w"]:
+    if displacement is None:
+        return torch.zeros_like(depth, dtype=torch.bool)
+    return displacement.any(-1).any(0)
 
 
 def _with_neighbours(values: Tensor, outside: float) -> Tensor:

@@ -41,13 +41,22 @@ def test_it_grows_by_a_pixel_a_time(times: int) -> None:
     assert torch.equal(grown, torch.where(near, NEAR, FAR))
 
 
-def test_what_joins_moves_along() -> None:
+def test_static_pixels_do_not_join_what_moves() -> None:
     displacement = torch.zeros(3, 9, 9, 3)
     displacement[1:, 4, 4] = torch.tensor([0.5, -0.25, 1.0])
-    _, moved = grow_foreground(_depth(), displacement, 1)
+    depth, moved = grow_foreground(_depth(), displacement, 2)
+    assert torch.equal(depth, _depth()) and torch.equal(moved, displacement)
+
+
+def test_within_what_moves_pixels_move_along() -> None:
+    displacement = torch.zeros(3, 9, 9, 3)
+    displacement[1:, 3:6, 3:6] = 0.25
+    displacement[1:, 4, 4] = torch.tensor([0.5, -0.25, 1.0])
+    depth, moved = grow_foreground(_depth(), displacement, 1)
     for row, column in ((4, 4), (3, 4), (5, 4), (4, 3), (4, 5)):
+        assert float(depth[row, column]) == NEAR
         assert torch.equal(moved[:, row, column], displacement[:, 4, 4])
-    assert int(moved.any(-1).any(0).sum()) == 5
+    assert torch.equal(moved.any(-1).any(0), displacement.any(-1).any(0))
 
 
 def test_slopes_below_the_step_stay() -> None:
