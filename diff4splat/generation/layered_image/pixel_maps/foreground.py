@@ -17,7 +17,7 @@ def grow_foreground(
 ) -> tuple[Float[Tensor, "h w"], Float[Tensor, "t h w 3"] | None]:
     """Both maps with the foreground grown by a pixel, ``times`` times; depth is above 0.
 
-    What moves has its rim already: static pixels do not join it.
+    What moves has its rim already: only moving pixels join it, and they join nothing else.
     """
     for _ in range(times):
         source = foreground_source(depth, _moving(depth, displacement))
@@ -37,7 +37,7 @@ def foreground_source(
     nearest = near.min(0)
     pixels = _with_neighbours(own, 0.0).gather(0, nearest.indices[None])[0]
     joins = log_depth - nearest.values > DEPTH_STEP
-    joins &= moving | ~moving.flatten()[pixels]
+    joins &= moving == moving.flatten()[pixels]
     return torch.where(joins, pixels, own)
 
 

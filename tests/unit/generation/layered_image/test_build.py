@@ -2,7 +2,7 @@
 
 import pytest
 import torch
-from image_layers import FAR_RANGES, input_image, is_finite, random_depth, random_rgb
+from image_layers import FAR_RANGES, input_image, is_finite, layer, random_depth, random_rgb
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import downsample
@@ -13,6 +13,7 @@ from diff4splat.generation.layered_image.build import (
     build_layered_image,
     pixel_layer,
 )
+from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
 from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
@@ -74,7 +75,10 @@ def test_pixels_take_the_depth_of_the_larger_copy() -> None:
 
 def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:
     image = input_image(random_rgb(*SIZE_PX))
-    maps = ImageMaps(depth=random_depth(*SIZE_PX, (2.0, 9.0)), displacement=None)
+    depth = torch.full(SIZE_PX, 9.0)
+    depth[4:12, 8:16] = 2.0
+    assert occluded_layer(layer(depth, pixel_index=torch.zeros(SIZE_PX).long())) is not None
+    maps = ImageMaps(depth=depth, displacement=None)
     assert len(build_layered_image(image, image, maps, MARGIN).layers) == 5
 
 

@@ -82,6 +82,12 @@ def test_steps_below_the_threshold_are_no_edges() -> None:
         assert bool(far_side_of_edges(depth).any()) is any_edge
 
 
+def test_the_middle_of_a_smoothed_edge_is_not_its_far_side() -> None:
+    profile = torch.tensor([NEAR] * 8 + [3.0, 4.0, 5.0] + [FAR] * 9)
+    edge = far_side_of_edges(profile.expand(6, 20))
+    assert torch.equal(edge.any(0).nonzero()[:, 0], torch.tensor([11, 12]))
+
+
 def test_what_moves_has_a_layer_of_its_own() -> None:
     displacement = torch.zeros(2, SIDE, SIDE, 3)
     displacement[1, _box()] = 0.5

@@ -48,6 +48,13 @@ def test_static_pixels_do_not_join_what_moves() -> None:
     assert torch.equal(depth, _depth()) and torch.equal(moved, displacement)
 
 
+def test_moving_pixels_do_not_join_what_is_static() -> None:
+    displacement = torch.full((2, 9, 9, 3), 0.5)
+    displacement[:, 4, 4] = 0
+    depth, moved = grow_foreground(_depth(), displacement, 2)
+    assert torch.equal(depth, _depth()) and torch.equal(moved, displacement)
+
+
 def test_within_what_moves_pixels_move_along() -> None:
     displacement = torch.zeros(3, 9, 9, 3)
     displacement[1:, 3:6, 3:6] = 0.25
