@@ -26,10 +26,10 @@ SWEEPS = 6
 """Passes over the pixels; seams hardly move after them."""
 FAR = 1e3
 """Cost where a shift ends outside of what is known."""
-MEANS_WEIGHT = 0.3
+MEANS_WEIGHT = 10.0
 """Of the colours around the source against the guess, beside the seams."""
-SPREAD_PX = 8
-"""Window around a pixel over which means are compared; pixel by pixel, labels are noise."""
+SPREAD_PX = 1
+"""Half the window over which means are compared; a wide one lets a small other object pass."""
 UNSEEN = 0.03
 """Squared difference from a neighbour where the shift ends outside: neither good nor bad."""
 
