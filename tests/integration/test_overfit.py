@@ -45,7 +45,7 @@ SHORT_STAGES = [
     pytest.param(name, marks=pytest.mark.slow) if name in ("dynamic", "static-high") else name
     for name in STAGES
 ]
-"""``joint`` renders motion as well, and ``static-low`` differs from the other in its size alone."""
+"""``joint`` renders motion as well; with one optimizer static stages differ in size alone."""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 

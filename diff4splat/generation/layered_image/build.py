@@ -12,7 +12,7 @@ A new way of filling hidden regions belongs into ``hidden_layers``.
 from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
@@ -33,7 +33,7 @@ from diff4splat.generation.layered_image.pixel_maps.depth_smoothing import smoot
 from diff4splat.generation.layered_image.pixel_maps.foreground import grow_foreground
 from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
-from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
+from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, moving_mask
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 
 PIXEL_FOOTPRINT_PX = 0.25
@@ -76,7 +76,7 @@ def build_layered_image(
     if is_reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
     if (disoccluded := disoccluded_layer(pixels)) is not None:
-        moving = _moving(maps)
+        moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
     if is_reduced and (occluded := occluded_layer(pixels)) is not None:
         hidden.append(occluded)
@@ -91,7 +91,7 @@ def build_layered_image(
 
 def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list[ImageLayer]:
     """The background layer, and the border extension if it has any cells."""
-    moving = _moving(maps)
+    moving = moving_mask(maps.depth, maps.displacement)
     background = background_layer(small.rgb, maps.depth, small.camera, maps.displacement)
     layers = [inpaint_background(background, small.rgb, moving)]
     if border_cells:
@@ -144,10 +144,3 @@ def _is_reduced(small: InputImage, image: InputImage) -> bool:
 def _finest(small: InputImage, maps: ImageMaps) -> Float[Tensor, "h w 3"]:
     """The largest copy that depth belongs to."""
     return small.rgb if maps.fine is None else maps.fine.rgb
-
-
-def _moving(maps: ImageMaps) -> Bool[Tensor, "h w"]:
-    """Pixels that are displaced at any time."""
-    if maps.displacement is None:
-        return torch.zeros_like(maps.depth, dtype=torch.bool)
-    return maps.displacement.any(-1).any(0)

@@ -6,6 +6,7 @@ end, when ``gaussians.py`` makes one Gaussian of each valid cell.
 
 from dataclasses import dataclass
 
+import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
@@ -64,3 +65,12 @@ class LayeredImage:
     def visible(self) -> "LayeredImage":
         """The layers that the image shows, alone."""
         return LayeredImage(layers=tuple(layer for layer in self.layers if layer.in_image))
+
+
+def moving_mask(
+    depth: Float[Tensor, "h w"], displacement: Float[Tensor, "t h w 3"] | None
+) -> Bool[Tensor, "h w"]:
+    """Cells that are displaced at any time."""
+    if displacement is None:
+        return torch.zeros_like(depth, dtype=torch.bool)
+    return displacement.any(-1).any(0)

@@ -7,19 +7,16 @@ Axes: ``h w`` pixels. The other layers continue the image in cells of the smalle
 both sides of an edge are mixed: blots in the foreground's colours beside it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.background_layer import BEHIND
-from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
-from diff4splat.generation.layered_image.disoccluded.texture import textured
+from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
 from diff4splat.generation.layered_image.disocclusion import grown
-from diff4splat.generation.layered_image.obliqueness import is_drawable
-from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
+from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
 
 DEPTH_STEP = 0.15
 """Difference of log depth that makes an edge."""
@@ -27,8 +24,6 @@ WINDOW_PX = 5
 """Side of the window that an edge fits into: smoothed depth takes some pixels for it."""
 REACH_SHARE = 1 / 6
 """Of the image's longer side: what a camera path disoccludes behind an edge."""
-FOOTPRINT_PX = 0.5
-"""Standard deviation of a cell's Gaussian: without gaps between neighbours."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,25 +42,16 @@ def occluded_layer(pixels: ImageLayer) -> ImageLayer | None:
         return None
     nearest = nearest_edge(pixels.depth, edge)
     foreground = nearest.log_depth - pixels.depth.log() > DEPTH_STEP / 2
-    moving = _moving(pixels)
+    # Another layer lies behind what moves.
+    moving = grown(moving_mask(pixels.depth, pixels.displacement), 1)
     known = ~grown(foreground, 1) & ~moving
     within = nearest.distance_px < REACH_SHARE * max(edge.shape)
-    mask = grown(foreground, 1) & within & ~moving & is_drawable(pixels.camera)
+    mask = grown(foreground, 1) & within & ~moving
     if not bool(known.any()) or not bool(mask.any()):
         return None
-    depth = 1 / extended_evenly(1 / pixels.depth, known)
     # A footprint covers the neighbours too.
     farthest = torch.nn.functional.max_pool2d(pixels.depth[None], 3, 1, 1)[0]
-    return replace(
-        pixels,
-        rgb=textured(pixels.rgb, known),
-        depth=torch.maximum(depth, BEHIND * farthest),
-        mask=mask,
-        footprint_px=FOOTPRINT_PX,
-        displacement=None,
-        pixel_index=torch.full_like(edge, NO_PIXEL, dtype=torch.long),
-        in_image=False,
-    )
+    return static_layer(pixels, known, mask, farthest)
 
 
 def far_side_of_edges(depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
@@ -91,10 +77,3 @@ def nearest_edge(depth: Float[Tensor, "h w"], edge: Bool[Tensor, "h w"]) -> Near
     of_label = depth.new_zeros(int(labels.max()) + 1)
     of_label[labels[edge]] = depth[edge].log()
     return NearestEdge(log_depth=of_label[labels], distance_px=torch.from_numpy(distance).to(depth))
-
-
-def _moving(pixels: ImageLayer) -> Bool[Tensor, "h w"]:
-    """What moves and the pixels beside it: another layer lies behind them."""
-    if pixels.displacement is None:
-        return torch.zeros_like(pixels.mask)
-    return grown(pixels.displacement.any(-1).any(0), 1)

@@ -8,6 +8,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from diff4splat.generation.layered_image.types import moving_mask
+
 DEPTH_STEP = 0.06
 """Difference of log depth between neighbours from which the nearer one is foreground."""
 
@@ -19,8 +21,10 @@ def grow_foreground(
 
     What moves has its rim already: only moving pixels join it, and they join nothing else.
     """
+    # Pixels join those that move alike, so growing changes nothing of it.
+    moving = moving_mask(depth, displacement)
     for _ in range(times):
-        source = foreground_source(depth, _moving(depth, displacement))
+        source = foreground_source(depth, moving)
         depth = depth.flatten()[source]
         if displacement is not None:
             displacement = displacement.flatten(1, 2)[:, source]
@@ -39,14 +43,6 @@ def foreground_source(
     joins = log_depth - nearest.values > DEPTH_STEP
     joins &= moving == moving.flatten()[pixels]
     return torch.where(joins, pixels, own)
-
-
-def _moving(
-    depth: Float[Tensor, "h w"], displacement: Float[Tensor, "t h w 3"] | None
-) -> Bool[Tensor, "h w"]:
-    if displacement is None:
-        return torch.zeros_like(depth, dtype=torch.bool)
-    return displacement.any(-1).any(0)
 
 
 def _with_neighbours(values: Tensor, outside: float) -> Tensor:
