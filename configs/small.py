@@ -140,7 +140,10 @@ def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
 
 
 def _monocular_depth(dynamic: StageRecipe) -> StageRecipe:
-    """Depth of single images: seven of each clip, without rendering."""
+    """Depth of single images: seven of each clip, without rendering.
+
+    The image backbone has seen photographs, and learns slowly.
+    """
     return replace(
         dynamic,
         name="monocular_depth",
@@ -150,8 +153,11 @@ def _monocular_depth(dynamic: StageRecipe) -> StageRecipe:
         micro_batch=8,
         trained=("monocular_depth",),
         losses=DepthLosses(),
-        optimizer=OptimizerSettings(learning_rate=2e-3, warmup_steps=200),
+        optimizer=OptimizerSettings(
+            learning_rate=1e-3, warmup_steps=100, part_rates=(("monocular_depth.backbone", 0.1),)
+        ),
         data=replace(dynamic.data, target_frames=4, tracks=0),
+        public_backbone=True,
         gates=(),
     )
 

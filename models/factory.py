@@ -21,9 +21,11 @@ from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.image_encoder.clip import ClipImageEncoder
 from diff4splat.models.ldrm.ldrm import Ldrm
+from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
 from diff4splat.models.networks import PARTS, Networks, model_parts
+from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
 from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.placement.initial_weights import (
     InitialWeights,
@@ -79,11 +81,11 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
         "dit": lambda: _dit(config),
         "ldrm": lambda: Ldrm(config),
         "deformation": lambda: _deformation(config),
-        "monocular_depth": lambda: MonocularDepthNet(config.monocular_depth.channels),
+        "monocular_depth": lambda: _monocular_depth(config),
         "motion_unet": lambda: MotionUNet(
             motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
         ),
-        "object_mask": lambda: ObjectMaskNet(config.object_mask.width, config.text.width),
+        "object_mask": lambda: _object_mask(config),
         "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 
@@ -100,6 +102,18 @@ def _dit(config: ModelConfig) -> nn.Module:
     if config.joint.used:
         return JointVideoDiT(config)
     return (NoiseExperts if config.dit.expert_boundary else VideoDiT)(config)
+
+
+def _monocular_depth(config: ModelConfig) -> nn.Module:
+    """On features of the image backbone, or on its own."""
+    depth = config.monocular_depth
+    return (BackboneDepthNet if depth.image_backbone else MonocularDepthNet)(depth.channels)
+
+
+def _object_mask(config: ModelConfig) -> nn.Module:
+    mask = config.object_mask
+    kind = BackboneObjectMaskNet if mask.image_backbone else ObjectMaskNet
+    return kind(mask.width, config.text.width)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:

@@ -4,7 +4,7 @@ prerequisites ─ networks ─ stage + samples ─ trainer ─ statistics of lat
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from diff4splat.models.hub.weight_files import part_file
 from diff4splat.models.networks import Networks, model_parts
 from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
 from diff4splat.progress.phases import Phases
+from diff4splat.training.backbone_init import start_from_public_backbones
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.earlier_release import earlier_fingerprint
 from diff4splat.training.latent_statistics import CLIPS, measure_statistics, write_statistics
@@ -91,6 +92,8 @@ def train_stage(request: StageRequest) -> StageResult:
     )
     if _starts_from_components(recipe, stage_recipe):
         init_from_principal_components(networks.vae, samples, request.phases)
+    if stage_recipe.public_backbone:
+        start_from_public_backbones(networks, _random_parts(request, stage_recipe, sources))
     stage = create_stage(networks, plan)
     settings = replace(_settings(request, plan), fill=fill)
     result = fit_stage(stage, samples, stage_recipe, settings)
@@ -119,10 +122,21 @@ def _networks(
 ) -> tuple[Networks, Callable[[Stage], None] | None]:
     """Networks to begin with; where weights are sharded, without values until they are."""
     recipe = request.recipe
-    if recipe.trainer.parallel != "fsdp2" or _starts_from_components(recipe, stage):
+    changed = _starts_from_components(recipe, stage) or stage.public_backbone
+    if recipe.trainer.parallel != "fsdp2" or changed:
         return starting_networks(recipe, stage, request.folder, request.start), None
     networks, weights = sharded_networks(recipe, stage, request.folder, request.start)
     return networks, weights.fill
+
+
+def _random_parts(
+    request: StageRequest, stage: StageRecipe, sources: Mapping[str, StageRecipe]
+) -> list[str]:
+    """Trained parts without weights of an earlier stage, of a model or of this stage itself."""
+    if (request.folder / stage.name / RECIPE_FILE).exists():
+        return []
+    ready = frozenset() if request.start is None else request.start.trained
+    return [part for part in stage.trained if part not in ready and part not in sources]
 
 
 def _starts_from_components(recipe: Recipe, stage: StageRecipe) -> bool:

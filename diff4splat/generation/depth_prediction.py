@@ -19,8 +19,8 @@ from diff4splat.models.protocols import DepthPrior
 
 SCALES = (1.0, 0.75, 1.25)
 """Sides against those of the copy; the first gives the unit."""
-MULTIPLE_PX = 16
-"""Of the sides that the network takes."""
+MULTIPLE_PX = 32
+"""Of the sides that every depth network takes."""
 
 
 def predict_depth(

@@ -29,6 +29,9 @@ from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.progress.run_log import RunLog
 
+ENLARGEMENT = 1.5
+"""Sides of a small copy for an image backbone (chosen in docs/log/depth-prior.md)."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Copies:
@@ -89,7 +92,7 @@ def _depths(
     larger = larger_copy(images, model.config.monocular_depth.photo_scale)
     if model.networks.monocular_depth is None or larger is images.small:
         return image_depth(model, images.small), None
-    fine = FineMaps(rgb=larger.rgb, depth=image_depth(model, larger))
+    fine = FineMaps(rgb=larger.rgb, depth=image_depth(model, larger, is_larger=True))
     return reduced_depth(fine.depth, images.small.camera.size_px), fine
 
 
@@ -102,12 +105,18 @@ def _given_depths(images: Copies, log: RunLog) -> tuple[Float[Tensor, "h w"], Fi
     return reduced_depth(depth, images.small.camera.size_px), fine
 
 
-def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:
-    """Z of every pixel in scene units."""
-    network = model.networks.monocular_depth
+def image_depth(
+    model: Model, image: InputImage, *, is_larger: bool = False
+) -> Float[Tensor, "h w"]:
+    """Z of every pixel in scene units; ``is_larger`` of the copy that photographs have for it.
+
+    An image backbone sees a small copy enlarged: it was trained on larger images.
+    """
+    network, config = model.networks.monocular_depth, model.config.monocular_depth
     if network is None:
         return torch.full_like(image.rgb[..., 0], PLANE_DEPTH)
-    scales = SCALES if image.reduction > 1 else SCALES[:1]
+    factor = ENLARGEMENT if config.image_backbone and not is_larger else 1
+    scales = [factor * scale for scale in (SCALES if image.reduction > 1 else SCALES[:1])]
     return predict_depth(network, image.rgb, model.config.activation, scales)
 
 

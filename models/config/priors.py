@@ -13,10 +13,13 @@ class MonocularDepthConfig:
     """At half the resolution; 0 leaves the prior out: the image is a plane."""
     photo_scale: int = 1
     """Sides of the copy of a photograph that it sees, against the copy of the other networks."""
+    image_backbone: bool = False
+    """Whether it also decodes features of the image backbone (ADR 32)."""
 
     def __post_init__(self) -> None:
         require_optional_width(self, "channels")
         require_counts(self, "photo_scale")
+        _require_backbone_fits(self)
 
     @property
     def used(self) -> bool:
@@ -30,9 +33,12 @@ class ObjectMaskConfig:
 
     width: int = 0
     """Channels at half the resolution; 0 leaves it out: the motion prior's own mask decides."""
+    image_backbone: bool = False
+    """Whether it decodes features of the image backbone (ADR 32) instead of its own."""
 
     def __post_init__(self) -> None:
         require_optional_width(self, "width")
+        _require_backbone_fits(self)
 
     @property
     def used(self) -> bool:
@@ -69,3 +75,9 @@ class MotionUNetConfig:
     def used(self) -> bool:
         """Whether there is such a network."""
         return self.width > 0
+
+
+def _require_backbone_fits(config: MonocularDepthConfig | ObjectMaskConfig) -> None:
+    fits = config.used or not config.image_backbone
+    where = f"{type(config).__name__}.image_backbone"
+    require(fits, where, "false without the network that it belongs to", config.image_backbone)

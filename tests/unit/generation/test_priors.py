@@ -12,7 +12,13 @@ from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.build import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
 from diff4splat.generation.motion_sampling import MotionRequest
-from diff4splat.generation.priors import Copies, image_depth, image_maps, motion_copy
+from diff4splat.generation.priors import (
+    ENLARGEMENT,
+    Copies,
+    image_depth,
+    image_maps,
+    motion_copy,
+)
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
@@ -90,6 +96,25 @@ def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     torch.testing.assert_close(1 / maps.depth, inverse.mean((1, 3)))
     whole = Copies(image=copies.small, small=replace(copies.small, reduction=1))
     assert image_maps(replace(model, config=config), whole, 2, request, RunLog()).fine is None
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("reduction", [1, 3])
+def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels(
+    reduction: int,
+) -> None:
+    prior = MonocularDepthConfig(channels=4, photo_scale=2, image_backbone=True)
+    config = replace(tiny_size(), monocular_depth=prior)
+    model = Model(config=config, networks=create_networks(config, parts=("monocular_depth",)))
+    torch.nn.init.normal_(model.networks.monocular_depth.head.weight, std=0.1)
+    photo = input_image(random_rgb(reduction * SIDE_PX, reduction * SIDE_PX))
+    copies = Copies(image=photo, small=downsample(photo, reduction))
+    request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
+    maps = image_maps(model, copies, 2, request, RunLog())
+    scales = [ENLARGEMENT * scale for scale in (SCALES if reduction > 1 else SCALES[:1])]
+    network, activation = model.networks.monocular_depth, config.activation
+    wanted = predict_depth(network, copies.small.rgb, activation, scales)
+    assert torch.equal(maps.depth, wanted) and float(wanted.std()) > 0 and maps.fine is None
 
 
 @torch.no_grad()

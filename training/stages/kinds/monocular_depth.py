@@ -20,8 +20,10 @@ from diff4splat.metrics.masked import masked_mean, mean_or_nan
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.batches.random_sky import SKY_DRAWS, random_sky
 from diff4splat.training.batches.random_views import (
     DRAWS,
+    PHOTO_DRAWS,
     DepthImages,
     depth_images,
     random_photo,
@@ -35,7 +37,7 @@ from diff4splat.training.stages.scene_prediction import log_depth
 
 SKY_DEPTH = 10 * PLANE_DEPTH
 """Pixels without depth are at least as far."""
-GAMMA, GAIN = 0.25, 0.15
+GAMMA, GAIN = 0.4, 0.24
 """Half the range of the logarithms of exponent and factor of a channel."""
 
 
@@ -79,11 +81,13 @@ class MonocularDepthStage(ModelStage):
         height, width = (
             sides[int(i)] for i in torch.randint(len(sides), (2,), generator=generator)
         )
-        draws = self._draws(batch, "view", len(images.rgb), DRAWS + 3)
-        views = random_views(images, (height, width), draws[:, :DRAWS].to(images.rgb))
+        count = DRAWS + PHOTO_DRAWS + SKY_DRAWS
+        draws = self._draws(batch, "view", len(images.rgb), count).to(images.rgb)
+        view, photo, sky = draws.split([DRAWS, PHOTO_DRAWS, SKY_DRAWS], 1)
+        views = random_views(images, (height, width), view)
         noise = torch.randn(views.rgb.shape, generator=self.random.per_step(batch, "noise"))
-        photo = random_photo(views.rgb, draws[:, DRAWS:].to(views.rgb), noise.to(views.rgb))
-        return replace(views, rgb=photo)
+        rgb = random_sky(views.rgb, views.known, sky)
+        return replace(views, rgb=random_photo(rgb, photo, noise.to(rgb)))
 
     def _draws(
         self, batch: ClipBatch, purpose: str, images: int, count: int

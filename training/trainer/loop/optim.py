@@ -26,19 +26,14 @@ def create_optimizer(
     """AdamW over named weights; weight decay acts on matrices only.
 
     Raises:
-        ConfigError: a learning rate is set for a part that does not learn.
+        ConfigError: a learning rate is set for what does not learn.
     """
     rates = dict(settings.part_rates)
-    parts = {part_of(name) for name in parameters}
-    if unknown := sorted(set(rates) - parts):
-        raise ConfigError(
-            f"part_rates: expected parts that learn ({', '.join(sorted(parts))}), got "
-            f"{', '.join(unknown)}; correct the recipe"
-        )
+    _require_known(rates, parameters)
     groups: dict[tuple[float, float], list[Tensor]] = {}
     for name, parameter in parameters.items():
         decay = settings.weight_decay if parameter.ndim > 1 else 0.0
-        groups.setdefault((rates.get(part_of(name), 1.0), decay), []).append(parameter)
+        groups.setdefault((_rate(name, rates), decay), []).append(parameter)
     optimizer = torch.optim.AdamW(
         [
             {"params": members, "weight_decay": decay, "rate": rate}
@@ -59,6 +54,26 @@ def create_optimizer(
 def part_of(name: str) -> str:
     """The model part that a weight belongs to."""
     return name.partition(".")[0]
+
+
+def _rate(name: str, rates: Mapping[str, float]) -> float:
+    """Factor of the longest named part or module that holds the weight."""
+    holders = [holder for holder in rates if _holds(holder, name)]
+    return rates[max(holders, key=len)] if holders else 1.0
+
+
+def _holds(holder: str, name: str) -> bool:
+    return name.startswith(f"{holder}.")
+
+
+def _require_known(rates: Mapping[str, float], parameters: Mapping[str, Tensor]) -> None:
+    unknown = [holder for holder in rates if not any(_holds(holder, name) for name in parameters)]
+    if unknown:
+        parts = ", ".join(sorted({part_of(name) for name in parameters}))
+        raise ConfigError(
+            f"part_rates: expected parts that learn ({parts}), or modules in them, got "
+            f"{', '.join(sorted(unknown))}; correct the recipe"
+        )
 
 
 def schedule(step: int, steps: int, settings: OptimizerSettings) -> float:

@@ -7,7 +7,8 @@ from torch import Tensor
 
 from diff4splat.models.image_unet.network import FOLDED_PX
 from diff4splat.models.motion_unet.text_tokens import text_tokens
-from diff4splat.models.object_mask.network import START_LOGIT, ObjectMaskNet
+from diff4splat.models.object_mask.mask_heads import START_LOGIT
+from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.object_mask.text_queries import QUERIES
 
 WIDTH, TEXT_WIDTH = 4, 8

@@ -11,7 +11,9 @@ from torch import Tensor
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.random_views import (
     DRAWS,
+    GREY_SHARE,
     LEVEL_SHARE,
+    SOFT_SHARE,
     WHOLE_SHARE,
     depth_images,
     random_photo,
@@ -104,13 +106,35 @@ def test_every_view_lies_within_its_image(
     assert float(middle.abs().max()) <= 1 / min(source)
 
 
+SAME = (1 / 1.96, 0.0, 0.0, 1.0, 1.0)
+"""Draws that leave a photo as it is."""
+
+
+def photo(rgb: Tensor, noise: float = 0.0, **changes: float) -> Tensor:
+    names = ("saturation", "vignette", "grain", "colorless", "soft")
+    draws = [changes.get(name, same) for name, same in zip(names, SAME, strict=True)]
+    return random_photo(
+        rgb, torch.tensor([draws]).expand(len(rgb), -1), noise * torch.randn_like(rgb)
+    )
+
+
 def test_colours_without_change_stay_and_noise_is_bounded() -> None:
     rgb = torch.rand(2, 3, 8, 8)
-    same = random_photo(
-        rgb, torch.tensor([[1 / 1.96, 0.0, 0.0]]).expand(2, -1), torch.zeros(2, 3, 8, 8)
-    )
-    torch.testing.assert_close(same, rgb)
-    grey = random_photo(rgb, torch.zeros(2, 3), torch.zeros_like(rgb))
-    torch.testing.assert_close(grey, rgb.mean(1, keepdim=True).expand_as(rgb))
-    noisy = random_photo(rgb, torch.ones(2, 3), 100 * torch.randn_like(rgb))
+    torch.testing.assert_close(photo(rgb), rgb)
+    noisy = photo(rgb, 100.0, vignette=1.0, grain=1.0)
     assert float(noisy.min()) >= 0 and float(noisy.max()) <= 1
+
+
+@pytest.mark.parametrize("change", [{"saturation": 0.0}, {"colorless": 0.5 * GREY_SHARE}])
+def test_some_photos_are_grey(change: dict[str, float]) -> None:
+    rgb = torch.rand(2, 3, 8, 8)
+    torch.testing.assert_close(photo(rgb, **change), rgb.mean(1, keepdim=True).expand_as(rgb))
+    torch.testing.assert_close(photo(rgb, colorless=GREY_SHARE), rgb)
+
+
+def test_a_soft_photo_keeps_flat_regions_and_loses_detail() -> None:
+    flat = torch.full((1, 3, 8, 8), 0.25)
+    torch.testing.assert_close(photo(flat, soft=0.0), flat)
+    checker = torch.tensor([[0.0, 1.0], [1.0, 0.0]]).repeat(4, 4).expand(1, 3, -1, -1)
+    torch.testing.assert_close(photo(checker, soft=0.0), torch.full_like(checker, 0.5))
+    torch.testing.assert_close(photo(checker, soft=SOFT_SHARE), checker)

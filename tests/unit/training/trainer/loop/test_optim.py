@@ -70,9 +70,24 @@ def test_only_matrices_decay_and_parts_have_their_rates() -> None:
     assert len(found) == len(trained_parameters(stage))
 
 
-def test_a_rate_for_a_part_that_does_not_learn_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"parts that learn \(body, head\), got eyes"):
-        stage_and_optimizer(part_rates=(("eyes", 0.1),))
+def test_a_module_has_a_rate_of_its_own_within_its_part() -> None:
+    stage, optimizer = stage_and_optimizer(part_rates=(("body.norm", 0.01), ("body", 0.1)))
+    set_learning_rate(optimizer, 1.0)
+    found = {
+        id(parameter): group["lr"]
+        for group in optimizer.param_groups
+        for parameter in group["params"]
+    }
+    assert found[id(stage.body.norm.weight)] == 0.01
+    assert found[id(stage.body.blocks[0].weight)] == 0.1
+    assert found[id(stage.head.weight)] == 1.0
+
+
+@pytest.mark.parametrize("holder", ["eyes", "bod", "body.nor"])
+def test_a_rate_for_what_does_not_learn_is_refused(holder: str) -> None:
+    expected = rf"parts that learn \(body, head\), or modules in them, got {holder};"
+    with pytest.raises(ConfigError, match=expected):
+        stage_and_optimizer(part_rates=((holder, 0.1),))
 
 
 def test_moments_made_beforehand_change_nothing() -> None:

