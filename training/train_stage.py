@@ -4,7 +4,7 @@ prerequisites ─ networks ─ stage + samples ─ trainer ─ statistics of lat
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -93,7 +93,10 @@ def train_stage(request: StageRequest) -> StageResult:
     if _starts_from_components(recipe, stage_recipe):
         init_from_principal_components(networks.vae, samples, request.phases)
     if stage_recipe.public_backbone:
-        start_from_public_backbones(networks, _random_parts(request, stage_recipe, sources))
+        # As above, a run that is taken up again computes what it then overwrites.
+        ready = sources.keys() | (frozenset() if request.start is None else request.start.trained)
+        fresh = [part for part in stage_recipe.trained if part not in ready]
+        start_from_public_backbones(networks, fresh)
     stage = create_stage(networks, plan)
     settings = replace(_settings(request, plan), fill=fill)
     result = fit_stage(stage, samples, stage_recipe, settings)
@@ -127,16 +130,6 @@ def _networks(
         return starting_networks(recipe, stage, request.folder, request.start), None
     networks, weights = sharded_networks(recipe, stage, request.folder, request.start)
     return networks, weights.fill
-
-
-def _random_parts(
-    request: StageRequest, stage: StageRecipe, sources: Mapping[str, StageRecipe]
-) -> list[str]:
-    """Trained parts without weights of an earlier stage, of a model or of this stage itself."""
-    if (request.folder / stage.name / RECIPE_FILE).exists():
-        return []
-    ready = frozenset() if request.start is None else request.start.trained
-    return [part for part in stage.trained if part not in ready and part not in sources]
 
 
 def _starts_from_components(recipe: Recipe, stage: StageRecipe) -> bool:

@@ -14,13 +14,12 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.config.networks import ActivationConfig
+from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.protocols import DepthPrior
 
 SCALES = (1.0, 0.75, 1.25)
 """Sides against those of the copy; the first gives the unit."""
-MULTIPLE_PX = 32
-"""Of the sides that every depth network takes."""
 
 
 def predict_depth(
@@ -55,7 +54,8 @@ def _scaled(
 
 
 def _whole(side: float) -> int:
-    return MULTIPLE_PX * max(round(side / MULTIPLE_PX), 1)
+    """The nearest side that every depth network takes."""
+    return BACKBONE_MULTIPLE_PX * max(round(side / BACKBONE_MULTIPLE_PX), 1)
 
 
 def _resized(maps: Float[Tensor, "1 c h w"], size: tuple[int, ...]) -> Float[Tensor, "1 c h2 w2"]:

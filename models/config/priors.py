@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 from diff4splat.models.config.checks import require, require_counts, require_optional_width
 
+BACKBONE_MULTIPLE_PX = 32
+"""Image sides that the image backbone takes are multiples of it."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MonocularDepthConfig:

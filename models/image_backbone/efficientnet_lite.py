@@ -31,8 +31,6 @@ FEATURE_STAGES = (0, 1, 2, 4, 6)
 """Stages after which a resolution is complete."""
 FEATURE_CHANNELS = tuple(STAGES[stage][-1] for stage in FEATURE_STAGES)
 """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the resolution."""
-MULTIPLE_PX = 32
-"""Image sides must be multiples of it."""
 MEAN, DEVIATION = 127 / 255, 128 / 255
 """Of the colours, as the public weights were trained."""
 

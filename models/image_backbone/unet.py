@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
 from diff4splat.models.image_backbone.efficientnet_lite import FEATURE_CHANNELS, EfficientNetLite
-from diff4splat.models.image_unet.network import FOLDED_PX
+from diff4splat.models.image_unet.network import FOLDED_PX, upsample_path
 
 
 class BackboneUNet(nn.Module):
@@ -41,8 +41,4 @@ class BackboneUNet(nn.Module):
         skips = [conv(level) for conv, level in zip(self.lateral, levels, strict=True)]
         cells = torch.nn.functional.pixel_unshuffle(image * 2 - 1, FOLDED_PX)
         skips[0] = skips[0] + self.pixels(cells)
-        features = self.blocks[-1](skips[-1])
-        for level in reversed(range(len(self.upsample))):
-            upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
-            features = self.blocks[level](skips[level] + upsampled)
-        return features
+        return upsample_path(self.blocks[-1](skips[-1]), skips, self.upsample, self.blocks)

@@ -51,10 +51,20 @@ class ImageUNet(nn.Module):
             skips.append(block(features))
             features = downsample(skips[-1])
         features = self.mid(self.down_blocks[-1](features))
-        for level in reversed(range(len(self.up_blocks))):
-            upsampled = torch.nn.functional.pixel_shuffle(self.upsample[level](features), 2)
-            features = self.up_blocks[level](skips[level] + upsampled)
-        return features
+        return upsample_path(features, skips, self.upsample, self.up_blocks)
+
+
+def upsample_path(
+    features: Float[Tensor, "b c h w"],
+    skips: Sequence[Tensor],
+    upsample: nn.ModuleList,
+    blocks: nn.ModuleList,
+) -> Tensor:
+    """From the coarsest features to those of the finest of ``skips``, which are finest first."""
+    for level in reversed(range(len(upsample))):
+        finer = torch.nn.functional.pixel_shuffle(upsample[level](features), 2)
+        features = blocks[level](skips[level] + finer)
+    return features
 
 
 def pixel_coordinates(image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 2 h w"]:

@@ -4,7 +4,7 @@ from torch import Tensor, nn
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import MOTION_CELL_PX
-from diff4splat.models.image_backbone.efficientnet_lite import MULTIPLE_PX as BACKBONE_MULTIPLE_PX
+from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
 from diff4splat.models.image_unet.network import MULTIPLE_PX as IMAGE_MULTIPLE_PX
 from diff4splat.models.motion_unet.unet import MULTIPLE_PX as MOTION_MULTIPLE_PX
 from diff4splat.models.onnx_export.source import (

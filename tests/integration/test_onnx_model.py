@@ -22,6 +22,7 @@ from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.io.scene_files.scene_file import load_scene
 from diff4splat.metrics.image import psnr
+from diff4splat.models.config.priors import MonocularDepthConfig
 from diff4splat.models.config.sizes import test_size
 from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model, load_model, save_model, with_parts
@@ -53,6 +54,8 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     """
     config = test_size()
     config = replace(config, dit=replace(config.dit, blocks=1), ldrm=replace(config.ldrm, blocks=1))
+    depth = MonocularDepthConfig(channels=4, image_backbone=True)
+    config = replace(config, monocular_depth=depth)
     noisy = Model(config=config, networks=create_networks(config))
     generator = torch.Generator().manual_seed(1)
     with torch.no_grad():

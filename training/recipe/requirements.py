@@ -5,6 +5,7 @@ All that recipes ask of a model configuration is here.
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import TIME_STRIDE
+from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
 from diff4splat.training.recipe.checks import require
 from diff4splat.training.recipe.kinds import (
     CAPTION_KINDS,
@@ -50,7 +51,18 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     fits = not data.keyframes_only or stage.kind in IMAGE_KINDS
     expected = f"false but for {' and '.join(IMAGE_KINDS)} stages"
     require(fits, f"{what}.keyframes_only", expected, "true")
+    if _on_image_backbone(stage, model):
+        sides = data.view_sides_px or data.size_px
+        fits = all(side % BACKBONE_MULTIPLE_PX == 0 for side in sides)
+        expected = f"multiples of {BACKBONE_MULTIPLE_PX} on the image backbone"
+        require(fits, f"{what}.view_sides_px or size_px", expected, sides)
     keyframed = model.refinement.used and stage.kind in RECONSTRUCTION_KINDS
     fits, stride = not keyframed or data.keyframe_stride == TIME_STRIDE, data.keyframe_stride
     expected = f"{TIME_STRIDE} with a refinement decoder"
     require(fits, f"{what}.keyframe_stride", expected, stride)
+
+
+def _on_image_backbone(stage: StageRecipe, model: ModelConfig) -> bool:
+    """Whether what the stage trains decodes features of the image backbone."""
+    priors = {"monocular_depth": model.monocular_depth, "object_mask": model.object_mask}
+    return stage.kind in priors and priors[stage.kind].image_backbone

@@ -5,8 +5,9 @@ import torch
 from image_layers import random_rgb
 from torch import Tensor
 
-from diff4splat.generation.depth_prediction import MULTIPLE_PX, SCALES, predict_depth
+from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.models.config.networks import ActivationConfig
+from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 
 CONFIG = ActivationConfig()
@@ -57,7 +58,7 @@ def test_every_scale_is_seen_twice_in_sides_that_the_network_takes() -> None:
     predict_depth(prior, random_rgb(128, 256), CONFIG)
     assert len(prior.sizes) == 2 * len(SCALES)
     assert set(prior.sizes) == {(128, 256), (96, 192), (160, 320)}
-    assert all(side % MULTIPLE_PX == 0 for size in prior.sizes for side in size)
+    assert all(side % BACKBONE_MULTIPLE_PX == 0 for size in prior.sizes for side in size)
 
 
 def test_scales_of_one_size_are_seen_once() -> None:

@@ -115,6 +115,14 @@ def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels
     network, activation = model.networks.monocular_depth, config.activation
     wanted = predict_depth(network, copies.small.rgb, activation, scales)
     assert torch.equal(maps.depth, wanted) and float(wanted.std()) > 0 and maps.fine is None
+    if reduction > 1:
+        return
+    large = input_image(random_rgb(2 * SIDE_PX, 2 * SIDE_PX))
+    fine = image_maps(
+        model, Copies(image=large, small=downsample(large, 2)), 2, request, RunLog()
+    ).fine
+    # A copy with its own pixels is large enough already.
+    assert torch.equal(fine.depth, predict_depth(network, large.rgb, activation, SCALES[:1]))
 
 
 @torch.no_grad()

@@ -1,14 +1,24 @@
 """Public weights of the image backbone as the start of a stage."""
 
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 import torch
+from clip_shards import reading, write_shards
+from depth_stages import depth_recipe
 
 from diff4splat.errors import ConfigError
+from diff4splat.models.config.priors import MonocularDepthConfig
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.networks import Networks
 from diff4splat.training import backbone_init
+from diff4splat.training.prerequisites import last_checkpoint
+from diff4splat.training.train_stage import StageRequest, train_stage
+from diff4splat.training.trainer.checkpoints.export import load_parts
 
 
 def test_only_the_backbone_takes_public_weights(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,3 +40,32 @@ def test_a_part_without_a_backbone_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"monocular_depth.*image_backbone"):
         backbone_init.start_from_public_backbones(networks, ["monocular_depth"])
     backbone_init.start_from_public_backbones(networks, [])
+
+
+@pytest.mark.usefixtures("as_shipped")
+def test_a_stage_starts_from_public_weights_also_after_a_start_without_a_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.manual_seed(1)
+    public = EfficientNetLite().state_dict()
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda: public)
+    recipe = reading(write_shards(tmp_path / "shards"))
+    prior = MonocularDepthConfig(channels=4, image_backbone=True)
+    like = depth_recipe()
+    stage = replace(
+        like,
+        steps=1,
+        data=replace(recipe.stage("dynamic").data, keyframe_stride=4),
+        optimizer=replace(like.optimizer, learning_rate=1e-9),
+        public_backbone=True,
+    )
+    model = replace(recipe.model, monocular_depth=prior)
+    recipe = replace(recipe, model=model, stages=(stage,))
+    run = tmp_path / "run"
+    for _ in range(2):
+        train_stage(StageRequest(recipe=recipe, stage=stage.name, folder=run))
+        stored = load_parts(last_checkpoint(run / stage.name))["monocular_depth"]
+        torch.testing.assert_close(stored["backbone.stem.weight"], public["stem.weight"])
+        shutil.rmtree(run / stage.name / "checkpoints")
+        (run / stage.name / "result.json").unlink()
+        assert (run / stage.name / "recipe.json").is_file()

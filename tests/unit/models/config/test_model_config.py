@@ -14,6 +14,7 @@ from diff4splat.models.config.model import (
     ModelConfig,
     MonocularDepthConfig,
     MotionUNetConfig,
+    ObjectMaskConfig,
     RefinementConfig,
     TextConfig,
     VaeConfig,
@@ -201,6 +202,16 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
         (RefinementConfig, {"depth_range": None}, "depth_range: expected two rising depths"),
         (MonocularDepthConfig, {"channels": -1}, "channels: expected a whole number of at least 0"),
         (MonocularDepthConfig, {"channels": True}, "channels: expected a whole number"),
+        (
+            MonocularDepthConfig,
+            {"image_backbone": True},
+            "MonocularDepthConfig.image_backbone: expected false without the network",
+        ),
+        (
+            ObjectMaskConfig,
+            {"image_backbone": True},
+            "ObjectMaskConfig.image_backbone: expected false without the network",
+        ),
         (MotionUNetConfig, {"heads": 0}, "MotionUNetConfig.heads: expected a whole number"),
         (MotionUNetConfig, {"width": 12}, "width: expected 0 or a multiple of 8, twice the heads"),
         (MotionUNetConfig, {"width": -8}, "width: expected a whole number of at least 0"),
@@ -303,3 +314,15 @@ def test_published_numbers() -> None:
     assert (paper.dit.blocks, paper.dit.width) == (32, 4096)
     assert (paper.ldrm.blocks, paper.ldrm.embed_channels) == (16, 64)
     assert (paper.frames, paper.size_px) == (49, (512, 512))
+
+
+def test_an_object_mask_on_the_image_backbone_needs_an_enlarged_copy() -> None:
+    mask = ObjectMaskConfig(width=4, image_backbone=True)
+    for scale, fits in ((1, False), (2, True), (3, False)):
+        motion = MotionUNetConfig(width=8, heads=1, input_scale=scale)
+        changed = {"object_mask": mask, "motion_unet": motion}
+        if fits:
+            assert dataclasses.replace(test_size(), **changed).object_mask.image_backbone
+            continue
+        with pytest.raises(ConfigError, match=r"input_scale: expected 32 px per token"):
+            dataclasses.replace(test_size(), **changed)

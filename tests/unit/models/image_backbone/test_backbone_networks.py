@@ -37,6 +37,15 @@ def test_a_fresh_network_predicts_the_plane() -> None:
     assert bool((BackboneDepthNet(WIDTH)(torch.rand(1, 3, 32, 64)) == 0).all())
 
 
+def test_depth_is_the_mean_of_both_encoders() -> None:
+    network, image = depth(), torch.rand(1, 3, 32, 64)
+    torch.nn.init.normal_(network.unet.head.weight, std=0.1)
+    both, unet = network(image), network.unet(image)
+    torch.nn.init.zeros_(network.unet.head.weight)
+    torch.testing.assert_close(both, network(image) + unet / 2)
+    assert bool((unet != 0).any())
+
+
 @NETWORKS
 @pytest.mark.parametrize("size", [(32, 32), (64, 32)])
 def test_every_pixel_of_any_multiple_has_a_value(

