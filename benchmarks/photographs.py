@@ -27,7 +27,6 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.generation.inputs.image_size import find_image_size
-from diff4splat.generation.inputs.input_cameras import path_frame
 from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry.camera import project
@@ -42,6 +41,7 @@ from diff4splat.paths.settings import PathSettings
 from diff4splat.progress.phases import peak_memory_bytes
 from diff4splat.render.api import render, render_video
 from diff4splat.render.settings import RenderSettings
+from diff4splat.scene.extent import scene_frame
 from diff4splat.scene.scene import Scene
 
 SIDE_PX = 256
@@ -118,9 +118,10 @@ def load(name: str) -> InputImage:
 def around(scene: Scene, picture: InputImage) -> tuple[float, bool, Float[Tensor, "h w 3"]]:
     """Least share of a frame that shows something, whether all is finite, and frames in a row."""
     shares, finite, frames = [], True, []
+    view = scene_frame(scene, picture.camera)
     for orbit in ORBITS:
         settings = PathSettings(frames=ORBIT_FRAMES, fps=ORBIT_FRAMES - 1)
-        for camera in build_path(orbit, path_frame(picture.camera), settings).cameras:
+        for camera in build_path(orbit, view, settings).cameras:
             seen = render(scene, camera, outputs=("rgb", "alpha", "depth"))
             shares.append(float((seen.alpha > SHOWN).float().mean()))
             finite &= all(bool(part.isfinite().all()) for part in (seen.rgb, seen.depth))

@@ -11,12 +11,12 @@ from torch import Tensor
 
 from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load
 from diff4splat.generation.inputs.image_size import find_image_size
-from diff4splat.generation.inputs.input_cameras import path_frame
 from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings
 from diff4splat.render.api import render
+from diff4splat.scene.extent import scene_frame
 
 SIDE_PX = 256
 ORBITS = ("orbit:0.0417", "orbit:-0.0417")
@@ -57,10 +57,9 @@ def prepared(photograph: Photograph, model: str) -> InputImage:
 def row(pipeline: Diff4SplatPipeline, picture: InputImage) -> UInt8[np.ndarray, "h w 3"]:
     """The photograph, 15 degrees to one side and to the other, depth."""
     scene = pipeline(picture, "static")
-    images = [picture.rgb]
+    view, images = scene_frame(scene, picture.camera), [picture.rgb]
     for orbit in ORBITS:
-        settings = PathSettings(frames=2, fps=1)
-        camera = build_path(orbit, path_frame(picture.camera), settings).cameras[1]
+        camera = build_path(orbit, view, PathSettings(frames=2, fps=1)).cameras[1]
         images.append(render(scene, camera).rgb.clamp(0, 1))
     depth = render(scene, picture.camera, outputs=("rgb", "depth")).depth
     cells = [(255 * image).round().byte().numpy() for image in images]

@@ -1,7 +1,7 @@
 """``diff4splat generate``: one photograph, a camera path and optional text to a scene folder.
 
 photograph ─ load_image ───┐
---camera ── choose_path ───┼─ Diff4SplatPipeline ─ Scene ─ render_into ─ write_scene_folder
+--camera ── read_inputs ───┼─ Diff4SplatPipeline ─ Scene ─ render_into ─ write_scene_folder
 --prompt ── require_prompt ┘
 """
 
@@ -14,7 +14,7 @@ import tyro
 
 from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.adapter import AdapterFolder, require_video_model
-from diff4splat.cli.options.camera import CameraOptions, choose_path, require_camera
+from diff4splat.cli.options.camera import CameraOptions, choose_path, read_preset, require_camera
 from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.depth import (
     DepthFileOrName,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from diff4splat.outputs.card import Result
     from diff4splat.outputs.compressed_scene import SceneFileFacts
     from diff4splat.paths.camera_path import CameraPath
+    from diff4splat.paths.preset_path import PresetPath
     from diff4splat.progress.phases import Phases
     from diff4splat.progress.run_log import RunLog
     from diff4splat.scene.scene import Scene
@@ -302,15 +303,18 @@ class Generate:
         lines += [f"Scene file: {scene_file}", empty_note(scene, record)]
         return result, scene_file, [line for line in lines if line]
 
-    def read_inputs(self) -> tuple["InputImage", "CameraPath"]:
-        """The photo at the model's size and the camera path, announced."""
+    def read_inputs(self) -> tuple["InputImage", "CameraPath | PresetPath"]:
+        """The photo at the model's size and the camera path, announced.
+
+        Presets are sized once the depth of the photo is known.
+        """
         from diff4splat.generation.inputs.input_cameras import path_frame, reconcile_intrinsics
 
         input_image = self.read_image()
         asked = choose_path(self.camera, path_frame(input_image.camera), self.options)
         input_image, path = reconcile_intrinsics(input_image, asked)
         self.announce(input_image, path)
-        return input_image, path
+        return input_image, read_preset(self.camera, self.options) or path
 
     def announce(self, input_image: "InputImage", path: "CameraPath") -> None:
         """Say what is known before the work; refuse what cannot fit.

@@ -126,7 +126,7 @@ def scene_lines(file: Path) -> list[str]:
         "time": f"{start_s:g} to {stop_s:g} s",
         "dilation": f"{scene.dilation_px2:g} px²",
         "cameras": f"{len(scene.path)} of {width} by {height} px",
-        "depth": f"near {depths.near:.3g}, median {depths.focus:.3g} scene units",
+        "depth": f"near {depths.near:.3g}, focus {depths.focus:.3g} scene units",
         **{key: str(value) for key, value in asdict(scene.provenance).items()},
     }
     return [f"{name:<16}{value}" for name, value in facts.items()]

@@ -24,6 +24,7 @@ from diff4splat.generation.inputs.request import (
     UserInput,
     negative_prompt,
     prepare_request,
+    sized_to_depth,
 )
 from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
@@ -39,6 +40,7 @@ from diff4splat.generation.visible_fill import without_visible
 from diff4splat.models.hub.model import Model, load_model, save_model, with_adapter, with_parts
 from diff4splat.models.placement.resident import keep_blocks
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.paths.preset_path import PresetPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import DILATION_PX2, Provenance, Scene
 
@@ -85,7 +87,7 @@ class Diff4SplatPipeline:
     def __call__(
         self,
         image: InputImage | Path | str,
-        path: CameraPath | str,
+        path: CameraPath | PresetPath | str,
         prompt: str | None = None,
         *,
         seed: int = 0,
@@ -97,7 +99,8 @@ class Diff4SplatPipeline:
 
         Args:
             image: a photograph's file, or a prepared ``InputImage``.
-            path: cameras, or presets such as ``spiral+forward``; becomes the suggested path.
+            path: cameras, or presets such as ``spiral+forward``, sized to the depth of the image;
+                becomes the suggested path.
             prompt: what moves; without one nothing does.
             seed: of the noise that sampling starts from.
             settings: sampling, guidance, filling and pruning.
@@ -138,6 +141,7 @@ class Diff4SplatPipeline:
             text = self._text_states(request, log)
             motion = MotionRequest(text=text.prompt, seed=request.seed, settings=request.settings)
             maps = image_maps(model, copies, frames, motion, log)
+        request = sized_to_depth(request, maps.depth)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(
             gaussians=gaussians.gaussians,

@@ -68,7 +68,7 @@ def f_stop_radius(options: OpticsOptions, path: "CameraPath") -> float:
 def central_focus(scene: "Scene", path: "CameraPath") -> Focus:
     """The depth at the centre of the first frame.
 
-    The median depth of the scene, if no Gaussian covers that pixel.
+    The focus depth of the scene, if no Gaussian covers that pixel.
     """
     from diff4splat.render.api import render
     from diff4splat.scene.extent import depth_range
@@ -83,5 +83,5 @@ def central_focus(scene: "Scene", path: "CameraPath") -> Focus:
     depth = depth_range(scene).focus
     return Focus(
         distance=depth,
-        note=f"focus: {depth:.4g}, the median depth, since frame 0 shows nothing in its middle",
+        note=f"focus: {depth:.4g}, the focus depth, since frame 0 shows nothing in its middle",
     )

@@ -9,6 +9,7 @@ from diff4splat.errors import ConfigError
 
 if TYPE_CHECKING:
     from diff4splat.paths.camera_path import CameraPath
+    from diff4splat.paths.preset_path import PresetPath
     from diff4splat.paths.settings import PathFrame
 
 PRESET_FRAMES, DEFAULT_FPS = 49, 24.0
@@ -61,20 +62,24 @@ def choose_path(camera: str, view: "PathFrame", options: CameraOptions) -> "Came
     Raises:
         InputError: neither a known preset nor a readable path file.
     """
-    return _from_file(camera, view, options) if _is_file(camera) else _preset(camera, view, options)
+    preset = read_preset(camera, options)
+    return _from_file(camera, view, options) if preset is None else preset.sized_to(view)
 
 
-def _preset(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":
-    from diff4splat.paths.build import build_path
+def read_preset(camera: str, options: CameraOptions) -> "PresetPath | None":
+    """The presets that ``camera`` names, with their timing; None for a path file."""
+    from diff4splat.paths.preset_path import PresetPath
     from diff4splat.paths.settings import PathSettings
 
+    if _is_file(camera):
+        return None
     settings = PathSettings(
         frames=PRESET_FRAMES if options.frames is None else options.frames,
         fps=DEFAULT_FPS if options.fps is None else options.fps,
         amplitude=options.amplitude,
         easing=options.easing,
     )
-    return build_path(camera, view, settings)
+    return PresetPath(text=camera, settings=settings)
 
 
 def _from_file(camera: str, view: "PathFrame", options: CameraOptions) -> "CameraPath":

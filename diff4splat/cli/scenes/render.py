@@ -152,17 +152,14 @@ class Render:
     def chosen_path(self, scene: "Scene") -> "CameraPath":
         """Cameras at the requested size, with their times."""
         from diff4splat.paths.resize import resized
-        from diff4splat.paths.settings import PathFrame
-        from diff4splat.scene.extent import depth_range
+        from diff4splat.scene.extent import scene_frame
 
         path = scene.path
         if self.resolution is not None:
             path = resized(path, longer_side(path.cameras.size_px, self.resolution))
         if self.camera is None:
             return scene_path(path, self.options)
-        depths = depth_range(scene)
-        view = PathFrame(camera=path.cameras[0], near_depth=depths.near, focus_depth=depths.focus)
-        return choose_path(self.camera, view, self.options)
+        return choose_path(self.camera, scene_frame(scene, path.cameras[0]), self.options)
 
 
 def in_dtype(scene: "Scene", dtype: str) -> "Scene":

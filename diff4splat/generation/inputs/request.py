@@ -17,6 +17,8 @@ from diff4splat.generation.inputs.image_size import (
     size_multiple_px,
 )
 from diff4splat.generation.inputs.input_cameras import (
+    as_preset,
+    path_in_depth,
     reconcile_intrinsics,
     resample_to_model_frames,
     to_camera_path,
@@ -33,6 +35,7 @@ from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.hub.model import Model
 from diff4splat.models.text_encoder.prompt import require_prompt
 from diff4splat.paths.camera_path import CameraPath
+from diff4splat.paths.preset_path import PresetPath
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +43,7 @@ class UserInput:
     """What a generation is asked for."""
 
     image: InputImage | Path | str
-    path: CameraPath | str
+    path: CameraPath | PresetPath | str
     prompt: str | None
     seed: int
     settings: GenerationSettings
@@ -63,6 +66,8 @@ class Request:
     settings: GenerationSettings
     plan: GenerationPlan
     depth: DepthSource | None = None
+    preset: PresetPath | None = None
+    """What ``path`` was built from, to be sized to the depth of the image."""
 
     @property
     def key_times_s(self) -> Float[Tensor, " k"]:
@@ -109,7 +114,17 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         settings=_with_guidance(settings, config),
         plan=plan,
         depth=user.depth,
+        preset=as_preset(user.path),
     )
+
+
+def sized_to_depth(request: Request, depth: Float[Tensor, "h w"]) -> Request:
+    """The request with presets sized to the depth of the image; given cameras stay as they are."""
+    if request.preset is None:
+        return request
+    path = path_in_depth(request.preset, request.path.cameras[0], depth)
+    small_path = _network_path(path, len(request.small_path), request.small).to(depth.device)
+    return replace(request, path=path, small_path=small_path)
 
 
 def _with_guidance(settings: GenerationSettings, config: ModelConfig) -> GenerationSettings:

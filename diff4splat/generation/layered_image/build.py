@@ -1,6 +1,6 @@
 """From an image, its depth and its displacement to all layers.
 
-    image and maps ─ upsample ─ smooth ─ grow foreground ─ pixels ─ subpixel infill     these show
+    image and maps ─ upsample ─ smooth, align edges ─ grow foreground ─ pixels ─ infill  these show
     pixels ─┬─ occluded layer                                    the image; all others extend
             └─ disoccluded layer ─ fine border                       it into what it hides
     smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving
@@ -30,6 +30,7 @@ from diff4splat.generation.layered_image.disocclusion import (
 )
 from diff4splat.generation.layered_image.fine_border import fine_border
 from diff4splat.generation.layered_image.pixel_maps.depth_smoothing import smooth_maps
+from diff4splat.generation.layered_image.pixel_maps.edge_alignment import align_static_edges
 from diff4splat.generation.layered_image.pixel_maps.foreground import grow_foreground
 from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
@@ -104,10 +105,10 @@ def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list
 def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageLayer:
     """One opaque cell per pixel of the image."""
     depth, displacement = _pixel_maps(small.rgb, image.rgb, maps)
+    cell_px = len(image.rgb) // len(_finest(small, maps))
     if _is_reduced(small, image) and (maps.fine is None or maps.fine.smooth):
         depth, displacement = smooth_maps(depth, displacement, image.rgb)
-    # Edges of a map are as wide as its cells.
-    cell_px = len(image.rgb) // len(_finest(small, maps))
+        depth = align_static_edges(depth, displacement, image.rgb, cell_px)
     depth, displacement = grow_foreground(depth, displacement, cell_px)
     return ImageLayer(
         camera=image.camera,

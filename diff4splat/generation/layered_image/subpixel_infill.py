@@ -1,24 +1,30 @@
 """Cells half a pixel apart, between the image's pixels (ours, ADR 24).
 
-Axes: ``h w`` pixels, ``hh ww`` = 2 h − 1, 2 w − 1 lattice points, ``t`` latent frames. From other
-sides, pixels of one surface move apart: small Gaussians leave gaps, large ones blur. Lattice points
-between pixels are interpolated, cubic in colour and linear in inverse depth, in which planes are
-planes. Across a depth edge that gives a thin sheet, which hides less than a gap would.
+Axes: ``h w`` pixels, ``hh ww`` = 2 h − 1, 2 w − 1 lattice points, ``v`` = w − 1, ``t`` latent
+frames. From other sides, pixels of one surface move apart: small Gaussians leave gaps, large ones
+blur. Lattice points between pixels are interpolated, cubic in colour and linear in inverse depth,
+in which planes are planes. Across a depth edge they belong to the far side: in between, they would
+be an outline of their own from other sides.
 """
 
 from dataclasses import replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.types import ImageLayer
+from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
 from diff4splat.geometry.camera import Camera
+
+DEPTH_STEP = 0.06
+"""Difference of log depth between neighbours that makes an edge."""
+SLOPE_FACTOR = 2.0
+"""An edge is so many times as high as the steps beside it."""
 
 
 def subpixel_infill(image: ImageLayer) -> ImageLayer:
     """The lattice without the pixels themselves; each point moves as the nearest pixel."""
-    depth = 1 / _interpolate(1 / image.depth[None], "bilinear")[0]
+    depth = _lattice_depth(image.depth, moving_mask(image.depth, image.displacement))
     rows, columns = _nearest(image, depth)
     between = torch.ones_like(depth, dtype=torch.bool)
     between[::2, ::2] = False
@@ -36,6 +42,45 @@ def subpixel_infill(image: ImageLayer) -> ImageLayer:
         displacement=displacement,
         in_image=True,
     )
+
+
+def _lattice_depth(
+    depth: Float[Tensor, "h w"], moving: Bool[Tensor, "h w"]
+) -> Float[Tensor, "hh ww"]:
+    """Interpolated on one surface; of the farthest neighbour across an edge of static pixels."""
+    is_edge = _edges(depth.log()) & (_largest_neighbour(moving.to(depth)) == 0)
+    even = 1 / _interpolate(1 / depth[None], "bilinear")[0]
+    return torch.where(is_edge, _largest_neighbour(depth), even)
+
+
+def _edges(log_depth: Float[Tensor, "h w"]) -> Bool[Tensor, "hh ww"]:
+    """Lattice points between pixels of two surfaces."""
+    across, down = _steps_apart(log_depth), _steps_apart(log_depth.mT).mT
+    height, width = log_depth.shape
+    edge = across.new_zeros(2 * height - 1, 2 * width - 1)
+    edge[::2, 1::2], edge[1::2, ::2] = across, down
+    edge[1::2, 1::2] = across[1:] | across[:-1] | down[:, 1:] | down[:, :-1]
+    return edge
+
+
+def _steps_apart(log_depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h v"]:
+    """Between each pixel and the next of its row: a step, and not a slope that goes on."""
+    step = log_depth.diff(dim=1).abs()
+    if step.shape[1] < 2:
+        return torch.zeros_like(step, dtype=torch.bool)
+    beside = torch.cat([step[:, 1:2], step, step[:, -2:-1]], 1)
+    slope = torch.maximum(beside[:, :-2], beside[:, 2:])
+    return (step > DEPTH_STEP) & (step > SLOPE_FACTOR * slope)
+
+
+def _largest_neighbour(values: Float[Tensor, "h w"]) -> Float[Tensor, "hh ww"]:
+    """Of the two or four pixels around each lattice point."""
+    for dim in (0, 1):
+        count = values.shape[dim]
+        step = torch.arange(2 * count - 1, device=values.device)
+        before, after = values.index_select(dim, step // 2), values.index_select(dim, -(-step // 2))
+        values = torch.maximum(before, after)
+    return values
 
 
 def lattice_camera(camera: Camera) -> Camera:

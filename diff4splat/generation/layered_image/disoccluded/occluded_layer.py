@@ -7,21 +7,27 @@ Axes: ``h w`` pixels. The other layers continue the image in cells of the smalle
 both sides of an edge are mixed: blots in the foreground's colours beside it.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
+from torch.nn.functional import max_pool2d, pad
 
 from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
 
-DEPTH_STEP = 0.15
+DEPTH_STEP = 0.08
 """Difference of log depth that makes an edge."""
+SLOPE_SHARE = 1 / 3
+"""Of the step: what the far side may still slope beside it."""
 WINDOW_PX = 5
 """Side of the window that an edge fits into: smoothed depth takes some pixels for it."""
+MARGIN_SHARE = 1 / 64
+"""Of the image's longer side: beside an edge, colours of the foreground are mixed in."""
 REACH_SHARE = 1 / 6
 """Of the image's longer side: what a camera path disoccludes behind an edge."""
 
@@ -44,13 +50,13 @@ def occluded_layer(pixels: ImageLayer) -> ImageLayer | None:
     foreground = nearest.log_depth - pixels.depth.log() > DEPTH_STEP / 2
     # Another layer lies behind what moves.
     moving = grown(moving_mask(pixels.depth, pixels.displacement), 1)
-    known = ~grown(foreground, 1) & ~moving
+    known = ~grown(foreground, math.ceil(MARGIN_SHARE * max(edge.shape))) & ~moving
     within = nearest.distance_px < REACH_SHARE * max(edge.shape)
     mask = grown(foreground, 1) & within & ~moving
     if not bool(known.any()) or not bool(mask.any()):
         return None
     # A footprint covers the neighbours too.
-    farthest = torch.nn.functional.max_pool2d(pixels.depth[None], 3, 1, 1)[0]
+    farthest = max_pool2d(pixels.depth[None], 3, 1, 1)[0]
     return static_layer(pixels, known, mask, farthest)
 
 
@@ -58,10 +64,12 @@ def far_side_of_edges(depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
     """Pixels beside a nearer surface that are about as far as the farthest around them."""
     half = WINDOW_PX // 2
     log_depth = depth.log()
-    around = torch.nn.functional.pad(log_depth[None, None], (half,) * 4, mode="replicate")
-    farthest = torch.nn.functional.max_pool2d(around, WINDOW_PX, 1)[0, 0]
-    nearest = -torch.nn.functional.max_pool2d(-around, WINDOW_PX, 1)[0, 0]
-    return (log_depth - nearest > DEPTH_STEP) & (farthest - log_depth < DEPTH_STEP / 3)
+    around = pad(log_depth[None, None], (half,) * 4, mode="replicate")
+    farthest = max_pool2d(around, WINDOW_PX, 1)[0, 0]
+    step = log_depth + max_pool2d(-around, WINDOW_PX, 1)[0, 0]
+    # Where the window leaves the image, half a slope looks like a step.
+    rim = pad(torch.zeros_like(depth)[half:-half, half:-half], (half,) * 4, value=1.0)
+    return (step > DEPTH_STEP * (1 + rim)) & (farthest - log_depth < SLOPE_SHARE * step)
 
 
 def nearest_edge(depth: Float[Tensor, "h w"], edge: Bool[Tensor, "h w"]) -> NearestEdge:

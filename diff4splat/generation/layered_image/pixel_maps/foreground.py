@@ -15,33 +15,39 @@ DEPTH_STEP = 0.06
 
 
 def grow_foreground(
-    depth: Float[Tensor, "h w"], displacement: Float[Tensor, "t h w 3"] | None, times: int
+    depth: Float[Tensor, "h w"], displacement: Float[Tensor, "t h w 3"] | None, cell_px: int
 ) -> tuple[Float[Tensor, "h w"], Float[Tensor, "t h w 3"] | None]:
-    """Both maps with the foreground grown by a pixel, ``times`` times; depth is above 0.
+    """Both maps with the foreground grown by a pixel; depth is above 0.
 
-    What moves has its rim already: only moving pixels join it, and they join nothing else.
+    Within what moves it grows by a cell of the depth map, in which edges lie there. What moves has
+    its rim already: only moving pixels join it, and they join nothing else.
     """
     # Pixels join those that move alike, so growing changes nothing of it.
     moving = moving_mask(depth, displacement)
-    for _ in range(times):
-        source = foreground_source(depth, moving)
+    growing = torch.ones_like(moving)
+    for _ in range(cell_px):
+        source = foreground_source(depth, moving, growing)
         depth = depth.flatten()[source]
         if displacement is not None:
             displacement = displacement.flatten(1, 2)[:, source]
+        growing = moving
     return depth, displacement
 
 
 def foreground_source(
-    depth: Float[Tensor, "h w"], moving: Bool[Tensor, "h w"]
+    depth: Float[Tensor, "h w"], moving: Bool[Tensor, "h w"], growing: Bool[Tensor, "h w"]
 ) -> Int[Tensor, "h w"]:
-    """Flat index of the pixel whose surface each pixel belongs to: a neighbour's or its own."""
+    """Flat index of the pixel whose surface each pixel belongs to: a neighbour's or its own.
+
+    Only ``growing`` pixels join a neighbour.
+    """
     log_depth = depth.log()
     own = torch.arange(depth.numel(), device=depth.device).view_as(depth)
     near = _with_neighbours(log_depth, torch.inf)
     nearest = near.min(0)
     pixels = _with_neighbours(own, 0.0).gather(0, nearest.indices[None])[0]
     joins = log_depth - nearest.values > DEPTH_STEP
-    joins &= moving == moving.flatten()[pixels]
+    joins &= growing & (moving == moving.flatten()[pixels])
     return torch.where(joins, pixels, own)
 
 

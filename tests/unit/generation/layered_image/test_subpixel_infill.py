@@ -1,5 +1,7 @@
 """Between the pixels of an image: place, size, colour and displacement."""
 
+import math
+
 import pytest
 import torch
 from image_layers import FAR_RANGES, FOCAL_PX, is_finite, layer, layered, random_depth
@@ -7,7 +9,11 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.build import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.gaussians import image_gaussians, layer_gaussians
-from diff4splat.generation.layered_image.subpixel_infill import lattice_camera, subpixel_infill
+from diff4splat.generation.layered_image.subpixel_infill import (
+    DEPTH_STEP,
+    lattice_camera,
+    subpixel_infill,
+)
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import pinhole, project
 from diff4splat.render.api import render
@@ -101,15 +107,29 @@ def test_a_static_image_has_a_static_infill() -> None:
     assert subpixel_infill(pixels(plane())).displacement is None
 
 
-@pytest.mark.parametrize("far", [1e4, 1e8])
-def test_a_depth_edge_is_bridged_by_the_harmonic_mean(far: float) -> None:
+@pytest.mark.parametrize("far", [2.2, 1e4, 1e8])
+def test_across_a_depth_edge_points_belong_to_the_far_side(far: float) -> None:
     depth = torch.full(SIZE_PX, 2.0)
-    depth[:, 3:] = far
+    depth[2:, 3:] = far
     infill = subpixel_infill(pixels(depth))
-    edge = infill.depth[:, 5]
-    torch.testing.assert_close(
-        edge, torch.full_like(edge, 2 / (1 / 2.0 + 1 / far)), rtol=1e-3, atol=0
-    )
+    rows, columns = lattice()
+    near = (rows < 1.5) & (columns >= 0) | (columns < 2.5)
+    torch.testing.assert_close(infill.depth, torch.where(near, 2.0, far), rtol=1e-6, atol=0)
+
+
+def test_a_step_below_the_threshold_is_bridged() -> None:
+    depth = torch.full(SIZE_PX, 2.0)
+    depth[:, 3:] = 2.0 * math.exp(0.9 * DEPTH_STEP)
+    between = subpixel_infill(pixels(depth)).depth[:, 5]
+    assert float(between.min()) > 2.0 and float(between.max()) < float(depth.max())
+
+
+def test_across_the_edge_of_what_moves_points_are_in_between() -> None:
+    depth, displacement = torch.full(SIZE_PX, 2.0), torch.zeros(2, *SIZE_PX, 3)
+    depth[:, 3:] = 6.0
+    displacement[1, :, :3] = 0.5
+    between = subpixel_infill(pixels(depth, displacement=displacement)).depth[:, 5]
+    torch.testing.assert_close(between, torch.full_like(between, 3.0))
 
 
 @pytest.mark.parametrize("limits", FAR_RANGES)

@@ -88,6 +88,23 @@ def test_the_middle_of_a_smoothed_edge_is_not_its_far_side() -> None:
     assert torch.equal(edge.any(0).nonzero()[:, 0], torch.tensor([11, 12]))
 
 
+def test_a_far_side_may_slope() -> None:
+    profile = torch.cat([torch.full((8,), NEAR), FAR * torch.exp(0.07 * torch.arange(12.0))])
+    edge = far_side_of_edges(profile.expand(9, 20))
+    assert edge[4].nonzero()[:, 0].tolist() == [8, 9]
+
+
+def test_colours_beside_an_edge_are_not_those_of_the_far_side() -> None:
+    columns = torch.arange(192)
+    near = ((columns > 80) & (columns < 110)).expand(16, 192)
+    mixed = ((columns > 77) & (columns < 113)).expand(16, 192)
+    rgb = torch.where(mixed[..., None], RED, BLUE)
+    pixels = layer(torch.where(near, NEAR, FAR), rgb=rgb, pixel_index=torch.zeros(16, 192).long())
+    found = occluded_layer(pixels)
+    inside = found.rgb[near & found.mask]
+    torch.testing.assert_close(inside, BLUE.expand_as(inside), atol=0.02, rtol=0)
+
+
 def test_what_moves_has_a_layer_of_its_own() -> None:
     displacement = torch.zeros(2, SIDE, SIDE, 3)
     displacement[1, _box()] = 0.5

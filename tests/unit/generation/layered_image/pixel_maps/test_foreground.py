@@ -33,25 +33,25 @@ def _loop(depth: Tensor) -> Tensor:
     return result
 
 
-@pytest.mark.parametrize("times", [0, 1, 2, 3])
-def test_it_grows_by_a_pixel_a_time(times: int) -> None:
-    grown, _ = grow_foreground(_depth(), None, times)
+@pytest.mark.parametrize("cell_px", [1, 2, 3])
+def test_it_grows_by_a_pixel(cell_px: int) -> None:
+    grown, _ = grow_foreground(_depth(), None, cell_px)
     rows, columns = torch.meshgrid(torch.arange(9), torch.arange(9), indexing="ij")
-    near = (rows - 4).abs() + (columns - 4).abs() <= times
+    near = (rows - 4).abs() + (columns - 4).abs() <= 1
     assert torch.equal(grown, torch.where(near, NEAR, FAR))
 
 
 def test_static_pixels_do_not_join_what_moves() -> None:
     displacement = torch.zeros(3, 9, 9, 3)
     displacement[1:, 4, 4] = torch.tensor([0.5, -0.25, 1.0])
-    depth, moved = grow_foreground(_depth(), displacement, 2)
+    depth, moved = grow_foreground(_depth(), displacement, 1)
     assert torch.equal(depth, _depth()) and torch.equal(moved, displacement)
 
 
 def test_moving_pixels_do_not_join_what_is_static() -> None:
     displacement = torch.full((2, 9, 9, 3), 0.5)
     displacement[:, 4, 4] = 0
-    depth, moved = grow_foreground(_depth(), displacement, 2)
+    depth, moved = grow_foreground(_depth(), displacement, 1)
     assert torch.equal(depth, _depth()) and torch.equal(moved, displacement)
 
 
@@ -66,9 +66,18 @@ def test_within_what_moves_pixels_move_along() -> None:
     assert torch.equal(moved.any(-1).any(0), displacement.any(-1).any(0))
 
 
+@pytest.mark.parametrize("cell_px", [1, 2, 3])
+def test_within_what_moves_it_grows_by_a_cell(cell_px: int) -> None:
+    moves = torch.full((2, 9, 9, 3), 0.25)
+    grown, _ = grow_foreground(_depth(), moves, cell_px)
+    rows, columns = torch.meshgrid(torch.arange(9), torch.arange(9), indexing="ij")
+    near = (rows - 4).abs() + (columns - 4).abs() <= cell_px
+    assert torch.equal(grown, torch.where(near, NEAR, FAR))
+
+
 def test_slopes_below_the_step_stay() -> None:
     depth = torch.exp(0.9 * DEPTH_STEP * torch.arange(12.0)).expand(5, 12)
-    assert torch.equal(grow_foreground(depth, None, 4)[0], depth)
+    assert torch.equal(grow_foreground(depth, None, 1)[0], depth)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1)])
