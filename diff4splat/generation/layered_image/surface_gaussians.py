@@ -23,22 +23,23 @@ SLOPE_UNIT = 2.0
 """Steps in depth, over those across the image, are multiples: few shapes make a small file."""
 MOST_UNITS = 3
 """Steeper surfaces are as good as edges."""
-THICKNESS = 0.5
-"""Across the surface, over the shorter side along it."""
 
 
 @torch.no_grad()
 def along_surface(gaussians: Gaussians, layer: ImageLayer) -> Gaussians:
-    """Those of ``layer``'s valid cells, with the shape of the surface."""
+    """Those of ``layer``'s valid cells, with the shape of the surface.
+
+    A wall has spheres; the longer they are along the surface, the thinner across.
+    """
     across, down = (steps[layer.mask] for steps in surface_steps(layer))
     axes, lengths = principal_axes(across, down)
     rotation = layer.camera.world_from_camera[:3, :3].to(axes) @ axes
-    thickness = THICKNESS * lengths.amin(-1, keepdim=True)
+    thickness = lengths.amin(-1).square() / lengths.amax(-1)
     size = layer.footprint_px * layer.depth[layer.mask]
     return replace(
         gaussians,
         quats=quaternion.from_matrix(rotation),
-        scales=size[:, None] * torch.cat([lengths, thickness], -1),
+        scales=size[:, None] * torch.cat([lengths, thickness[:, None]], -1),
     )
 
 
