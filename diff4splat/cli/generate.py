@@ -26,7 +26,6 @@ from diff4splat.cli.options.device import render_device, require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.models import (
     ModelName,
-    prompt_notes,
     require_prompt_for,
     require_runtime,
 )
@@ -308,33 +307,14 @@ class Generate:
 
         Presets are sized once the depth of the photo is known.
         """
+        from diff4splat.cli.common.generation_notes import announce
         from diff4splat.generation.inputs.input_cameras import path_frame, reconcile_intrinsics
 
-        input_image = self.read_image()
+        input_image, preset = self.read_image(), read_preset(self.camera, self.options)
         asked = choose_path(self.camera, path_frame(input_image.camera), self.options)
         input_image, path = reconcile_intrinsics(input_image, asked)
-        self.announce(input_image, path)
-        return input_image, read_preset(self.camera, self.options) or path
-
-    def announce(self, input_image: "InputImage", path: "CameraPath") -> None:
-        """Say what is known before the work; refuse what cannot fit.
-
-        Raises:
-            ConfigError: more memory or disk is needed than is free.
-        """
-        from diff4splat.cli.common.console import note
-        from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-        from diff4splat.outputs.run_estimate import estimate_generation, require_fits
-        from diff4splat.paths.summary import summarize
-
-        note("; ".join((f"focal length: {input_image.focal_source}", *input_image.notes)))
-        for line in prompt_notes(self.prompt, self.model):
-            note(line)
-        for warning in summarize(path, PLANE_DEPTH).warnings:
-            note(f"camera path: {warning}")
-        size_px, depth = input_image.camera.size_px, not self.skip_depth
-        needed = estimate_generation(len(path), size_px, depth, self.video == "gif")
-        require_fits(needed, self.out, "fewer --frames, --skip-depth or a smaller size")
+        announce(self, input_image, path)
+        return input_image, path if preset is None else preset
 
     def video_name(self) -> str:
         """The name of the video, which says its format."""

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
+from diff4splat.generation.layered_image.windows import largest_around
 from diff4splat.models.blocks.conv_block import CELL_PX
 
 GROWN_PX = 2
@@ -86,9 +87,7 @@ def fill_from_neighbours(
 
 def grown(mask: Bool[Tensor, "h w"], margin_px: int = GROWN_PX) -> Bool[Tensor, "h w"]:
     """The mask with a margin around it."""
-    side, plane = 2 * margin_px + 1, mask.float()[None, None]
-    rows = torch.nn.functional.max_pool2d(plane, (side, 1), 1, (margin_px, 0))
-    return torch.nn.functional.max_pool2d(rows, (1, side), 1, (0, margin_px))[0, 0] > 0
+    return largest_around(mask.float(), margin_px) > 0
 
 
 def _inpaints(static: Bool[Tensor, "h w"]) -> bool:

@@ -13,11 +13,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
+from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer, moving_mask
 from diff4splat.geometry.camera import Camera
 
-DEPTH_STEP = 0.06
-"""Difference of log depth between neighbours that makes an edge."""
 SLOPE_FACTOR = 2.0
 """An edge is so many times as high as the steps beside it."""
 

@@ -12,13 +12,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.types import ImageLayer
+from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.rays import camera_rays
 from diff4splat.scene.gaussians import Gaussians
 
-MAX_STEP = 0.06
-"""Difference of log depth between cells from which it is an edge and not a slope."""
 SLOPE_UNIT = 2.0
 """Steps in depth, over those across the image, are multiples: few shapes make a small file."""
 MOST_UNITS = 3
@@ -87,4 +85,4 @@ def _slope(log_depth: Float[Tensor, "h w"], dim: int) -> Float[Tensor, "h w"]:
     nothing = torch.zeros_like(log_depth.narrow(dim, 0, 1))
     after, before = torch.cat([difference, nothing], dim), torch.cat([nothing, difference], dim)
     smaller = torch.where(after.abs() < before.abs(), after, before)
-    return smaller.where((after * before > 0) & (smaller.abs() <= MAX_STEP), 0.0)
+    return smaller.where((after * before > 0) & (smaller.abs() <= DEPTH_STEP), 0.0)

@@ -13,6 +13,8 @@ from torch import Tensor
 from diff4splat.errors import ShapeError
 from diff4splat.geometry.camera import Camera
 
+DEPTH_STEP = 0.06
+"""Difference of log depth between neighbouring pixels that makes an edge."""
 NO_PIXEL = -1
 """Index of a cell whose colour no pixel of the image decides."""
 

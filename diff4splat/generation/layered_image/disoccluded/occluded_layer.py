@@ -14,18 +14,18 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
-from torch.nn.functional import max_pool2d, pad
 
 from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
+from diff4splat.generation.layered_image.windows import largest_around, smallest_around
 
 DEPTH_STEP = 0.08
 """Difference of log depth that makes an edge."""
 SLOPE_SHARE = 1 / 3
 """Of the step: what the far side may still slope beside it."""
-WINDOW_PX = 5
-"""Side of the window that an edge fits into: smoothed depth takes some pixels for it."""
+WINDOW_RADIUS_PX = 2
+"""Of the window that an edge fits into: smoothed depth takes some pixels for it."""
 MARGIN_SHARE = 1 / 64
 """Of the image's longer side: beside an edge, colours of the foreground are mixed in."""
 REACH_SHARE = 1 / 6
@@ -56,20 +56,19 @@ def occluded_layer(pixels: ImageLayer) -> ImageLayer | None:
     if not bool(known.any()) or not bool(mask.any()):
         return None
     # A footprint covers the neighbours too.
-    farthest = max_pool2d(pixels.depth[None], 3, 1, 1)[0]
+    farthest = largest_around(pixels.depth, 1)
     return static_layer(pixels, known, mask, farthest)
 
 
 def far_side_of_edges(depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
     """Pixels beside a nearer surface that are about as far as the farthest around them."""
-    half = WINDOW_PX // 2
-    log_depth = depth.log()
-    around = pad(log_depth[None, None], (half,) * 4, mode="replicate")
-    farthest = max_pool2d(around, WINDOW_PX, 1)[0, 0]
-    step = log_depth + max_pool2d(-around, WINDOW_PX, 1)[0, 0]
+    log_depth, rim = depth.log(), torch.ones_like(depth)
+    step = log_depth - smallest_around(log_depth, WINDOW_RADIUS_PX)
+    slope = largest_around(log_depth, WINDOW_RADIUS_PX) - log_depth
     # Where the window leaves the image, half a slope looks like a step.
-    rim = pad(torch.zeros_like(depth)[half:-half, half:-half], (half,) * 4, value=1.0)
-    return (step > DEPTH_STEP * (1 + rim)) & (farthest - log_depth < SLOPE_SHARE * step)
+    inner = slice(WINDOW_RADIUS_PX, -WINDOW_RADIUS_PX)
+    rim[inner, inner] = 0
+    return (step > DEPTH_STEP * (1 + rim)) & (slope < SLOPE_SHARE * step)
 
 
 def nearest_edge(depth: Float[Tensor, "h w"], edge: Bool[Tensor, "h w"]) -> NearestEdge:

@@ -8,10 +8,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from diff4splat.generation.layered_image.types import moving_mask
-
-DEPTH_STEP = 0.06
-"""Difference of log depth between neighbours from which the nearer one is foreground."""
+from diff4splat.generation.layered_image.types import DEPTH_STEP, moving_mask
 
 
 def grow_foreground(

@@ -9,12 +9,8 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.build import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.gaussians import image_gaussians, layer_gaussians
-from diff4splat.generation.layered_image.subpixel_infill import (
-    DEPTH_STEP,
-    lattice_camera,
-    subpixel_infill,
-)
-from diff4splat.generation.layered_image.types import ImageLayer
+from diff4splat.generation.layered_image.subpixel_infill import lattice_camera, subpixel_infill
+from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer
 from diff4splat.geometry.camera import pinhole, project
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings

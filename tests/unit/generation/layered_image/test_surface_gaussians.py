@@ -10,13 +10,12 @@ from torch import Tensor
 from diff4splat.generation.layered_image.build import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.surface_gaussians import (
-    MAX_STEP,
     MOST_UNITS,
     SLOPE_UNIT,
     principal_axes,
     surface_steps,
 )
-from diff4splat.generation.layered_image.types import ImageLayer
+from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import camera_rays
@@ -60,7 +59,7 @@ def test_steps_lead_to_the_next_pixel(units: float) -> None:
 
 @pytest.mark.parametrize(("units", "want"), [(0.4, 0), (0.6, 1), (1.4, 1), (20.0, MOST_UNITS)])
 def test_slopes_are_few(units: float, want: int) -> None:
-    units = min(units, 0.9 * MAX_STEP * FOCAL_PX / SLOPE_UNIT)
+    units = min(units, 0.9 * DEPTH_STEP * FOCAL_PX / SLOPE_UNIT)
     across, _ = surface_steps(pixels(receding(units)))
     slope = across[:, 1:-1, 2] * FOCAL_PX / SLOPE_UNIT
     torch.testing.assert_close(slope, torch.full_like(slope, min(want, round(units))))
@@ -102,7 +101,7 @@ def test_a_depth_edge_stretches_nothing() -> None:
 
 
 def test_steps_above_the_threshold_are_edges() -> None:
-    depth = torch.exp(1.1 * MAX_STEP * torch.arange(16.0)).expand(SIZE_PX)
+    depth = torch.exp(1.1 * DEPTH_STEP * torch.arange(16.0)).expand(SIZE_PX)
     relative = layer_gaussians(pixels(depth)).scales / depth.flatten()[:, None]
     torch.testing.assert_close(relative.std(0), torch.zeros(3), atol=1e-6, rtol=0)
 

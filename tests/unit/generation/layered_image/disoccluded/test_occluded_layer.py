@@ -122,6 +122,15 @@ def test_the_nearest_edge_of_a_pixel() -> None:
     assert float(found.distance_px[3, 4]) == pytest.approx(5, rel=0.05)
 
 
+@pytest.mark.parametrize("size", [(1, 1), (3, 3), (4, 9)])
+def test_small_images_have_edges_too(size: tuple[int, int]) -> None:
+    depth = torch.full(size, FAR)
+    depth[:, 0] = NEAR
+    edge = far_side_of_edges(depth)
+    assert edge.shape == size
+    assert bool(edge[:, 1:3].all()) and not bool(edge[:, :1].any())
+
+
 @pytest.mark.parametrize("scale", [1e-30, 1e30])
 def test_any_unit_will_do(scale: float) -> None:
     pixels = _pixels()

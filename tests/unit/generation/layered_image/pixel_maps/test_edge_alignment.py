@@ -8,11 +8,11 @@ from image_layers import FAR_RANGES, random_depth
 from torch import Tensor
 
 from diff4splat.generation.layered_image.pixel_maps.edge_alignment import (
-    DEPTH_STEP,
     align_edges,
     align_static_edges,
     beside_edges,
 )
+from diff4splat.generation.layered_image.types import DEPTH_STEP
 
 SIZE_PX, EDGE, CELL_PX = (24, 32), 16, 2
 NEAR, FAR = 2.0, 3.0

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import Tensor
 
-from diff4splat.generation.layered_image.pixel_maps.foreground import DEPTH_STEP, grow_foreground
+from diff4splat.generation.layered_image.pixel_maps.foreground import grow_foreground
+from diff4splat.generation.layered_image.types import DEPTH_STEP
 
 NEAR, FAR = 2.0, 6.0
 

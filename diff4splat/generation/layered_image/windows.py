@@ -1,0 +1,20 @@
+"""Extremes in a window around every pixel; beyond the border lie the pixels of the border.
+
+Axes: ``h w`` pixels.
+"""
+
+from jaxtyping import Float
+from torch import Tensor
+from torch.nn.functional import max_pool2d, pad
+
+
+def largest_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
+    """Of the square that reaches ``radius_px`` to every side."""
+    padded = pad(values[None, None], (radius_px,) * 4, mode="replicate")
+    rows = max_pool2d(padded, (2 * radius_px + 1, 1), 1)
+    return max_pool2d(rows, (1, 2 * radius_px + 1), 1)[0, 0]
+
+
+def smallest_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
+    """Of the same square."""
+    return -largest_around(-values, radius_px)
