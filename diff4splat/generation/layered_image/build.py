@@ -32,6 +32,7 @@ from diff4splat.generation.layered_image.fine_border import fine_border
 from diff4splat.generation.layered_image.pixel_maps.depth_smoothing import smooth_maps
 from diff4splat.generation.layered_image.pixel_maps.edge_alignment import align_static_edges
 from diff4splat.generation.layered_image.pixel_maps.foreground import grow_foreground
+from diff4splat.generation.layered_image.pixel_maps.moving_rim import with_moving_rim
 from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, moving_mask
@@ -109,6 +110,8 @@ def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageL
     if _is_reduced(small, image) and (maps.fine is None or maps.fine.smooth):
         depth, displacement = smooth_maps(depth, displacement, image.rgb)
         depth = align_static_edges(depth, displacement, image.rgb, cell_px)
+        if displacement is not None:
+            depth, displacement = with_moving_rim(depth, displacement, image.rgb)
     depth, displacement = grow_foreground(depth, displacement, cell_px)
     return ImageLayer(
         camera=image.camera,

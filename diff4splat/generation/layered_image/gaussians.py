@@ -10,7 +10,6 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from diff4splat.generation.layered_image.surface_gaussians import along_surface
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
 from diff4splat.geometry.camera import stack_cameras
 from diff4splat.geometry.depth import distance_from_depth
@@ -41,7 +40,7 @@ class GaussianSet:
 
 
 def layer_gaussians(layer: ImageLayer) -> Gaussians:
-    """One Gaussian per valid cell; those that extend the image face the camera."""
+    """One Gaussian per valid cell, facing the camera."""
     cameras = stack_cameras([layer.camera])
     depth = layer.depth.where(layer.mask, 1.0)[None]
     base = PixelBase(
@@ -52,8 +51,7 @@ def layer_gaussians(layer: ImageLayer) -> Gaussians:
     )
     zero = depth.new_zeros(sum(GAUSSIAN_SPLIT), *depth.shape)
     config = ActivationConfig(footprint_px=layer.footprint_px)
-    facing = activate(zero, base, config).select(layer.mask.flatten())
-    return along_surface(facing, layer) if layer.in_image else facing
+    return activate(zero, base, config).select(layer.mask.flatten())
 
 
 def image_gaussians(image: LayeredImage, key_times_s: Float[Tensor, " k"]) -> GaussianSet:

@@ -11,12 +11,11 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.rigid_components import connected_components
 
 RIM_PX = 2
-EDGE_SHARE = 3 / 128
+EDGE_SHARE = 4 / 128
 """Of the image's longer side: width of the edge in which depth may be that of the background."""
-FARTHEST_SHARE = 1.05
-"""Depth over that of the object's surface nearby, above which it is the background's."""
 LEAST_LIKENESS = 0.5
 """Place of a colour between that of the background, 0, and of the object, 1."""
 LEAST_CONTRAST = 0.08
@@ -42,18 +41,23 @@ def with_rim(
 def on_surface(
     moving: Bool[Tensor, "h w"], depth: Float[Tensor, "h w"], mask: Bool[Tensor, "h w"]
 ) -> Float[Tensor, "h w"]:
-    """Depth without what lies far behind the object at its edge; ``moving`` is ``mask`` and more.
+    """Depth no farther than the object's surface at its edge; ``moving`` is ``mask`` and more.
 
     Depth edges lie beside colour edges. What is farther than the object would move less in the
-    image, and tear off.
+    image, and tear off; so does what is suddenly nearer.
     """
     edge_px = max(round(EDGE_SHARE * max(mask.shape)), 1)
-    core = ~grown(~mask, edge_px)
-    if not bool(core.any()):
-        core = mask
+    core = core_of_components(mask, edge_px)
     surface = depth.flatten()[nearest_inside(core)]
-    behind = ~mask | (depth > FARTHEST_SHARE * surface)
-    return torch.where(moving & ~core & behind, surface, depth)
+    surface = _mean_around(surface, edge_px)
+    on_edge = torch.where(mask, torch.minimum(depth, surface), surface)
+    return torch.where(moving & ~core, on_edge, depth)
+
+
+def core_of_components(mask: Bool[Tensor, "h w"], edge_px: int) -> Bool[Tensor, "h w"]:
+    """Each component without its edge; one that is nothing but edge as it is."""
+    core, component = ~grown(~mask, edge_px), connected_components(mask)
+    return core | (mask & ~torch.isin(component, component[core]))
 
 
 def likeness(
@@ -85,6 +89,12 @@ def nearest_inside(mask: Bool[Tensor, "h w"]) -> Int[Tensor, "h w"]:
     pixel_of_label = np.zeros(int(label.max()) + 1, np.int64)
     pixel_of_label[label.flat[inside]] = inside
     return torch.from_numpy(pixel_of_label[label]).to(mask.device)
+
+
+def _mean_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
+    """Of the square that reaches ``radius_px`` to every side."""
+    padded = torch.nn.functional.pad(values[None, None], (radius_px,) * 4, mode="replicate")
+    return torch.nn.functional.avg_pool2d(padded, 2 * radius_px + 1, 1)[0, 0]
 
 
 def _local_mean(

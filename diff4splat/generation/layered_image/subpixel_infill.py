@@ -3,26 +3,29 @@
 Axes: ``h w`` pixels, ``hh ww`` = 2 h − 1, 2 w − 1 lattice points, ``v`` = w − 1, ``t`` latent
 frames. From other sides, pixels of one surface move apart: small Gaussians leave gaps, large ones
 blur. Lattice points between pixels are interpolated, cubic in colour and linear in inverse depth,
-in which planes are planes. Across a depth edge they belong to the far side: in between, they would
-be an outline of their own from other sides.
+in which planes are planes. Across a depth edge they have depth and colour of the far side: in
+between, they would be an outline of their own from other sides.
 """
 
 from dataclasses import replace
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer, moving_mask
+from diff4splat.generation.layered_image.windows import largest_around
 from diff4splat.geometry.camera import Camera
 
+KERNEL_RADIUS = 3
+"""Of the cubic kernel, in steps of the lattice."""
 SLOPE_FACTOR = 2.0
 """An edge is so many times as high as the steps beside it."""
 
 
 def subpixel_infill(image: ImageLayer) -> ImageLayer:
     """The lattice without the pixels themselves; each point moves as the nearest pixel."""
-    depth = _lattice_depth(image.depth, moving_mask(image.depth, image.displacement))
+    depth, rgb = _lattice_maps(image)
     rows, columns = _nearest(image, depth)
     between = torch.ones_like(depth, dtype=torch.bool)
     between[::2, ::2] = False
@@ -32,7 +35,7 @@ def subpixel_infill(image: ImageLayer) -> ImageLayer:
         displacement = displacement[:, rows, columns] * ratio[..., None]
     return ImageLayer(
         camera=lattice_camera(image.camera),
-        rgb=_interpolate(image.rgb.movedim(-1, 0), "bicubic").clamp(0, 1).movedim(0, -1),
+        rgb=rgb,
         depth=depth,
         mask=between,
         opacity=image.opacity,
@@ -42,13 +45,20 @@ def subpixel_infill(image: ImageLayer) -> ImageLayer:
     )
 
 
-def _lattice_depth(
-    depth: Float[Tensor, "h w"], moving: Bool[Tensor, "h w"]
-) -> Float[Tensor, "hh ww"]:
-    """Interpolated on one surface; of the farthest neighbour across an edge of static pixels."""
-    is_edge = _edges(depth.log()) & (_largest_neighbour(moving.to(depth)) == 0)
+def _lattice_maps(image: ImageLayer) -> tuple[Float[Tensor, "hh ww"], Float[Tensor, "hh ww 3"]]:
+    """Depth and colours; across an edge of static pixels both are those of the far side.
+
+    Beside an edge the cubic kernel would see both sides, and draw a bright or dark outline.
+    """
+    depth, rgb = image.depth, image.rgb.movedim(-1, 0)
+    moving = moving_mask(depth, image.displacement)
+    far_side = _edges(depth.log()) & (_largest_neighbour(moving.to(depth)) == 0)
+    near_edge = largest_around(far_side.to(depth), KERNEL_RADIUS) > 0
+    colors = torch.where(near_edge, _interpolate(rgb, "bilinear"), _interpolate(rgb, "bicubic"))
     even = 1 / _interpolate(1 / depth[None], "bilinear")[0]
-    return torch.where(is_edge, _largest_neighbour(depth), even)
+    farthest = _farthest_neighbour(depth)
+    colors = torch.where(far_side, rgb.flatten(1)[:, farthest], colors).clamp(0, 1)
+    return torch.where(far_side, depth.flatten()[farthest], even), colors.movedim(0, -1)
 
 
 def _edges(log_depth: Float[Tensor, "h w"]) -> Bool[Tensor, "hh ww"]:
@@ -73,12 +83,21 @@ def _steps_apart(log_depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h v"]:
 
 def _largest_neighbour(values: Float[Tensor, "h w"]) -> Float[Tensor, "hh ww"]:
     """Of the two or four pixels around each lattice point."""
-    for dim in (0, 1):
-        count = values.shape[dim]
-        step = torch.arange(2 * count - 1, device=values.device)
-        before, after = values.index_select(dim, step // 2), values.index_select(dim, -(-step // 2))
-        values = torch.maximum(before, after)
-    return values
+    return values.flatten()[_farthest_neighbour(values)]
+
+
+def _farthest_neighbour(depth: Float[Tensor, "h w"]) -> Int[Tensor, "hh ww"]:
+    """Flat index of the farthest of the two or four pixels around each lattice point."""
+    height, width = depth.shape
+    rows, columns = (torch.arange(2 * side - 1, device=depth.device) for side in (height, width))
+    corners = [
+        ((rows + down) // 2)[:, None] * width + (columns + right) // 2
+        for down in (0, 1)
+        for right in (0, 1)
+    ]
+    around = torch.stack(corners)
+    farthest = depth.flatten()[around].argmax(0, keepdim=True)
+    return around.gather(0, farthest)[0]
 
 
 def lattice_camera(camera: Camera) -> Camera:

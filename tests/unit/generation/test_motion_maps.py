@@ -57,7 +57,7 @@ def test_pixels_move_as_the_larger_copy_does() -> None:
     assert torch.equal(maps.fine.displacement, displacement)
     pixels = pixel_layer(SMALL, PHOTO, maps)
     moving = pixels.displacement.any(-1).any(0)
-    assert 1 <= int(moving.sum()) <= 16, "a neighbourhood of one pixel of the larger copy"
+    assert 1 <= int(moving.sum()) <= 8 * 8, "one pixel of the larger copy, and its rim"
 
 
 def test_the_small_copy_needs_no_larger_one() -> None:

@@ -90,9 +90,20 @@ def test_background_depth_inside_the_objects_edge_is_pulled_forward() -> None:
     assert torch.equal(found[~MASK], depth[~MASK])
 
 
-def test_a_surface_that_recedes_keeps_its_depth() -> None:
-    depth = (3.0 + 0.02 * torch.arange(SIZE[1])).expand(SIZE).clone()
-    assert torch.equal(on_surface(MASK, depth, MASK), depth)
+def test_a_surface_that_recedes_stays_without_steps() -> None:
+    mask, slope = _object(4, 20), 0.02
+    depth = (3.0 + slope * torch.arange(SIZE[1])).expand(SIZE).clone()
+    found = on_surface(mask, depth, mask)[4:20, 4:20]
+    assert float(found.diff(dim=1).abs().max()) < 1.5 * slope
+    assert float((found - depth[4:20, 4:20]).abs().max()) < 2 * slope
+
+
+def test_a_thin_object_does_not_take_the_depth_of_another() -> None:
+    mask, depth = _object(2, 20), torch.full(SIZE, 20.0)
+    depth[mask] = 3.0
+    mask[:, 25] = True
+    depth[:, 25] = 7.0
+    assert bool((on_surface(mask, depth, mask)[:, 25] == 7.0).all())
 
 
 def test_what_is_thinner_than_its_edges_keeps_its_depth() -> None:

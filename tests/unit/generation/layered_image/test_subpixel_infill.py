@@ -152,3 +152,12 @@ def test_from_half_the_distance_it_closes_most_gaps() -> None:
 
     assert float(alpha(both.visible_count).min()) > 0.75
     assert float(alpha(30).min()) < 0.5
+
+
+def test_across_a_depth_edge_colours_are_those_of_the_far_side() -> None:
+    depth, rgb = torch.full(SIZE_PX, 2.0), torch.full((*SIZE_PX, 3), 0.1)
+    depth[:, 3:], rgb[:, 3:] = 6.0, 0.8
+    infill = subpixel_infill(pixels(depth, rgb=rgb))
+    assert bool((infill.rgb[:, 5] == 0.8).all())
+    # No overshoot of the cubic kernel on either side: it would be an outline.
+    assert bool(((infill.rgb >= 0.1) & (infill.rgb <= 0.8)).all())
