@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.layered_image.build import FineMaps, ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.pixel_maps.upsampling import upsample_maps
 
 

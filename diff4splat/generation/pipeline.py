@@ -26,8 +26,9 @@ from diff4splat.generation.inputs.request import (
     prepare_request,
     sized_to_depth,
 )
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.motion_sampling import MotionRequest
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan

@@ -14,8 +14,8 @@ from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
-from diff4splat.generation.layered_image.build import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.mask_rim import with_rim
+from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
 from diff4splat.generation.motion_maps import (
     depth_at,

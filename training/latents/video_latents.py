@@ -10,7 +10,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.priors import image_depth
 from diff4splat.generation.video.render_condition import encode_condition, render_layered_image
 from diff4splat.geometry.camera import Camera

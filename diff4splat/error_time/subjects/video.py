@@ -20,7 +20,8 @@ from diff4splat.error_time.subjects.model import request, shipped_model
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE, CallCount, Guidance
 from diff4splat.flow.sampler_types import VelocityFn
 from diff4splat.flow.solve import ADAPTIVE, solve
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.priors import image_depth
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.render_condition import encode_condition, render_layered_image

@@ -12,8 +12,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import image_gaussians
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
 from diff4splat.geometry import quaternion
 from diff4splat.render.api import render

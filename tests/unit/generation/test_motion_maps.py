@@ -7,7 +7,8 @@ import torch
 from image_layers import input_image, random_rgb
 
 from diff4splat.generation.inputs.input_image import downsample
-from diff4splat.generation.layered_image.build import FineMaps, ImageMaps, pixel_layer
+from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.pixel_layer import pixel_layer
 from diff4splat.generation.motion_maps import (
     depth_at,
     reduced_displacement,

@@ -8,8 +8,8 @@ from filmed_scenes import filmed_scene
 from image_layers import random_rgb
 from torch.nn.functional import avg_pool2d, interpolate
 
-from diff4splat.generation.layered_image.build import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
+from diff4splat.generation.layered_image.pixel_maps.pixel_layer import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera, pinhole, stack_cameras

@@ -29,9 +29,10 @@ from diff4splat.generation.layered_image.border_extension import (
     farthest_covered,
     push_behind_surface,
 )
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import image_gaussians, layer_gaussians
 from diff4splat.generation.layered_image.obliqueness import is_drawable
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import focal_from_fov, pinhole, project
 from diff4splat.geometry.depth import distance_from_depth

@@ -6,16 +6,15 @@ from image_layers import FAR_RANGES, input_image, is_finite, layer, random_depth
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import downsample
-from diff4splat.generation.layered_image.build import (
-    PIXEL_FOOTPRINT_PX,
-    FineMaps,
-    ImageMaps,
-    build_layered_image,
-    pixel_layer,
-)
+from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
+from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
+    PIXEL_FOOTPRINT_PX,
+    pixel_layer,
+)
 from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 from diff4splat.render.api import render

@@ -7,8 +7,8 @@ import torch
 from image_layers import FAR_RANGES, FOCAL_PX, is_finite, layer, layered, random_depth
 from torch import Tensor
 
-from diff4splat.generation.layered_image.build import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.gaussians import image_gaussians, layer_gaussians
+from diff4splat.generation.layered_image.pixel_maps.pixel_layer import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.subpixel_infill import lattice_camera, subpixel_infill
 from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer
 from diff4splat.geometry.camera import pinhole, project

@@ -3,7 +3,8 @@
 import torch
 from image_layers import input_image, random_rgb, sliding_path
 
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.types import LayeredImage
 from diff4splat.generation.video.fill_path import fill_path
 from diff4splat.paths.camera_path import CameraPath

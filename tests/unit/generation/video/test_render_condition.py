@@ -7,8 +7,9 @@ import torch
 from image_layers import input_image, sliding_path
 from torch import Tensor
 
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.types import LayeredImage
 from diff4splat.generation.video.render_condition import (
     MIN_COVERAGE,

@@ -6,7 +6,8 @@ import pytest
 import torch
 from image_layers import input_image, random_rgb, sliding_path
 
-from diff4splat.generation.layered_image.build import ImageMaps, build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_fill import FillRequest, TextStates, VideoFill, fill_hidden
