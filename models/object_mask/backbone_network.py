@@ -1,10 +1,16 @@
-"""Object mask on the image backbone (ADR 32): it knows what photographs show.
+"""Object mask with two encoders: a U-Net of its own and the image backbone (ADR 32).
 
-Axes: ``b`` images, ``h w`` pixels, ``c`` channels.
+Axes: ``b`` images, ``h w`` pixels, ``c`` channels. The U-Net knows drawn worlds, the backbone what
+photographs show. A pixel's embedding is linear in the features of both.
 """
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.object_mask.mask_heads import MaskHeads
+from diff4splat.models.object_mask.network import MaskUNet
 
 GROWTH = (1, 2, 4, 6, 6)
 """Channels at 1/2 to 1/32 of the resolution, in multiples of the configured width."""
@@ -15,4 +21,9 @@ class BackboneObjectMaskNet(BackboneUNet, MaskHeads):
 
     def __init__(self, width: int, text_width: int) -> None:
         super().__init__([width * share for share in GROWTH])
-        self.add_heads(width, text_width)
+        self.unet = MaskUNet(width)
+        self.add_heads(width, text_width, encoders=2)
+
+    def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
+        """``image`` is RGB in [0, 1], its sides multiples of 32."""
+        return torch.cat([super().features(image), self.unet.features(image)], 1)

@@ -30,10 +30,10 @@ START_LOGIT = -3.0
 class MaskHeads(nn.Module):
     """The heads of an object mask; the networks that extend it give features."""
 
-    def add_heads(self, width: int, text_width: int) -> None:
-        """``width`` channels of the features; the heads are the last layers to be made."""
+    def add_heads(self, width: int, text_width: int, encoders: int = 1) -> None:
+        """``width`` channels of the features of each encoder; the last layers to be made."""
         self.embedding_width = 2 * width
-        self.embedding = nn.Conv2d(width, self.embedding_width * FOLDED_PX**2, 1)
+        self.embedding = nn.Conv2d(encoders * width, self.embedding_width * FOLDED_PX**2, 1)
         self.names = nn.Conv2d(self.embedding_width, len(NOUNS) + len(COLOR_NAMES) + 2, 1)
         self.queries = TextQueries(text_width, TEXT_CHANNELS, self.embedding_width)
 

@@ -15,12 +15,19 @@ BLOCKS = (0, 1, 2, 3)
 """Residual blocks at each of them on the way down; one on the way up."""
 
 
-class ObjectMaskNet(ImageUNet, MaskHeads):
+class MaskUNet(ImageUNet):
+    """Features of every cell of two pixels."""
+
+    def __init__(self, width: int) -> None:
+        channels = [width * share for share in GROWTH]
+        super().__init__(channels, lambda level: _blocks(channels[level], BLOCKS[level]))
+
+
+class ObjectMaskNet(MaskUNet, MaskHeads):
     """For every pixel the logit of the probability that the prompt asks it to move."""
 
     def __init__(self, width: int, text_width: int) -> None:
-        channels = [width * share for share in GROWTH]
-        super().__init__(channels, lambda level: _blocks(channels[level], BLOCKS[level]))
+        super().__init__(width)
         self.add_heads(width, text_width)
 
 

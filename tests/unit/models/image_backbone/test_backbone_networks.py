@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import pytest
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
+from diff4splat.models.object_mask.network import ObjectMaskNet
 
 WIDTH, TEXT_WIDTH = 4, 8
 
@@ -30,6 +31,11 @@ def masks() -> nn.Module:
     return network
 
 
+def _last(weight: Tensor, like: Tensor) -> Tensor:
+    """The input channels of the U-Net, which come last."""
+    return weight if weight.shape == like.shape else weight[:, -like.shape[1] :]
+
+
 NETWORKS = pytest.mark.parametrize("make", [depth, masks])
 
 
@@ -44,6 +50,26 @@ def test_depth_is_the_mean_of_both_encoders() -> None:
     torch.nn.init.zeros_(network.unet.head.weight)
     torch.testing.assert_close(both, network(image) + unet / 2)
     assert bool((unet != 0).any())
+
+
+def test_a_mask_without_the_backbones_features_is_that_of_the_unet() -> None:
+    both, alone = BackboneObjectMaskNet(WIDTH, TEXT_WIDTH), ObjectMaskNet(WIDTH, TEXT_WIDTH)
+    torch.nn.init.zeros_(both.embedding.weight[:, :WIDTH])
+    weights = both.unet.state_dict()
+    for name in ("embedding", "queries", "names"):
+        alone.get_submodule(name).load_state_dict(
+            {
+                key: _last(weight, like)
+                for (key, weight), like in zip(
+                    both.get_submodule(name).state_dict().items(),
+                    alone.get_submodule(name).state_dict().values(),
+                    strict=True,
+                )
+            }
+        )
+    alone.load_state_dict(weights, strict=False)
+    image, text = torch.rand(2, 3, 32, 64), torch.rand(2, 5, TEXT_WIDTH)
+    torch.testing.assert_close(both(image, text), alone(image, text))
 
 
 @NETWORKS
