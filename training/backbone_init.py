@@ -22,4 +22,6 @@ def start_from_public_backbones(networks: Networks, parts: Sequence[str]) -> Non
                 f"public_backbone: expected parts on the image backbone, got {part}; set "
                 f"model.{part}.image_backbone or leave public_backbone out"
             )
-        network.backbone.load_state_dict(public_backbone_weights())
+        weights = public_backbone_weights()
+        own = network.backbone.state_dict()
+        network.backbone.load_state_dict({name: weights[name] for name in own})

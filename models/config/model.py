@@ -28,7 +28,6 @@ from diff4splat.models.config.networks import (
     VaeConfig,
 )
 from diff4splat.models.config.priors import (
-    BACKBONE_MULTIPLE_PX,
     MonocularDepthConfig,
     MotionUNetConfig,
     ObjectMaskConfig,
@@ -107,10 +106,6 @@ class ModelConfig:
         self._require_fitting_joint()
         self._require_motion_prior()
         self._require_fitting_image_encoder()
-        enlarged_px = self.token_px * self.motion_unet.input_scale
-        fits = not self.object_mask.image_backbone or enlarged_px % BACKBONE_MULTIPLE_PX == 0
-        expected = f"{BACKBONE_MULTIPLE_PX} px per token with an image backbone"
-        require(fits, "MotionUNetConfig.input_scale", expected, self.motion_unet.input_scale)
         finest = 2 ** len(self.deformation.level_widths) * self.ldrm.grid_stride
         fits = self.token_px % finest == 0
         require(fits, "ModelConfig.vae", f"tokens of a multiple of {finest} px", self.token_px)

@@ -37,7 +37,7 @@ class ObjectMaskConfig:
     width: int = 0
     """Channels at half the resolution; 0 leaves it out: the motion prior's own mask decides."""
     image_backbone: bool = False
-    """Whether it decodes features of the image backbone (ADR 32) instead of its own."""
+    """Whether it has a second encoder, the image backbone (ADR 32)."""
 
     def __post_init__(self) -> None:
         require_optional_width(self, "width")

@@ -38,11 +38,12 @@ MEAN, DEVIATION = 127 / 255, 128 / 255
 class EfficientNetLite(nn.Module):
     """Features of every resolution, finest first."""
 
-    def __init__(self) -> None:
+    def __init__(self, levels: int = len(FEATURE_STAGES)) -> None:
+        """``levels`` resolutions; the layers after them, most of the weights, are left out."""
         super().__init__()
         self.stem = SameConv2d(3, STEM_CHANNELS, 3, 2, groups=1)
         channels, self.stages = STEM_CHANNELS, nn.ModuleList()
-        for blocks, kernel, stride, expansion, wide in STAGES:
+        for blocks, kernel, stride, expansion, wide in STAGES[: FEATURE_STAGES[levels - 1] + 1]:
             shapes = [
                 BlockShape(wide if i else channels, wide, kernel, 1 if i else stride, expansion)
                 for i in range(blocks)
@@ -51,7 +52,7 @@ class EfficientNetLite(nn.Module):
             channels = wide
 
     def forward(self, image: Float[Tensor, "n 3 h w"]) -> list[Float[Tensor, "n c hl wl"]]:
-        """``image`` is RGB in [0, 1], its sides multiples of 32."""
+        """``image`` is RGB in [0, 1], its sides multiples of two to the number of levels."""
         features = torch.nn.functional.relu6(self.stem((image - MEAN) / DEVIATION))
         levels = []
         for index, stage in enumerate(self.stages):

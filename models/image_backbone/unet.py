@@ -23,11 +23,11 @@ class BackboneUNet(nn.Module):
     """The backbone on the way down, a block per resolution on the way up."""
 
     def __init__(self, channels: Sequence[int]) -> None:
-        """``channels`` at 1/2, 1/4, 1/8, 1/16 and 1/32 of the resolution."""
+        """``channels`` at 1/2, 1/4, 1/8, 1/16, 1/32 of the resolution, or at the first of them."""
         super().__init__()
-        self.backbone = EfficientNetLite()
+        self.backbone = EfficientNetLite(len(channels))
         self.lateral = nn.ModuleList(
-            [nn.Conv2d(*pair, 1) for pair in zip(FEATURE_CHANNELS, channels, strict=True)]
+            [nn.Conv2d(*pair, 1) for pair in zip(FEATURE_CHANNELS, channels, strict=False)]
         )
         self.pixels = nn.Conv2d(3 * FOLDED_PX**2, channels[0], 3, padding=1)
         self.blocks = nn.ModuleList([ConvBlock(count) for count in channels])
@@ -36,7 +36,7 @@ class BackboneUNet(nn.Module):
         )
 
     def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
-        """``image`` is RGB in [0, 1], its sides multiples of 32."""
+        """``image`` is RGB in [0, 1], its sides multiples of the coarsest cell."""
         levels = self.backbone(image)
         skips = [conv(level) for conv, level in zip(self.lateral, levels, strict=True)]
         cells = torch.nn.functional.pixel_unshuffle(image * 2 - 1, FOLDED_PX)

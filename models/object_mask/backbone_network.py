@@ -12,8 +12,9 @@ from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.object_mask.mask_heads import MaskHeads
 from diff4splat.models.object_mask.network import MaskUNet
 
-GROWTH = (1, 2, 4, 6, 6)
-"""Channels at 1/2 to 1/32 of the resolution, in multiples of the configured width."""
+GROWTH = (1, 2, 4, 6)
+"""Channels at 1/2 to 1/16 of the resolution, in multiples of the configured width: most objects
+are smaller than cells of 1/32."""
 
 
 class BackboneObjectMaskNet(BackboneUNet, MaskHeads):
@@ -25,5 +26,5 @@ class BackboneObjectMaskNet(BackboneUNet, MaskHeads):
         self.add_heads(width, text_width, encoders=2)
 
     def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
-        """``image`` is RGB in [0, 1], its sides multiples of 32."""
+        """``image`` is RGB in [0, 1], its sides multiples of 16."""
         return torch.cat([super().features(image), self.unet.features(image)], 1)

@@ -47,7 +47,7 @@ class MaskHeads(nn.Module):
         text: Float[Tensor, "b s e"],
         text_mask: Bool[Tensor, "b s"] | None = None,
     ) -> Float[Tensor, "b h w"]:
-        """Logits of one prompt per image; ``image`` is RGB in [0, 1], its sides multiples of 32."""
+        """Logits of one prompt per image; ``image`` is RGB in [0, 1], its sides multiples of 16."""
         return self.logits(self.features(image), text_tokens(text, text_mask))[:, 0]
 
     def name_logits(

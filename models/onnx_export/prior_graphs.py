@@ -73,7 +73,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image and text to the logits of what the text asks to move."""
-    size = _image_size(config.object_mask.image_backbone)
+    size = _image_size(image_backbone=False)  # its backbone ends at 1/16
     return [
         GraphSource(
             name="object_mask",

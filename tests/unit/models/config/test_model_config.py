@@ -314,15 +314,3 @@ def test_published_numbers() -> None:
     assert (paper.dit.blocks, paper.dit.width) == (32, 4096)
     assert (paper.ldrm.blocks, paper.ldrm.embed_channels) == (16, 64)
     assert (paper.frames, paper.size_px) == (49, (512, 512))
-
-
-def test_an_object_mask_on_the_image_backbone_needs_an_enlarged_copy() -> None:
-    mask = ObjectMaskConfig(width=4, image_backbone=True)
-    for scale, fits in ((1, False), (2, True), (3, False)):
-        motion = MotionUNetConfig(width=8, heads=1, input_scale=scale)
-        changed = {"object_mask": mask, "motion_unet": motion}
-        if fits:
-            assert dataclasses.replace(test_size(), **changed).object_mask.image_backbone
-            continue
-        with pytest.raises(ConfigError, match=r"input_scale: expected 32 px per token"):
-            dataclasses.replace(test_size(), **changed)

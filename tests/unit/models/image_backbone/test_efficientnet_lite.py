@@ -151,3 +151,12 @@ def test_public_weights_give_the_features_of_their_own_code() -> None:
     for level, (mean, deviation) in zip(levels, REFERENCE, strict=True):
         assert float(level.mean()) == pytest.approx(mean, abs=1e-3)
         assert float(level.std()) == pytest.approx(deviation, rel=1e-3)
+
+
+def test_fewer_levels_are_the_first_of_all() -> None:
+    whole, part, image = EfficientNetLite(), EfficientNetLite(4), torch.rand(1, 3, 64, 32)
+    part.load_state_dict({name: whole.state_dict()[name] for name in part.state_dict()})
+    levels = part(image)
+    assert len(levels) == 4
+    for found, wanted in zip(levels, whole(image), strict=False):
+        torch.testing.assert_close(found, wanted)
