@@ -54,7 +54,9 @@ def _lattice_maps(image: ImageLayer) -> tuple[Float[Tensor, "hh ww"], Float[Tens
     moving = moving_mask(depth, image.displacement)
     far_side = _edges(depth.log()) & (_largest_neighbour(moving.to(depth)) == 0)
     near_edge = largest_around(far_side.to(depth), KERNEL_RADIUS) > 0
-    colors = torch.where(near_edge, _interpolate(rgb, "bilinear"), _interpolate(rgb, "bicubic"))
+    # Channel by channel: three at once are rounded otherwise on another number of threads.
+    linear = torch.cat([_interpolate(channel[None], "bilinear") for channel in rgb])
+    colors = torch.where(near_edge, linear, _interpolate(rgb, "bicubic"))
     even = 1 / _interpolate(1 / depth[None], "bilinear")[0]
     farthest = _farthest_neighbour(depth)
     colors = torch.where(far_side, rgb.flatten(1)[:, farthest], colors).clamp(0, 1)
@@ -95,9 +97,11 @@ def _farthest_neighbour(depth: Float[Tensor, "h w"]) -> Int[Tensor, "hh ww"]:
         for down in (0, 1)
         for right in (0, 1)
     ]
-    around = torch.stack(corners)
-    farthest = depth.flatten()[around].argmax(0, keepdim=True)
-    return around.gather(0, farthest)[0]
+    # Not an argmax: of equal depths it may take another on another number of threads.
+    flat, farthest = depth.flatten(), corners[0]
+    for corner in corners[1:]:
+        farthest = torch.where(flat[corner] > flat[farthest], corner, farthest)
+    return farthest
 
 
 def lattice_camera(camera: Camera) -> Camera:
