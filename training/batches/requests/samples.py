@@ -1,12 +1,10 @@
-"""Samples of the object mask: an image, some objects of it pasted or repainted, and prompts."""
+"""Samples of the object mask: an image and prompts."""
 
 import torch
 
 from diff4splat.training.batches.requests.image_requests import draw_image_requests
-from diff4splat.training.batches.requests.object_image import ObjectImage, random_object_image
-from diff4splat.training.batches.requests.paste import paste
+from diff4splat.training.batches.requests.object_image import random_object_image
 from diff4splat.training.batches.requests.present import name_maps
-from diff4splat.training.batches.requests.repaint import repaint
 from diff4splat.training.batches.requests.request_batch import RequestBatch, collate_requests
 from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.recipe.stage import StageRecipe
@@ -14,10 +12,6 @@ from diff4splat.training.stage import SampleKey
 
 REQUESTS = 5
 """Prompts per image: they cost little beside the image."""
-PASTED_SHARE = 0.25
-"""Share of images with an object of another image."""
-OTHERS = 1_000
-"""The other image is one of so many that follow."""
 
 
 class RequestSamples:
@@ -43,12 +37,8 @@ class RequestSamples:
         """
         key = SampleKey(self.clips.seed, self.recipe.name, sample_index, "requests")
         generator = key.generator()
-        seen, source = self._image(sample_index, generator)
-        if float(torch.rand((), generator=generator)) < PASTED_SHARE:
-            offset = 1 + int(torch.randint(OTHERS, (), generator=generator))
-            other, _ = self._image(sample_index + offset, generator)
-            seen = paste(seen, other, generator)
-        seen = repaint(seen, generator)
+        clip, source = self.clips.clip(sample_index)
+        seen = random_object_image(clip, self.recipe.data.size_px, generator)
         empty = torch.zeros(seen.image.shape[:2], dtype=torch.bool)
         requests = draw_image_requests(seen.objects, empty, REQUESTS, generator)
         nouns, colors = name_maps(seen.objects, empty)
@@ -61,11 +51,6 @@ class RequestSamples:
             colors=colors[None],
             captions=tuple(request.caption for request in requests),
         )
-
-    def _image(self, index: int, generator: torch.Generator) -> tuple[ObjectImage, str]:
-        """A random image of a clip, and the name of the clip's source."""
-        clip, source = self.clips.clip(index)
-        return random_object_image(clip, self.recipe.data.size_px, generator), source
 
     def collate(self, samples: list[RequestBatch]) -> RequestBatch:
         """Samples as one batch."""

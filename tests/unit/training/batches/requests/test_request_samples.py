@@ -10,8 +10,6 @@ from diff4splat.captions.vocabulary import NOUNS
 from diff4splat.data.clip import Clip, ClipMetadata, ObjectNote, View
 from diff4splat.errors import InputError
 from diff4splat.geometry.camera import pinhole
-from diff4splat.training.batches.requests import repaint
-from diff4splat.training.batches.requests import samples as request_samples
 from diff4splat.training.batches.requests.request_batch import RequestBatch
 from diff4splat.training.batches.requests.samples import REQUESTS, RequestSamples
 from diff4splat.training.batches.samples import ClipSamples
@@ -30,14 +28,6 @@ RECIPE = StageRecipe(
     losses=ObjectMaskLosses(),
     data=DataSettings(size_px=(32, 32)),
 )
-
-
-@pytest.fixture
-def as_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing is pasted or repainted."""
-    monkeypatch.setattr(request_samples, "PASTED_SHARE", 0.0)
-    monkeypatch.setattr(repaint, "REPAINTED_SHARE", 0.0)
-    monkeypatch.setattr(repaint, "TWO_COLORED_SHARE", 0.0)
 
 
 def clip(masked: bool = True) -> Clip:
@@ -87,7 +77,6 @@ def test_shapes() -> None:
     assert batch.to(torch.device("cpu")).captions == batch.captions
 
 
-@pytest.mark.usefixtures("as_drawn")
 def test_masks_lie_on_the_objects_that_captions_name() -> None:
     source, asked = samples(), set()
     for index in range(40):
@@ -104,7 +93,6 @@ def test_masks_lie_on_the_objects_that_captions_name() -> None:
     assert asked == {(False, False), (True, False), (False, True), (True, True)}
 
 
-@pytest.mark.usefixtures("as_drawn")
 def test_every_pixel_has_the_name_of_its_object() -> None:
     source = samples()
     for index in range(10):
@@ -118,7 +106,6 @@ def test_every_pixel_has_the_name_of_its_object() -> None:
             assert float(batch.images[0][box].float().mean(0)[0]) > 120
 
 
-@pytest.mark.usefixtures("as_drawn")
 def test_parts_and_mirrored_images_occur() -> None:
     source = samples()
     red = [(source[index].images[0, ..., 0] > 150) for index in range(30)]
@@ -143,25 +130,3 @@ def test_clips_without_masks_are_refused() -> None:
 def test_an_image_without_named_objects_asks_for_nothing() -> None:
     bare = replace(clip(), note=replace(clip().note, objects=()))
     assert not bool(samples(bare)[0].masks.any())
-
-
-def test_objects_are_repainted() -> None:
-    source = samples()
-    numbers = {int(number) for index in range(30) for number in source[index].colors.unique()}
-    assert len(numbers) > 4
-
-
-class FirstAreBare:
-    """The first clips have no named objects, the others have."""
-
-    def clip(self, index: int) -> Clip:
-        given = clip()
-        return replace(given, note=replace(given.note, objects=())) if index < 20 else given
-
-
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_objects_are_pasted_from_other_clips(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(request_samples, "PASTED_SHARE", share)
-    source = RequestSamples(ClipSamples(RECIPE, 0, [FirstAreBare()]))
-    pasted = [bool(source[index].nouns.any()) for index in range(20)]
-    assert sum(pasted) > 8 if share else not any(pasted)
