@@ -40,11 +40,6 @@ def color_name(linear: Float64[np.ndarray, "3"]) -> str:
     return names[int(squared_distance.sum(1).argmin())]
 
 
-def color_anchors(name: str) -> tuple[Float64[np.ndarray, "3"], ...]:
-    """Linear RGB colours of this name."""
-    return tuple(linear_from_hex(word) for word in _ANCHORS[name].split())
-
-
 @cache
 def _anchors() -> tuple[tuple[str, ...], Float64[np.ndarray, "n 3"]]:
     pairs = [(name, word) for name, words in _ANCHORS.items() for word in words.split()]
