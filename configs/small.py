@@ -199,7 +199,10 @@ def _motion_diffusion(video: StageRecipe) -> StageRecipe:
 
 
 def _object_mask(video: StageRecipe) -> StageRecipe:
-    """Five prompts for every image: all that a clip shows can be asked for."""
+    """Five prompts for every image: all that a clip shows can be asked for.
+
+    The image backbone has seen photographs, and learns slowly.
+    """
     return replace(
         video,
         name="object_mask",
@@ -207,7 +210,10 @@ def _object_mask(video: StageRecipe) -> StageRecipe:
         steps=6_000,
         trained=("object_mask",),
         losses=ObjectMaskLosses(),
-        optimizer=OptimizerSettings(learning_rate=1e-3, warmup_steps=200),
+        optimizer=OptimizerSettings(
+            learning_rate=1e-3, warmup_steps=200, part_rates=(("object_mask.backbone", 0.1),)
+        ),
         data=replace(video.data, keyframes_only=True),
         text_dropout=0.0,
+        public_backbone=True,
     )

@@ -6,8 +6,10 @@ overlap   of the mask with the object that was asked for
 found     the most probable pixel is on it
 whole     four fifths of it are in the mask
 still     no pixel moves where the sentence asks for an object that is not there
+auc       an object has a higher most probable pixel than an absent one has
 
-``--unknown-nouns`` asks by colour and a noun that no training shows.
+``--unknown-nouns`` asks by colour and a noun that no training shows, ``--objects 99`` for every
+object of an image in place of two.
 """
 
 import argparse
@@ -17,7 +19,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from benchmarks.named_objects.requests import AskedImage, asked_image
+from benchmarks.named_objects.requests import OBJECTS, AskedImage, asked_image
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
 from diff4splat.generation.motion_networks import motion_prior
@@ -28,7 +30,7 @@ from diff4splat.geometry.camera import pinhole
 from diff4splat.models.hub.model import Model, load_model
 
 THRESHOLD = GenerationSettings().motion.threshold
-COLUMNS = ("overlap", "found", "whole", "still")
+COLUMNS = ("overlap", "found", "whole", "still", "auc")
 
 
 def motion_of(model: Model, rgb: Tensor, sentence: str) -> MotionSample:
@@ -67,11 +69,20 @@ def rows(model: Model, images: list[AskedImage]) -> dict[str, dict[str, float]]:
         values: dict[str, list[float]] = defaultdict(list)
         for image in images:
             for sentence, truth in image.requests:
-                found = measure(motion_of(model, change(image.rgb), sentence), truth)
-                for column, value in found.items():
+                sample = motion_of(model, change(image.rgb), sentence)
+                kind = "present" if bool(truth.any()) else "absent"
+                values[kind].append(float(sample.probability.max()))
+                for column, value in measure(sample, truth).items():
                     values[column].append(value)
         table[name] = {column: sum(all_) / len(all_) for column, all_ in values.items()}
+        table[name]["auc"] = auc(values["present"], values["absent"])
     return table
+
+
+def auc(present: list[float], absent: list[float]) -> float:
+    """Share of pairs in which the present one is higher; ties count half. NaN without a pair."""
+    difference = torch.tensor(present)[:, None] - torch.tensor(absent)
+    return float((difference.sign() + 1).mean() / 2)
 
 
 @torch.no_grad()
@@ -82,11 +93,12 @@ def main() -> None:
     parser.add_argument("model")
     parser.add_argument("--most", type=int, default=120)
     parser.add_argument("--unknown-nouns", action="store_true")
+    parser.add_argument("--objects", type=int, default=OBJECTS)
     options = parser.parse_args()
     model, folder = load_model(options.model, parts=MOTION_PARTS), ClipFolder(options.clips)
     count = min(len(folder), options.most)
-    unknown = options.unknown_nouns
-    images = [asked_image(folder.clip(index), unknown_nouns=unknown) for index in range(count)]
+    asking = {"unknown_nouns": options.unknown_nouns, "most_objects": options.objects}
+    images = [asked_image(folder.clip(index), **asking) for index in range(count)]
     print("| images |", " | ".join(COLUMNS), "|\n|---|" + "---:|" * len(COLUMNS))
     for name, values in rows(model, images).items():
         print(f"| {name} |", " | ".join(f"{values[column]:.3f}" for column in COLUMNS), "|")

@@ -29,7 +29,7 @@ from diff4splat.training.batches.requests.present import PresentObject, named_ob
 
 Asked: TypeAlias = tuple[str, PresentObject | None]
 OBJECTS = 2
-"""Asked for in each image, at most."""
+"""Asked for in each image by default, at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,9 @@ class AskedImage:
     requests: tuple[tuple[str, Bool[Tensor, "h w"]], ...]
 
 
-def asked_image(clip: Clip, *, unknown_nouns: bool = False) -> AskedImage:
+def asked_image(
+    clip: Clip, *, unknown_nouns: bool = False, most_objects: int = OBJECTS
+) -> AskedImage:
     """The first image of a clip; equal clips give equal requests."""
     view = clip.views[0]
     number = zlib.crc32(clip.note.identifier.encode()) >> 1
@@ -49,29 +51,33 @@ def asked_image(clip: Clip, *, unknown_nouns: bool = False) -> AskedImage:
     ask = _by_color if unknown_nouns else _by_name
     requests = [
         (text, torch.zeros(view.instances[0].shape, dtype=torch.bool) if one is None else one.mask)
-        for text, one in ask(objects, generator)
+        for text, one in ask(objects, generator, most_objects)
     ]
     return AskedImage(rgb=unit_rgb(view.rgb[0]), requests=tuple(requests))
 
 
-def _by_name(objects: list[PresentObject], generator: torch.Generator) -> Iterator[Asked]:
+def _by_name(
+    objects: list[PresentObject], generator: torch.Generator, most: int
+) -> Iterator[Asked]:
     names = [one.named for one in objects]
     able = [i for i, one in enumerate(objects) if one.is_asked_for and is_unique(names, i)]
-    for index in _some(able, generator):
+    for index in _some(able, generator, most):
         yield _sentence(f"{names[index].color} {names[index].noun}", generator), objects[index]
     absent = caption_of_absent_object(names, generator)
     if absent is not None:
         yield absent, None
 
 
-def _by_color(objects: list[PresentObject], generator: torch.Generator) -> Iterator[Asked]:
+def _by_color(
+    objects: list[PresentObject], generator: torch.Generator, most: int
+) -> Iterator[Asked]:
     colors = [one.named.color for one in objects]
     able = [
         one
         for one in objects
         if one.is_asked_for and sum(colors_alike(one.named.color, other) for other in colors) == 1
     ]
-    for one in _some(able, generator):
+    for one in _some(able, generator, most):
         yield _sentence(f"{one.named.color} {draw(UNSEEN_NOUNS, generator)}", generator), one
     absent = colors_unlike(colors)
     if absent:
@@ -79,8 +85,8 @@ def _by_color(objects: list[PresentObject], generator: torch.Generator) -> Itera
         yield _sentence(name, generator), None
 
 
-def _some(able: list[Any], generator: torch.Generator) -> list[Any]:
-    order = torch.randperm(len(able), generator=generator)[:OBJECTS].tolist()
+def _some(able: list[Any], generator: torch.Generator, most: int) -> list[Any]:
+    order = torch.randperm(len(able), generator=generator)[:most].tolist()
     return [able[place] for place in order]
 
 

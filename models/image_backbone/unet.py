@@ -26,9 +26,8 @@ class BackboneUNet(nn.Module):
         """``channels`` at 1/2, 1/4, 1/8, 1/16, 1/32 of the resolution, or at the first of them."""
         super().__init__()
         self.backbone = EfficientNetLite(len(channels))
-        self.lateral = nn.ModuleList(
-            [nn.Conv2d(*pair, 1) for pair in zip(FEATURE_CHANNELS, channels, strict=False)]
-        )
+        levels = zip(FEATURE_CHANNELS[: len(channels)], channels, strict=True)
+        self.lateral = nn.ModuleList([nn.Conv2d(*pair, 1) for pair in levels])
         self.pixels = nn.Conv2d(3 * FOLDED_PX**2, channels[0], 3, padding=1)
         self.blocks = nn.ModuleList([ConvBlock(count) for count in channels])
         self.upsample = nn.ModuleList(

@@ -37,7 +37,8 @@ def text_encoder_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSo
 
 def monocular_depth_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image to the raw ray distance of its pixels."""
-    size = _image_size(config.monocular_depth.image_backbone)
+    on_backbone = config.monocular_depth.image_backbone
+    size = _image_size(BACKBONE_MULTIPLE_PX if on_backbone else IMAGE_MULTIPLE_PX)
     return [
         GraphSource(
             name="monocular_depth",
@@ -73,7 +74,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image and text to the logits of what the text asks to move."""
-    size = _image_size(image_backbone=False)  # its backbone ends at 1/16
+    size = _image_size(IMAGE_MULTIPLE_PX)
     return [
         GraphSource(
             name="object_mask",
@@ -89,10 +90,9 @@ def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
     ]
 
 
-def _image_size(image_backbone: bool) -> tuple[str, str]:
-    """Symbols of the sides that a U-Net takes."""
-    side = BACKBONE_MULTIPLE_PX if image_backbone else IMAGE_MULTIPLE_PX
-    return f"{side}*rows", f"{side}*columns"
+def _image_size(multiple_px: int) -> tuple[str, str]:
+    """Symbols of the sides that a network takes."""
+    return f"{multiple_px}*rows", f"{multiple_px}*columns"
 
 
 def _motion_and_mask(network: nn.Module, *inputs: Tensor) -> tuple[Tensor, Tensor]:

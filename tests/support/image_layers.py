@@ -43,6 +43,18 @@ def layer(depth: Tensor, **changes: object) -> ImageLayer:
     return ImageLayer(**fields | changes)
 
 
+RED, GREEN = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.7, 0.1])
+"""Colours of an object and of what is behind it."""
+RIM_SIZE_PX = (24, 28)
+
+
+def square_mask(first: int, last: int) -> Tensor:
+    """A square in an image of ``RIM_SIZE_PX``, from row and column ``first`` up to ``last``."""
+    mask = torch.zeros(RIM_SIZE_PX, dtype=torch.bool)
+    mask[first:last, first:last] = True
+    return mask
+
+
 def box_mask(side: int = 48) -> Tensor:
     """A box of 12 × 16 pixels."""
     mask = torch.zeros(side, side, dtype=torch.bool)

@@ -51,7 +51,7 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     fits = not data.keyframes_only or stage.kind in IMAGE_KINDS
     expected = f"false but for {' and '.join(IMAGE_KINDS)} stages"
     require(fits, f"{what}.keyframes_only", expected, "true")
-    if _on_image_backbone(stage, model):
+    if stage.kind == "monocular_depth" and model.monocular_depth.image_backbone:
         sides = data.view_sides_px or data.size_px
         fits = all(side % BACKBONE_MULTIPLE_PX == 0 for side in sides)
         expected = f"multiples of {BACKBONE_MULTIPLE_PX} on the image backbone"
@@ -60,9 +60,3 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     fits, stride = not keyframed or data.keyframe_stride == TIME_STRIDE, data.keyframe_stride
     expected = f"{TIME_STRIDE} with a refinement decoder"
     require(fits, f"{what}.keyframe_stride", expected, stride)
-
-
-def _on_image_backbone(stage: StageRecipe, model: ModelConfig) -> bool:
-    """Whether what the stage trains decodes features of the image backbone."""
-    priors = {"monocular_depth": model.monocular_depth, "object_mask": model.object_mask}
-    return stage.kind in priors and priors[stage.kind].image_backbone

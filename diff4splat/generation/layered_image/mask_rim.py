@@ -12,6 +12,7 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.rigid_components import connected_components
+from diff4splat.generation.layered_image.windows import mean_around
 
 RIM_PX = 2
 EDGE_SHARE = 4 / 128
@@ -49,7 +50,7 @@ def on_surface(
     edge_px = max(round(EDGE_SHARE * max(mask.shape)), 1)
     core = core_of_components(mask, edge_px)
     surface = depth.flatten()[nearest_inside(core)]
-    surface = _mean_around(surface, edge_px)
+    surface = mean_around(surface, edge_px)
     on_edge = torch.where(mask, torch.minimum(depth, surface), surface)
     return torch.where(moving & ~core, on_edge, depth)
 
@@ -89,12 +90,6 @@ def nearest_inside(mask: Bool[Tensor, "h w"]) -> Int[Tensor, "h w"]:
     pixel_of_label = np.zeros(int(label.max()) + 1, np.int64)
     pixel_of_label[label.flat[inside]] = inside
     return torch.from_numpy(pixel_of_label[label]).to(mask.device)
-
-
-def _mean_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
-    """Of the square that reaches ``radius_px`` to every side."""
-    padded = torch.nn.functional.pad(values[None, None], (radius_px,) * 4, mode="replicate")
-    return torch.nn.functional.avg_pool2d(padded, 2 * radius_px + 1, 1)[0, 0]
 
 
 def _local_mean(

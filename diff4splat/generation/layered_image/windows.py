@@ -1,11 +1,11 @@
-"""Extremes in a window around every pixel; beyond the border lie the pixels of the border.
+"""Extremes and mean of a window around every pixel; beyond the border lie its pixels.
 
 Axes: ``h w`` pixels.
 """
 
 from jaxtyping import Float
 from torch import Tensor
-from torch.nn.functional import max_pool2d, pad
+from torch.nn.functional import avg_pool2d, max_pool2d, pad
 
 
 def largest_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
@@ -18,3 +18,9 @@ def largest_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor
 def smallest_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
     """Of the same square."""
     return -largest_around(-values, radius_px)
+
+
+def mean_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
+    """Of the same square."""
+    padded = pad(values[None, None], (radius_px,) * 4, mode="replicate")
+    return avg_pool2d(padded, 2 * radius_px + 1, 1)[0, 0]

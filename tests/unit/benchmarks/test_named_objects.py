@@ -1,10 +1,12 @@
 """Requests of the benchmark of named objects, and what it measures of a mask."""
 
+import math
+
 import pytest
 import torch
 from oracles_clips import make_clip
 
-from benchmarks.named_objects.__main__ import measure
+from benchmarks.named_objects.__main__ import auc, measure
 from benchmarks.named_objects.requests import asked_image
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.flow.guidance import CallCount
@@ -39,3 +41,15 @@ def test_unknown_nouns_stand_beside_the_colour_of_one_object() -> None:
         known = set(TRAINING_NOUNS) & set(text.split())
         assert not known and any(noun in text for noun in UNSEEN_NOUNS)
         assert truth.dtype == torch.bool
+
+
+def test_auc_is_the_share_of_pairs_in_the_right_order() -> None:
+    assert auc([0.9, 0.4], [0.5, 0.1]) == 0.75
+    assert auc([0.5], [0.5]) == 0.5
+    assert math.isnan(auc([], [0.5]))
+
+
+def test_every_object_can_be_asked_for() -> None:
+    few, all_ = (asked_image(make_clip(), most_objects=most) for most in (1, 99))
+    assert sum(bool(truth.any()) for _, truth in few.requests) == 1
+    assert len(all_.requests) > len(few.requests)

@@ -1,4 +1,4 @@
-"""A smooth surface over what is not known: close to a membrane, stiffer across than down (ours).
+"""A smooth surface over what is not known: close to a membrane (ours).
 
 Axes: ``h w`` pixels, ``h2 w2`` pixels of the copy of half the size.
 """
@@ -11,15 +11,12 @@ from torch import Tensor
 
 SWEEPS = 40
 """Averages with the neighbours, per level of the pyramid."""
-ACROSS_WEIGHT = 4.0
-"""Of the neighbours in the row, over that of those in the column: grounds and skies change with
-height, so the sky above a hole says less than the ground beside it."""
 
 
 def extended_evenly(
     values: Float[Tensor, "h w"], known: Bool[Tensor, "h w"]
 ) -> Float[Tensor, "h w"]:
-    """``values`` where ``known``, at least somewhere; else close to a mean of the neighbours.
+    """``values`` where ``known``, at least somewhere; else close to the mean of the neighbours.
 
     A coarse copy gives the start, and averaging does the rest: close to a membrane over the hole.
     """
@@ -35,9 +32,7 @@ def extended_evenly(
     filled = torch.where(known, values, start)
     for _ in range(SWEEPS):
         padded = torch.nn.functional.pad(filled[None, None], (1, 1, 1, 1), mode="replicate")[0, 0]
-        down = padded[:-2, 1:-1] + padded[2:, 1:-1]
-        across = padded[1:-1, :-2] + padded[1:-1, 2:]
-        mean = (down + ACROSS_WEIGHT * across) / (2 + 2 * ACROSS_WEIGHT)
+        mean = (padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]) / 4
         filled = torch.where(known, values, mean)
     return filled
 

@@ -26,7 +26,7 @@ SWEEPS = 6
 """Passes over the pixels; seams hardly move after them."""
 FAR = 1e3
 """Cost where a shift ends outside of what is known."""
-MEANS_WEIGHT = 30.0
+MEANS_WEIGHT = 10.0
 """Of the colours around the source against the guess, beside the seams."""
 SPREAD_PX = 1
 """Half the window over which means are compared; a wide one lets a small other object pass."""

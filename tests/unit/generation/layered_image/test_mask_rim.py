@@ -2,6 +2,7 @@
 
 import pytest
 import torch
+from image_layers import GREEN, RED, RIM_SIZE_PX, square_mask
 from torch import Tensor
 
 from diff4splat.generation.layered_image.disocclusion import grown
@@ -12,17 +13,7 @@ from diff4splat.generation.layered_image.mask_rim import (
     with_rim,
 )
 
-SIZE = (24, 28)
-RED, GREEN = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.7, 0.1])
-
-
-def _object(first: int, last: int) -> Tensor:
-    mask = torch.zeros(SIZE, dtype=torch.bool)
-    mask[first:last, first:last] = True
-    return mask
-
-
-MASK, OBJECT = _object(8, 16), _object(7, 17)
+MASK, OBJECT = square_mask(8, 16), square_mask(7, 17)
 """The mask misses the object's outermost pixels."""
 
 
@@ -31,7 +22,7 @@ def _image() -> Tensor:
 
 
 def _depth() -> Tensor:
-    depth = torch.full(SIZE, 20.0)
+    depth = torch.full(RIM_SIZE_PX, 20.0)
     depth[MASK] = 3.0
     return depth
 
@@ -47,7 +38,7 @@ def test_a_mask_that_is_right_stays() -> None:
     assert torch.equal(mask, OBJECT)
 
 
-def test_mixed_pixels_join_if_they_are_more_of_the_object() -> None:
+def test_mixed_pixels_join_if_they_are_more_of_thesquare_mask() -> None:
     image, edge = _image(), OBJECT & ~MASK
     for share, joins in ((0.6, True), (0.2, False)):
         image[edge] = share * RED + (1 - share) * GREEN
@@ -56,21 +47,21 @@ def test_mixed_pixels_join_if_they_are_more_of_the_object() -> None:
 
 
 def test_nothing_joins_where_object_and_background_are_alike() -> None:
-    image = torch.full((*SIZE, 3), 0.5)
+    image = torch.full((*RIM_SIZE_PX, 3), 0.5)
     image[OBJECT] = 0.52
     mask, depth = with_rim(MASK, _depth(), image)
     assert torch.equal(mask, MASK) and torch.equal(depth, _depth())
 
 
 def test_the_rim_is_no_wider_than_it_may_be() -> None:
-    image = torch.where(_object(2, 22)[..., None], RED, GREEN)
+    image = torch.where(square_mask(2, 22)[..., None], RED, GREEN)
     mask, _ = with_rim(MASK, _depth(), image)
     assert not bool((mask & ~grown(MASK, RIM_PX)).any())
 
 
 @pytest.mark.parametrize("value", [False, True])
 def test_an_empty_or_a_full_mask_stays(value: bool) -> None:
-    mask = torch.full(SIZE, value)
+    mask = torch.full(RIM_SIZE_PX, value)
     grown, depth = with_rim(mask, _depth(), _image())
     assert torch.equal(grown, mask) and torch.equal(depth, _depth())
 
@@ -84,22 +75,22 @@ def test_small_images(size: tuple[int, int]) -> None:
 
 
 def test_background_depth_inside_the_objects_edge_is_pulled_forward() -> None:
-    depth = torch.where(_object(8, 15), 3.0, 20.0)
+    depth = torch.where(square_mask(8, 15), 3.0, 20.0)
     found = on_surface(MASK, depth, MASK)
     assert bool((found[MASK] == 3.0).all()), "row 15 had that of the background"
     assert torch.equal(found[~MASK], depth[~MASK])
 
 
 def test_a_surface_that_recedes_stays_without_steps() -> None:
-    mask, slope = _object(4, 20), 0.02
-    depth = (3.0 + slope * torch.arange(SIZE[1])).expand(SIZE).clone()
+    mask, slope = square_mask(4, 20), 0.02
+    depth = (3.0 + slope * torch.arange(RIM_SIZE_PX[1])).expand(RIM_SIZE_PX).clone()
     found = on_surface(mask, depth, mask)[4:20, 4:20]
     assert float(found.diff(dim=1).abs().max()) < 1.5 * slope
     assert float((found - depth[4:20, 4:20]).abs().max()) < 2 * slope
 
 
 def test_a_thin_object_does_not_take_the_depth_of_another() -> None:
-    mask, depth = _object(2, 20), torch.full(SIZE, 20.0)
+    mask, depth = square_mask(2, 20), torch.full(RIM_SIZE_PX, 20.0)
     depth[mask] = 3.0
     mask[:, 25] = True
     depth[:, 25] = 7.0
@@ -107,9 +98,9 @@ def test_a_thin_object_does_not_take_the_depth_of_another() -> None:
 
 
 def test_what_is_thinner_than_its_edges_keeps_its_depth() -> None:
-    line = torch.zeros(SIZE, dtype=torch.bool)
+    line = torch.zeros(RIM_SIZE_PX, dtype=torch.bool)
     line[10] = True
-    depth = torch.rand(SIZE) + 1
+    depth = torch.rand(RIM_SIZE_PX) + 1
     assert torch.equal(on_surface(line, depth, line), depth)
 
 

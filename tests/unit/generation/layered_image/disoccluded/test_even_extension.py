@@ -25,11 +25,3 @@ def test_extension_stays_within_the_known_values() -> None:
         found = extended_evenly(torch.where(known, values, torch.nan), known)
         least, most = values[known].min(), values[known].max()
         assert bool(((found >= least - 1e-6) & (found <= most + 1e-6)).all())
-
-
-def test_what_is_beside_a_hole_counts_more_than_what_is_above() -> None:
-    values = torch.zeros(SIDE, SIDE)
-    values[:18] = 1.0  # the sky, from the upper edge of the box on
-    found = extended_evenly(values, ~box_mask())[box_mask()]
-    across = extended_evenly(values.mT, ~box_mask().mT)[box_mask().mT]
-    assert float(found.mean()) < float(across.mean())

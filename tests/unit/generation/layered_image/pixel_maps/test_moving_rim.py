@@ -2,21 +2,12 @@
 
 import pytest
 import torch
+from image_layers import GREEN, RED, RIM_SIZE_PX, square_mask
 from torch import Tensor
 
 from diff4splat.generation.layered_image.pixel_maps.moving_rim import with_moving_rim
 
-SIZE = (24, 28)
-RED, GREEN = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.7, 0.1])
-
-
-def _square(first: int, last: int) -> Tensor:
-    mask = torch.zeros(SIZE, dtype=torch.bool)
-    mask[first:last, first:last] = True
-    return mask
-
-
-MASK, MIXED = _square(8, 16), _square(7, 17) & ~_square(8, 16)
+MASK, MIXED = square_mask(8, 16), square_mask(7, 17) & ~square_mask(8, 16)
 
 
 def _image(share: float) -> Tensor:
@@ -27,7 +18,7 @@ def _image(share: float) -> Tensor:
 
 
 def _maps() -> tuple[Tensor, Tensor]:
-    displacement = torch.zeros(2, *SIZE, 3)
+    displacement = torch.zeros(2, *RIM_SIZE_PX, 3)
     displacement[1, MASK] = torch.tensor([1.0, 0.0, 0.5])
     return torch.where(MASK, 3.0, 20.0), displacement
 
@@ -44,8 +35,11 @@ def test_pixels_that_show_a_bit_of_the_object_move_with_it(share: float, joins: 
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_nothing_changes_where_nothing_or_everything_moves(moving: bool) -> None:
-    depth, displacement = torch.rand(SIZE) + 1, torch.full((2, *SIZE, 3), float(moving))
-    found = with_moving_rim(depth, displacement, torch.rand(*SIZE, 3))
+    depth, displacement = (
+        torch.rand(RIM_SIZE_PX) + 1,
+        torch.full((2, *RIM_SIZE_PX, 3), float(moving)),
+    )
+    found = with_moving_rim(depth, displacement, torch.rand(*RIM_SIZE_PX, 3))
     assert torch.equal(found[0], depth) and torch.equal(found[1], displacement)
 
 
