@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from diff4splat.models.networks import Networks
+from diff4splat.models.object_mask.enlarged import enlarged, reduced
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
 LEAST_PROBABILITY = 0.35
@@ -52,8 +53,10 @@ class MaskedMotion:
 
         Sides in a text are those of motion, so its object is the same in both.
         """
-        mirrored = self.object_mask(image.flip(-1), text).flip(-1)
-        return (self.object_mask(image, text) + mirrored) / 2
+        larger = enlarged(image)
+        mirrored = self.object_mask(larger.flip(-1), text).flip(-1)
+        logits = (self.object_mask(larger, text) + mirrored) / 2
+        return reduced(logits[None], image.shape[-2:])[0]
 
 
 def motion_prior(networks: Networks) -> MotionPrior | None:

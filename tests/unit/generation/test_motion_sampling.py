@@ -85,8 +85,9 @@ class Square:
     def __call__(self, image: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
         """The logit in the middle, almost nothing elsewhere."""
         del text
-        logits = torch.full((1, *image.shape[2:]), -9.0)
-        logits[:, 8:24, 8:24] = self.logit
+        height, width = image.shape[2:]
+        logits = torch.full((1, height, width), -9.0)
+        logits[:, height // 4 : 3 * height // 4, width // 4 : 3 * width // 4] = self.logit
         return logits
 
 

@@ -8,13 +8,13 @@ image in turn, some that it does not show, and none.
 """
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.image_unet.network import FOLDED_PX
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 from diff4splat.models.networks import Networks
+from diff4splat.models.object_mask.enlarged import enlarged, reduced
 from diff4splat.training.batches.coarse_images import coarse
 from diff4splat.training.batches.requests.request_batch import RequestBatch
 from diff4splat.training.losses.object_mask import cross_entropy, dice_error, name_error
@@ -41,8 +41,8 @@ class ObjectMaskStage(ModelStage):
         """The terms ``cross_entropy``, ``dice`` and ``names``."""
         losses = self.plan.recipe.losses
         rgb = self._random_light(self._random_sharpness(batch), batch)
-        features = self.object_mask.features(rgb)
-        logits = self.object_mask.logits(features, self._tokens(batch))
+        features = self.object_mask.features(enlarged(rgb))
+        logits = self._logits_of(features, batch)
         errors = {
             "cross_entropy": lambda: cross_entropy(logits, batch.masks),
             "dice": lambda: dice_error(logits, batch.masks),
@@ -83,7 +83,13 @@ class ObjectMaskStage(ModelStage):
     def _logits(
         self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
     ) -> Float[Tensor, "b r h w"]:
-        return self.object_mask.logits(self.object_mask.features(rgb), self._tokens(batch))
+        return self._logits_of(self.object_mask.features(enlarged(rgb)), batch)
+
+    def _logits_of(
+        self, features: Float[Tensor, "b c h2 w2"], batch: RequestBatch
+    ) -> Float[Tensor, "b r h w"]:
+        logits = self.object_mask.logits(features, self._tokens(batch))
+        return reduced(logits, batch.masks.shape[-2:])
 
     def _tokens(self, batch: RequestBatch) -> TextTokens:
         return text_tokens(*self._text.encode(batch, training=False))
@@ -92,9 +98,9 @@ class ObjectMaskStage(ModelStage):
         self, features: Float[Tensor, "b c h2 w2"], batch: RequestBatch
     ) -> Float[Tensor, " b"]:
         """Of noun and colour, one pixel of every cell: neighbours say the same."""
-        truth = (batch.nouns, batch.colors)
+        truth, size = (batch.nouns, batch.colors), features.shape[-2:]
         return sum(
-            name_error(found, names[:, ::FOLDED_PX, ::FOLDED_PX].long())
+            name_error(found, _nearest(names, size))
             for found, names in zip(self.object_mask.name_logits(features), truth, strict=True)
         )
 
@@ -123,6 +129,12 @@ class ObjectMaskStage(ModelStage):
 
 def _rgb(images: Tensor) -> Float[Tensor, "b 3 h w"]:
     return unit_rgb(images).movedim(-1, 1)
+
+
+def _nearest(names: Tensor, size: tuple[int, int]) -> Int[Tensor, "b h2 w2"]:
+    """Numbers of the names at another size."""
+    resized = torch.nn.functional.interpolate(names[:, None].float(), size, mode="nearest-exact")
+    return resized[:, 0].long()
 
 
 def _mean_where(values: Float[Tensor, "b r"], mask: Bool[Tensor, "b r"]) -> Float[Tensor, " b"]:

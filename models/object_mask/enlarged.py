@@ -1,0 +1,30 @@
+"""The size at which the object mask sees an image: small objects need small cells.
+
+Axes: ``n c h w`` images, ``n r h w`` logits.
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+ENLARGEMENT = 1.5
+"""Of the image's sides. Validation worlds of 128 px: docs/log/object-mask-backbone.md."""
+MULTIPLE_PX = 16
+
+
+def enlarged(image: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
+    """The image with larger sides, multiples of 16."""
+    height, width = (
+        max(round(side * ENLARGEMENT / MULTIPLE_PX), 1) * MULTIPLE_PX for side in image.shape[-2:]
+    )
+    larger = torch.nn.functional.interpolate(
+        image, (height, width), mode="bicubic", align_corners=False
+    )
+    return larger.clamp(0, 1)
+
+
+def reduced(
+    logits: Float[Tensor, "n r h2 w2"], size_px: tuple[int, int]
+) -> Float[Tensor, "n r h w"]:
+    """Logits of an enlarged image at the size that it had."""
+    return torch.nn.functional.interpolate(logits.float(), size_px, mode="bilinear", antialias=True)
