@@ -38,7 +38,7 @@ def test_a_mask_that_is_right_stays() -> None:
     assert torch.equal(mask, OBJECT)
 
 
-def test_mixed_pixels_join_if_they_are_more_of_thesquare_mask() -> None:
+def test_mixed_pixels_join_if_they_are_more_of_the_object() -> None:
     image, edge = _image(), OBJECT & ~MASK
     for share, joins in ((0.6, True), (0.2, False)):
         image[edge] = share * RED + (1 - share) * GREEN
@@ -113,3 +113,10 @@ def test_the_nearest_pixel_is_the_nearest() -> None:
     # OpenCV's distance is exact to a few per cent.
     assert bool(((every - chosen).norm(dim=1) <= 1.05 * truth + 1e-9).all())
     assert bool(mask.flatten()[nearest.flatten()].all())
+
+
+def test_the_surface_at_the_edge_has_no_steps() -> None:
+    mask, depth = square_mask(4, 20), torch.full(RIM_SIZE_PX, 3.0)
+    depth[:, ::2] = 3.4
+    edge = on_surface(mask, torch.where(mask, depth, 20.0), mask)[4, 6:18]
+    assert float(edge.diff().abs().max()) < 0.2

@@ -78,3 +78,10 @@ def test_beside_an_object_the_mean_is_that_of_the_ground() -> None:
 def test_the_mean_of_a_fine_texture_is_even() -> None:
     noise = torch.rand(SIDE, SIDE, 3, generator=torch.Generator().manual_seed(0))
     assert float(means_within_objects(0.4 + 0.2 * noise).std()) < 0.5 * float(0.2 * noise.std())
+
+
+def test_colours_of_another_object_leave_the_mean() -> None:
+    image = torch.full((64, 192, 3), 0.2)
+    image[:, :96] = torch.tensor([0.9, 0.1, 0.1])
+    beside = means_within_objects(image)[:, 100]
+    assert float((beside - 0.2).abs().max()) < 0.005  # 0.02 with a plain mean
