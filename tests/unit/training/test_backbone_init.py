@@ -15,6 +15,7 @@ from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.networks import Networks
+from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
 from diff4splat.training import backbone_init
 from diff4splat.training.prerequisites import last_checkpoint
 from diff4splat.training.train_stage import StageRequest, train_stage
@@ -33,6 +34,18 @@ def test_only_the_backbone_takes_public_weights(monkeypatch: pytest.MonkeyPatch)
         name = key.removeprefix("backbone.")
         want = public[name] if key.startswith("backbone.") else before[key]
         torch.testing.assert_close(value, want)
+
+
+def test_a_shorter_backbone_takes_the_weights_that_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    torch.manual_seed(1)
+    public = EfficientNetLite().state_dict()
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda: public)
+    network = BackboneObjectMaskNet(4, 8)
+    backbone_init.start_from_public_backbones(Networks(object_mask=network), ["object_mask"])
+    taken = network.backbone.state_dict()
+    assert len(taken) < len(public)
+    for name, value in taken.items():
+        torch.testing.assert_close(value, public[name])
 
 
 def test_a_part_without_a_backbone_is_refused() -> None:
