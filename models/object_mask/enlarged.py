@@ -7,13 +7,14 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.image_unet.network import MULTIPLE_PX
+
 ENLARGEMENT = 1.5
 """Of the image's sides. Validation worlds of 128 px: docs/log/object-mask-backbone.md."""
-MULTIPLE_PX = 16
 
 
 def enlarged(image: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
-    """The image with larger sides, multiples of 16."""
+    """The image with larger sides, multiples of those that the network takes."""
     height, width = (
         max(round(side * ENLARGEMENT / MULTIPLE_PX), 1) * MULTIPLE_PX for side in image.shape[-2:]
     )

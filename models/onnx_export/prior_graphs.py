@@ -73,7 +73,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
-    """An image and text to the logits of what the text asks to move."""
+    """An image, enlarged as in ``object_mask.enlarged``, and text to logits of what is to move."""
     size = _image_size(IMAGE_MULTIPLE_PX)
     return [
         GraphSource(

@@ -3,7 +3,8 @@
 import pytest
 import torch
 
-from diff4splat.models.object_mask.enlarged import ENLARGEMENT, MULTIPLE_PX, enlarged, reduced
+from diff4splat.models.image_unet.network import MULTIPLE_PX
+from diff4splat.models.object_mask.enlarged import ENLARGEMENT, enlarged, reduced
 
 
 @pytest.mark.parametrize("size", [(16, 16), (64, 128), (144, 80)])

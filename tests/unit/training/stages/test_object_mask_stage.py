@@ -108,6 +108,20 @@ def test_images_get_another_light_and_another_sharpness() -> None:
     assert sharp == {True, False}
 
 
+def test_the_network_sees_enlarged_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage, sizes = make_stage(mask_recipe(), model=MODEL), []
+    features = stage.object_mask.features
+
+    def recorded(image: torch.Tensor) -> torch.Tensor:
+        sizes.append(tuple(image.shape[-2:]))
+        return features(image)
+
+    monkeypatch.setattr(stage.object_mask, "features", recorded)
+    stage(requests())
+    stage.measure(requests())
+    assert sizes == [(48, 48)] * 2
+
+
 def test_panel() -> None:
     image = make_stage(mask_recipe(), model=MODEL).eval().panel(requests())
     assert image.ndim == 3 and bool(image.isfinite().all())
