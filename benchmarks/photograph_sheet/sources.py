@@ -4,13 +4,13 @@ Axes: ``h w`` pixels.
 """
 
 import importlib.resources
-import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from diff4splat.data_prep.panoramas.view import PanoramaView, panorama_view
 from diff4splat.errors import InputError
 
 Image = UInt8[np.ndarray, "h w 3"]
@@ -82,20 +82,10 @@ def load(photograph: Photograph) -> Image:
     rgb = np.ascontiguousarray(pixels[..., ::-1])
     if photograph.yaw_deg is None:
         return rgb
-    return panorama_view(rgb, photograph.yaw_deg, photograph.pitch_deg)
-
-
-def panorama_view(panorama: Image, yaw_deg: float, pitch_deg: float) -> Image:
-    """A pinhole view of an equirectangular panorama."""
-    (height, width), sides = VIEW_PX, panorama.shape[:2]
-    focal_px = width / 2 / math.tan(math.radians(VIEW_FOV_DEG) / 2)
-    x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
-    pitch = math.radians(pitch_deg)
-    down = y * math.cos(pitch) - focal_px * math.sin(pitch)
-    forward = y * math.sin(pitch) + focal_px * math.cos(pitch)
-    yaw = np.arctan2(x, forward) + math.radians(yaw_deg)
-    elevation = np.arctan2(down, np.hypot(x, forward))
-    columns = (yaw / (2 * math.pi) + 0.5) * sides[1] - 0.5
-    rows = (elevation / math.pi + 0.5) * sides[0] - 0.5
-    maps = (columns.astype(np.float32), rows.astype(np.float32))
-    return cv2.remap(panorama, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    view = PanoramaView(
+        size_px=VIEW_PX,
+        fov_deg=VIEW_FOV_DEG,
+        yaw_deg=photograph.yaw_deg,
+        pitch_deg=photograph.pitch_deg,
+    )
+    return panorama_view(rgb, view)

@@ -72,6 +72,7 @@ prepare doctor folder --dataset spring --out folder
 prepare align nowhere --out folder --reference tracks
 prepare align folder --out folder --reference megasam
 prepare curate nowhere --out folder
+prepare panoramas nowhere.exr --out folder
 prepare poses nowhere.mp4 --out poses.json
 prepare captions folder --out folder
 prepare pipeline nowhere.toml

@@ -57,6 +57,8 @@ class DataSettings:
     """Sides, drawn from at each step. Stage ``monocular_depth``: random views (window, zoom, roll,
     noise) of every image. Stage ``motion_diffusion``: widths to which images are reduced and
     enlarged again. Stage ``object_mask``: the same, of square images."""
+    photographs: str = ""
+    """Stage ``monocular_depth``: folder of photographs without depth, one per sample and step."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4

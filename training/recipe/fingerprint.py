@@ -49,7 +49,12 @@ def decisive(stage: Mapping[str, Any]) -> dict[str, Any]:
         for key, value in stage.items()
         if key != "micro_batch" and not (key in _STAGE_ADDED and _STAGE_ADDED[key] == value)
     }
-    return kept | {"data": data}
+    losses = {
+        key: value
+        for key, value in stage["losses"].items()
+        if not (key in _LOSS_ADDED and _LOSS_ADDED[key] == value)
+    }
+    return kept | {"data": data, "losses": losses}
 
 
 def _model(model: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,7 +95,8 @@ _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}
 """Sections of later releases, and what is 0 in a model without them."""
 _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
 _SOURCE_ADDED = {"depth_loss": "true", "motion_loss": "true", "views": 0, "unit": ""}
-_NOT_DECISIVE = ("workers", "in_memory")
+_NOT_DECISIVE = ("workers", "in_memory", "photographs")
+_LOSS_ADDED = {"window_consistency": 0.0}
 _ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False}
 """Settings of later releases, with the value that changes nothing."""
 

@@ -77,6 +77,9 @@ class DepthLosses:
     sky_margin: float = 0.2
     """How much nearer than the sky the depth is at pixels without truth (ours): for data in which
     only the sky has no depth."""
+    window_consistency: float = 0.0
+    """A window of a photograph gets the depth that the whole gives it (ours); needs
+    ``data.photographs``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -51,6 +51,9 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     fits = not data.keyframes_only or stage.kind in IMAGE_KINDS
     expected = f"false but for {' and '.join(IMAGE_KINDS)} stages"
     require(fits, f"{what}.keyframes_only", expected, "true")
+    if stage.kind == "monocular_depth":
+        fits = not stage.losses.window_consistency or data.photographs
+        require(fits, f"{what}.photographs", "a folder for losses.window_consistency", "none")
     if stage.kind == "monocular_depth" and model.monocular_depth.image_backbone:
         sides = data.view_sides_px or data.size_px
         fits = all(side % BACKBONE_MULTIPLE_PX == 0 for side in sides)

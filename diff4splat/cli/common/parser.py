@@ -13,7 +13,11 @@ from diff4splat.cli.datasets.prepare_curation import (
     PrepareCurate,
     PreparePoses,
 )
-from diff4splat.cli.datasets.prepare_datasets import PrepareDoctor, PrepareImport
+from diff4splat.cli.datasets.prepare_datasets import (
+    PrepareDoctor,
+    PrepareImport,
+    PreparePanoramas,
+)
 from diff4splat.cli.datasets.prepare_pipeline import PreparePipeline
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -48,6 +52,7 @@ Prepare = (
     | Annotated[PrepareLatents, subcommand("latents")]
     | Annotated[PrepareImport, subcommand("import")]
     | Annotated[PrepareDoctor, subcommand("doctor")]
+    | Annotated[PreparePanoramas, subcommand("panoramas")]
     | Annotated[PreparePoses, subcommand("poses")]
     | Annotated[PrepareAlign, subcommand("align")]
     | Annotated[PrepareCaptions, subcommand("captions")]

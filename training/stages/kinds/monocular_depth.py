@@ -9,6 +9,7 @@ than everything else.
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import torch
 from jaxtyping import Float
@@ -19,9 +20,11 @@ from diff4splat.metrics.depth import depth_pearson
 from diff4splat.metrics.masked import masked_mean, mean_or_nan
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
-from diff4splat.training.batches.random_sky import SKY_DRAWS, random_sky
-from diff4splat.training.batches.random_views import (
+from diff4splat.training.batches.random_images.photographs import read_photographs
+from diff4splat.training.batches.random_images.random_sky import SKY_DRAWS, random_sky
+from diff4splat.training.batches.random_images.random_views import (
     DRAWS,
     PHOTO_DRAWS,
     DepthImages,
@@ -31,7 +34,8 @@ from diff4splat.training.batches.random_views import (
 )
 from diff4splat.training.losses.log_depth import gradient_error, inverse_depth_error
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
-from diff4splat.training.stages.model_stage import ModelStage, Terms
+from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
+from diff4splat.training.stages.photo_windows import window_difference
 from diff4splat.training.stages.previews import depth_preview
 from diff4splat.training.stages.scene_prediction import log_depth
 
@@ -46,6 +50,16 @@ class MonocularDepthStage(ModelStage):
 
     parts = ("monocular_depth",)
 
+    def __init__(self, networks: Networks, plan: StagePlan) -> None:
+        super().__init__(networks, plan)
+        # Processors differentiate depthwise convolutions faster so.
+        self.monocular_depth.to(memory_format=torch.channels_last)
+        data, weight = plan.recipe.data, plan.recipe.losses.window_consistency
+        self.photographs = None
+        if weight:
+            side_px = max(data.view_sides_px or data.size_px)
+            self.photographs = read_photographs(Path(data.photographs), side_px)
+
     def compilable(self) -> tuple[nn.Module, ...]:
         """The depth network."""
         return (self.monocular_depth,)
@@ -54,21 +68,35 @@ class MonocularDepthStage(ModelStage):
         """The terms ``depth_log``, ``depth_gradient``, ``inverse_depth`` and ``sky_margin``."""
         images, weights = self._views(batch), self.plan.recipe.losses
         predicted = self.log_depth(self._random_colors(images.rgb, batch))
-        terms = depth_terms(predicted, images)
+        terms = {
+            name: lambda value=value: _per_sample(value, batch)
+            for name, value in depth_terms(predicted, images).items()
+        }
+        if self.photographs is not None:
+            terms["window_consistency"] = lambda: self._window_consistency(batch, images)
         return weighted_sum(
             [
-                LossTerm(
-                    name=name,
-                    weight=getattr(weights, name),
-                    compute=lambda value=value: _per_sample(value, batch),
-                )
-                for name, value in terms.items()
+                LossTerm(name=name, weight=getattr(weights, name), compute=compute)
+                for name, compute in terms.items()
             ]
+        )
+
+    def _window_consistency(self, batch: ClipBatch, images: DepthImages) -> Float[Tensor, " b"]:
+        """One photograph per sample: its window, as large as the views, against the whole."""
+        draws = self._draws(batch, "photograph", len(batch), 1 + DRAWS).to(images.rgb)
+        chosen = (draws[:, 0] * len(self.photographs)).long().cpu()
+        photographs = unit_rgb(self.photographs[chosen].to(images.rgb.device))
+        return window_difference(
+            self.log_depth,
+            photographs,
+            images.rgb.shape[2:],
+            draws[:, 1:],
+            lambda rgb: self._random_colors(rgb, batch, "window light"),
         )
 
     def log_depth(self, rgb: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n h w"]:
         """Logarithm of the depth z of every pixel."""
-        raw = self.monocular_depth(rgb)
+        raw = self.monocular_depth(rgb.contiguous(memory_format=torch.channels_last))
         with torch.autocast(rgb.device.type, enabled=False):
             return log_depth(raw, self.plan.model)
 
@@ -98,10 +126,10 @@ class MonocularDepthStage(ModelStage):
         return torch.cat(rows)
 
     def _random_colors(
-        self, rgb: Float[Tensor, "n 3 h w"], batch: ClipBatch
+        self, rgb: Float[Tensor, "n 3 h w"], batch: ClipBatch, purpose: str = "light"
     ) -> Float[Tensor, "n 3 h w"]:
         """Every image with a random gamma and random gains: depth does not follow from colour."""
-        spread = 2 * self._draws(batch, "light", len(rgb), 4).to(rgb)[:, :, None, None] - 1
+        spread = 2 * self._draws(batch, purpose, len(rgb), 4).to(rgb)[:, :, None, None] - 1
         gamma, gain = (GAMMA * spread[:, :1]).exp(), (GAIN * spread[:, 1:]).exp()
         return (rgb.clamp_min(1e-3) ** gamma * gain).clamp(0, 1)
 

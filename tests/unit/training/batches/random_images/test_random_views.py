@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-from diff4splat.training.batches.random_views import (
+from diff4splat.training.batches.random_images.random_views import (
     DRAWS,
     GREY_SHARE,
     LEVEL_SHARE,

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from diff4splat.training.batches.random_sky import SKY_DRAWS, SKY_SHARE, random_sky
+from diff4splat.training.batches.random_images.random_sky import SKY_DRAWS, SKY_SHARE, random_sky
 
 ABOVE, BELOW = (0.1, 0.2, 0.3), (0.9, 0.8, 0.7)
 

@@ -54,12 +54,19 @@ def random_views(
     images: DepthImages, size_px: tuple[int, int], draws: Float[Tensor, "n 5"]
 ) -> DepthImages:
     """One view of (height, width) of every image; ``draws`` are uniform in [0, 1)."""
-    place = _placement(images.rgb.shape[2:], size_px, draws)
-    fine = _sample(images.rgb, place, (2 * size_px[0], 2 * size_px[1]), "bilinear")
+    place = placement(images.rgb.shape[2:], size_px, draws)
     depth = torch.where(images.known, images.depth, 0.0)[:, None]
     return depth_images(
-        torch.nn.functional.avg_pool2d(fine, 2), _sample(depth, place, size_px, "nearest")[:, 0]
+        view_rgb(images.rgb, place, size_px), sample_view(depth, place, size_px, "nearest")[:, 0]
     )
+
+
+def view_rgb(
+    rgb: Float[Tensor, "n 3 h w"], place: "Placement", size_px: tuple[int, int]
+) -> Float[Tensor, "n 3 vh vw"]:
+    """Colours of views: the mean of 2 × 2 samples per pixel."""
+    fine = sample_view(rgb, place, (2 * size_px[0], 2 * size_px[1]), "bilinear")
+    return torch.nn.functional.avg_pool2d(fine, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,9 +78,10 @@ class Placement:
     """Columns: from the view's centre to its right and to its lower edge."""
 
 
-def _placement(
+def placement(
     source_px: tuple[int, ...], size_px: tuple[int, int], draws: Float[Tensor, "n 5"]
 ) -> Placement:
+    """Where views of ``size_px`` lie in images of ``source_px`` (both height, width)."""
     whole, roll, zoom, *shift = draws.unbind(1)
     whole = whole < WHOLE_SHARE
     roll = torch.where(whole, 0.0, _random_roll(roll))
@@ -96,9 +104,10 @@ def _random_roll(draw: Float[Tensor, " n"]) -> Float[Tensor, " n"]:
     return torch.where(rolled < 0, 0.0, (2 * rolled - 1) * MAX_ROLL_RAD)
 
 
-def _sample(
+def sample_view(
     maps: Float[Tensor, "n c h w"], place: Placement, size_px: tuple[int, int], mode: str
 ) -> Float[Tensor, "n c vh vw"]:
+    """Values of maps at the pixels of views, by interpolation of ``mode``."""
     matrix = torch.cat([place.axes, place.center[:, :, None]], 2)
     shape = [len(maps), maps.shape[1], *size_px]
     grid = torch.nn.functional.affine_grid(matrix, shape, align_corners=False)

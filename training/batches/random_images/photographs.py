@@ -1,0 +1,41 @@
+"""Photographs without depth, kept in memory as squares.
+
+Axes: ``n`` photographs, ``s`` their side in pixels.
+"""
+
+from pathlib import Path
+
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from diff4splat.errors import InputError
+from diff4splat.io.photos.images import read_photo
+from diff4splat.io.pixels import to_bytes
+
+SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
+
+
+def read_photographs(folder: Path, side_px: int) -> UInt8[Tensor, "n 3 s s"]:
+    """The middle square of every photograph in ``folder``, by name.
+
+    Raises:
+        InputError: the folder has no photographs, or one cannot be read.
+    """
+    files = sorted(file for file in folder.glob("*") if file.suffix.lower() in SUFFIXES)
+    if not files:
+        raise InputError(
+            f"{folder}: expected photographs ({', '.join(SUFFIXES)}), got none; "
+            "correct data.photographs or leave it out"
+        )
+    return torch.stack([_square(read_photo(file, convert=True).rgb, side_px) for file in files])
+
+
+def _square(rgb: Float[Tensor, "h w 3"], side_px: int) -> UInt8[Tensor, "3 s s"]:
+    short = min(rgb.shape[:2])
+    top, left = ((length - short) // 2 for length in rgb.shape[:2])
+    square = rgb[top : top + short, left : left + short].movedim(-1, 0)
+    resized = torch.nn.functional.interpolate(
+        square[None], (side_px, side_px), mode="bilinear", antialias=True
+    )[0]
+    return torch.from_numpy(to_bytes(resized))
