@@ -11,8 +11,9 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError, InputError
 from diff4splat.io.photos.images import write_png
-from diff4splat.training.recipe.fingerprint import fingerprint
+from diff4splat.training.recipe.fingerprint import decisive, fingerprint
 from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_to_dict
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.photo_windows import consistency_error, window_difference
@@ -134,3 +135,5 @@ def test_earlier_runs_keep_their_fingerprint(tmp_path: Path) -> None:
     weighted = Recipe(name="test", seed=0, model=MODEL, stages=(photo_recipe(tmp_path),))
     one, two, three = (fingerprint(r, "monocular_depth") for r in (plain, other, weighted))
     assert one == two != three
+    # The key is new: with it, runs from before would not go on.
+    assert "window_consistency" not in decisive(recipe_to_dict(plain)["stages"][0])["losses"]
