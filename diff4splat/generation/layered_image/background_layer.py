@@ -7,7 +7,7 @@ Where the pixel's surface continues it has the pixel's colour and displacement. 
 edge it belongs to the far side: it has the far side's colour and is static.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float
@@ -65,6 +65,16 @@ def background_layer(
         displacement=None if displacement is None else displacement * same,
         pixel_index=torch.where(far.holds_pixel, pixels, NO_PIXEL),
     )
+
+
+def behind_pixels(layer: ImageLayer, depth: Float[Tensor, "y x"]) -> ImageLayer:
+    """The layer behind the pixels of a larger copy, whose sides are multiples of the layer's.
+
+    Depth of the larger copy has edges of its own; where it is farther, the layer would be seen.
+    """
+    coarse = torch.nn.functional.adaptive_max_pool2d(depth[None], layer.depth.shape)
+    farthest = _neighbours(coarse)[0].amax(0).view_as(layer.depth)
+    return replace(layer, depth=torch.maximum(layer.depth, BEHIND * farthest))
 
 
 def far_side(depth: Float[Tensor, "h w"]) -> FarSide:

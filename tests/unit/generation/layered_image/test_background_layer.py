@@ -14,6 +14,7 @@ from diff4splat.generation.layered_image.background_layer import (
     SAME_SURFACE,
     WINDOW,
     background_layer,
+    behind_pixels,
 )
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
@@ -136,3 +137,24 @@ def test_precision_is_that_of_the_depth(dtype: torch.dtype) -> None:
     layer = behind(rgb, depth)
     assert layer.depth.dtype == layer.rgb.dtype == dtype
     assert layer.displacement is None
+
+
+def test_it_lies_behind_farther_pixels_of_a_larger_copy() -> None:
+    rgb, depth = halves()
+    layer, fine = behind(rgb, depth), random_depth(2 * SIDE, 2 * SIDE, (0.5, 20.0), seed=3)
+    moved = behind_pixels(layer, fine)
+    for row in range(SIDE):
+        for column in range(SIDE):
+            rows, columns = (
+                slice(max(2 * (at - REACH), 0), 2 * (at + REACH + 1)) for at in (row, column)
+            )
+            farthest = BEHIND * float(fine[rows, columns].max())
+            wanted = max(float(layer.depth[row, column]), farthest)
+            assert float(moved.depth[row, column]) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_nearer_pixels_of_a_larger_copy_change_nothing() -> None:
+    layer = behind(*halves())
+    assert torch.equal(
+        behind_pixels(layer, torch.full((4 * SIDE, 4 * SIDE), 0.1)).depth, layer.depth
+    )

@@ -72,6 +72,14 @@ def test_pixels_take_the_depth_of_the_larger_copy() -> None:
     torch.testing.assert_close(moved, torch.full_like(moved, 0.5 * 7 / 4))
 
 
+def test_the_background_layer_is_not_seen_before_farther_pixels_of_the_larger_copy() -> None:
+    image = input_image(random_rgb(*SIZE_PX))
+    fine = FineMaps(rgb=image.rgb, depth=torch.full(SIZE_PX, 7.0), smooth=False)
+    maps = ImageMaps(depth=torch.full(SMALL, 4.0), displacement=None, fine=fine)
+    layers = build_layered_image(downsample(image, FACTOR), image, maps, MARGIN).layers
+    assert layers[2].depth.shape == SMALL and float(layers[2].depth.min()) > 7.0
+
+
 def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:
     image = input_image(random_rgb(*SIZE_PX))
     depth = torch.full(SIZE_PX, 9.0)
