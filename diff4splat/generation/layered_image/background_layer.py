@@ -67,7 +67,7 @@ def background_layer(
     )
 
 
-def behind_pixels(layer: ImageLayer, depth: Float[Tensor, "y x"]) -> ImageLayer:
+def farther_than_pixels(layer: ImageLayer, depth: Float[Tensor, "y x"]) -> ImageLayer:
     """The layer behind the pixels of a larger copy, whose sides are multiples of the layer's.
 
     Depth of the larger copy has edges of its own; where it is farther, the layer would be seen.

@@ -12,7 +12,10 @@ A new way of filling hidden regions belongs into ``hidden_layers``.
 from dataclasses import replace
 
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.layered_image.background_layer import background_layer, behind_pixels
+from diff4splat.generation.layered_image.background_layer import (
+    background_layer,
+    farther_than_pixels,
+)
 from diff4splat.generation.layered_image.border_extension import (
     border_extension,
     push_behind_surface,
@@ -49,7 +52,7 @@ def build_layered_image(
     hidden, reduced = hidden_layers(small, maps, border_cells), is_reduced(small, image)
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
-        hidden[0] = behind_pixels(hidden[0], pixels.depth)
+        hidden[0] = farther_than_pixels(hidden[0], pixels.depth)
     if (disoccluded := disoccluded_layer(pixels)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]

@@ -14,7 +14,7 @@ from diff4splat.generation.layered_image.background_layer import (
     SAME_SURFACE,
     WINDOW,
     background_layer,
-    behind_pixels,
+    farther_than_pixels,
 )
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
@@ -142,7 +142,7 @@ def test_precision_is_that_of_the_depth(dtype: torch.dtype) -> None:
 def test_it_lies_behind_farther_pixels_of_a_larger_copy() -> None:
     rgb, depth = halves()
     layer, fine = behind(rgb, depth), random_depth(2 * SIDE, 2 * SIDE, (0.5, 20.0), seed=3)
-    moved = behind_pixels(layer, fine)
+    moved = farther_than_pixels(layer, fine)
     for row in range(SIDE):
         for column in range(SIDE):
             rows, columns = (
@@ -156,5 +156,5 @@ def test_it_lies_behind_farther_pixels_of_a_larger_copy() -> None:
 def test_nearer_pixels_of_a_larger_copy_change_nothing() -> None:
     layer = behind(*halves())
     assert torch.equal(
-        behind_pixels(layer, torch.full((4 * SIDE, 4 * SIDE), 0.1)).depth, layer.depth
+        farther_than_pixels(layer, torch.full((4 * SIDE, 4 * SIDE), 0.1)).depth, layer.depth
     )
