@@ -32,14 +32,14 @@ def seen(view: PanoramaView) -> np.ndarray:
 @settings(max_examples=20, deadline=None)
 @given(yaw=st.floats(-180, 180), pitch=st.floats(-60, 60), roll=st.floats(-40, 40))
 def test_the_middle_looks_where_yaw_and_pitch_say(yaw: float, pitch: float, roll: float) -> None:
-    view = PanoramaView(size_px=(33, 33), fov_deg=50, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
+    view = PanoramaView(size_px=(33, 33), fov_deg=50.0, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
     y, p = math.radians(yaw), math.radians(pitch)
     wanted = [math.sin(y) * math.cos(p), -math.sin(p), math.cos(y) * math.cos(p)]
     np.testing.assert_allclose(seen(view)[16, 16], wanted, atol=0.03)
 
 
 def test_straight_lines_stay_straight_and_the_width_has_the_field_of_view() -> None:
-    view = PanoramaView(size_px=(31, 61), fov_deg=70)
+    view = PanoramaView(size_px=(31, 61), fov_deg=70.0)
     direction = seen(view)
     slope = direction[..., 0] / direction[..., 2]
     half = math.tan(math.radians(35))
@@ -48,18 +48,18 @@ def test_straight_lines_stay_straight_and_the_width_has_the_field_of_view() -> N
 
 
 def test_roll_turns_the_image_around_its_middle() -> None:
-    level = seen(PanoramaView(size_px=(41, 41), fov_deg=40))
-    turned = seen(PanoramaView(size_px=(41, 41), fov_deg=40, roll_deg=90))
+    level = seen(PanoramaView(size_px=(41, 41), fov_deg=40.0))
+    turned = seen(PanoramaView(size_px=(41, 41), fov_deg=40.0, roll_deg=90.0))
     np.testing.assert_allclose(turned, np.rot90(level), atol=0.02)
 
 
 def test_the_seam_does_not_show() -> None:
-    ahead = PanoramaView(size_px=(32, 32), fov_deg=60)
-    behind = PanoramaView(size_px=(32, 32), fov_deg=60, yaw_deg=180)
+    ahead = PanoramaView(size_px=(32, 32), fov_deg=60.0)
+    behind = PanoramaView(size_px=(32, 32), fov_deg=60.0, yaw_deg=180.0)
     np.testing.assert_allclose(seen(behind), seen(ahead) * np.array([-1, 1, -1]), atol=0.02)
 
 
 @pytest.mark.parametrize("pitch", [-90.0, 90.0])
 def test_a_pole_has_finite_pixels(pitch: float) -> None:
-    view = PanoramaView(size_px=(16, 16), fov_deg=100, pitch_deg=pitch)
+    view = PanoramaView(size_px=(16, 16), fov_deg=100.0, pitch_deg=pitch)
     assert np.isfinite(seen(view)).all()
