@@ -16,6 +16,7 @@ from torch import Tensor
 from diff4splat.generation.depth_prediction import predict_depth
 from diff4splat.io.atomic import write_text
 from diff4splat.models.hub.model import load_model
+from diff4splat.training.batches.random_images.photographs import middle_square
 
 Predict = Callable[[Float[Tensor, "h w 3"]], Float[Tensor, "h w"]]
 HEADER = (
@@ -106,11 +107,5 @@ def _photographs() -> list[Float[Tensor, "h w 3"]]:
     from skimage import data
 
     photos = [data.astronaut(), data.chelsea(), data.coffee(), data.rocket()]
-    return [_square(torch.from_numpy(photo[..., :3].copy()).float() / 255) for photo in photos]
-
-
-def _square(photo: Float[Tensor, "h w 3"]) -> Float[Tensor, "side side 3"]:
-    side = min(photo.shape[:2])
-    top, left = ((length - side) // 2 for length in photo.shape[:2])
-    square = photo[top : top + side, left : left + side]
-    return _resized(square.movedim(-1, 0), (256, 256)).movedim(0, -1).clamp(0, 1)
+    unit = [torch.from_numpy(photo[..., :3].copy()).float() / 255 for photo in photos]
+    return [middle_square(photo, 256).movedim(0, -1) for photo in unit]

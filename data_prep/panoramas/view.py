@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import torch
+
+from diff4splat.geometry.lenses.equirectangular import Equirectangular
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,10 +35,11 @@ def panorama_view(panorama: np.ndarray, view: PanoramaView) -> np.ndarray:
     pitch = math.radians(view.pitch_deg)
     down = y * math.cos(pitch) - focal_px * math.sin(pitch)
     forward = y * math.sin(pitch) + focal_px * math.cos(pitch)
-    yaw = np.arctan2(x, forward) + math.radians(view.yaw_deg)
-    elevation = np.arctan2(down, np.hypot(x, forward))
+    directions = torch.from_numpy(np.stack([x, down, forward], -1))
+    longitude, latitude = Equirectangular().points(directions)[0].numpy().transpose(2, 0, 1)
+    yaw = longitude + math.radians(view.yaw_deg)
     columns = (yaw / (2 * math.pi) + 0.5) * sides[1] - 0.5
-    rows = (elevation / math.pi + 0.5) * sides[0] - 0.5
+    rows = (latitude / math.pi + 0.5) * sides[0] - 0.5
     maps = (columns.astype(np.float32), rows.astype(np.float32))
     return cv2.remap(panorama, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
 

@@ -67,14 +67,10 @@ def background_layer(
     )
 
 
-def farther_than_pixels(layer: ImageLayer, depth: Float[Tensor, "y x"]) -> ImageLayer:
-    """The layer behind the pixels of a larger copy, whose sides are multiples of the layer's.
-
-    Depth of the larger copy has edges of its own; where it is farther, the layer would be seen.
-    """
-    coarse = torch.nn.functional.adaptive_max_pool2d(depth[None], layer.depth.shape)
-    farthest = _neighbours(coarse)[0].amax(0).view_as(layer.depth)
-    return replace(layer, depth=torch.maximum(layer.depth, BEHIND * farthest))
+def farther_than_pixels(layer: ImageLayer, farthest: Float[Tensor, "h w"]) -> ImageLayer:
+    """The layer with no cell in front of the ``farthest`` depths in its neighbourhood."""
+    near = _neighbours(farthest[None])[0].amax(0).view_as(farthest)
+    return replace(layer, depth=torch.maximum(layer.depth, BEHIND * near))
 
 
 def far_side(depth: Float[Tensor, "h w"]) -> FarSide:

@@ -11,6 +11,10 @@ A new way of filling hidden regions belongs into ``hidden_layers``.
 
 from dataclasses import replace
 
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.background_layer import (
     background_layer,
@@ -49,10 +53,9 @@ def build_layered_image(
     Without ``infill`` between the pixels, theirs are twice as wide.
     """
     pixels = pixel_layer(small, image, maps)
-    hidden, reduced = hidden_layers(small, maps, border_cells), is_reduced(small, image)
+    hidden, reduced = hidden_layers(small, maps, pixels, border_cells), is_reduced(small, image)
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
-        hidden[0] = farther_than_pixels(hidden[0], pixels.depth)
     if (disoccluded := disoccluded_layer(pixels)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
@@ -67,13 +70,28 @@ def build_layered_image(
     return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
 
 
-def hidden_layers(small: InputImage, maps: ImageMaps, border_cells: int) -> list[ImageLayer]:
-    """The background layer, and the border extension if it has any cells."""
+def hidden_layers(
+    small: InputImage, maps: ImageMaps, pixels: ImageLayer, border_cells: int
+) -> list[ImageLayer]:
+    """The background layer, and the border extension if it has any cells, behind ``pixels``."""
     moving = moving_mask(maps.depth, maps.displacement)
+    farthest = farthest_depth(maps.depth, pixels.depth)
     background = background_layer(small.rgb, maps.depth, small.camera, maps.displacement)
+    background = farther_than_pixels(background, farthest)
     layers = [inpaint_background(background, small.rgb, moving)]
     if border_cells:
         border = border_extension(small.rgb, maps.depth, small.camera, border_cells)
-        border = push_behind_surface(border, maps.depth, border_cells)
+        border = push_behind_surface(border, farthest, border_cells)
         layers.append(inpaint_border(border, small.rgb, moving))
     return layers
+
+
+def farthest_depth(
+    depth: Float[Tensor, "h w"], of_pixels: Float[Tensor, "y x"]
+) -> Float[Tensor, "h w"]:
+    """Of each pixel of the smaller copy: its own, or that of the farthest of the image's in it.
+
+    The image's depth has edges of its own; layers as near as the smaller copy's would be seen.
+    """
+    farthest = torch.nn.functional.adaptive_max_pool2d(of_pixels[None], depth.shape)[0]
+    return torch.maximum(depth, farthest)

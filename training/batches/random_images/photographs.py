@@ -28,14 +28,15 @@ def read_photographs(folder: Path, side_px: int) -> UInt8[Tensor, "n 3 s s"]:
             f"{folder}: expected photographs ({', '.join(SUFFIXES)}), got none; "
             "correct data.photographs or leave it out"
         )
-    return torch.stack([_square(read_photo(file, convert=True).rgb, side_px) for file in files])
+    squares = (middle_square(read_photo(file, convert=True).rgb, side_px) for file in files)
+    return torch.stack([torch.from_numpy(to_bytes(square)) for square in squares])
 
 
-def _square(rgb: Float[Tensor, "h w 3"], side_px: int) -> UInt8[Tensor, "3 s s"]:
+def middle_square(rgb: Float[Tensor, "h w 3"], side_px: int) -> Float[Tensor, "3 s s"]:
+    """The largest square in the middle of an image, resized."""
     short = min(rgb.shape[:2])
     top, left = ((length - short) // 2 for length in rgb.shape[:2])
     square = rgb[top : top + short, left : left + short].movedim(-1, 0)
-    resized = torch.nn.functional.interpolate(
+    return torch.nn.functional.interpolate(
         square[None], (side_px, side_px), mode="bilinear", antialias=True
-    )[0]
-    return torch.from_numpy(to_bytes(resized))
+    )[0].clamp(0, 1)

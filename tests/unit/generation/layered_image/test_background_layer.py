@@ -139,22 +139,18 @@ def test_precision_is_that_of_the_depth(dtype: torch.dtype) -> None:
     assert layer.displacement is None
 
 
-def test_it_lies_behind_farther_pixels_of_a_larger_copy() -> None:
+def test_it_lies_behind_farther_pixels_in_its_neighbourhood() -> None:
     rgb, depth = halves()
-    layer, fine = behind(rgb, depth), random_depth(2 * SIDE, 2 * SIDE, (0.5, 20.0), seed=3)
-    moved = farther_than_pixels(layer, fine)
+    layer, farthest = behind(rgb, depth), random_depth(SIDE, SIDE, (0.5, 20.0), seed=3)
+    moved = farther_than_pixels(layer, farthest)
     for row in range(SIDE):
         for column in range(SIDE):
-            rows, columns = (
-                slice(max(2 * (at - REACH), 0), 2 * (at + REACH + 1)) for at in (row, column)
-            )
-            farthest = BEHIND * float(fine[rows, columns].max())
-            wanted = max(float(layer.depth[row, column]), farthest)
+            rows, columns = (slice(max(at - REACH, 0), at + REACH + 1) for at in (row, column))
+            near = BEHIND * float(farthest[rows, columns].max())
+            wanted = max(float(layer.depth[row, column]), near)
             assert float(moved.depth[row, column]) == pytest.approx(wanted, rel=1e-6)
 
 
-def test_nearer_pixels_of_a_larger_copy_change_nothing() -> None:
+def test_nearer_pixels_change_nothing() -> None:
     layer = behind(*halves())
-    assert torch.equal(
-        farther_than_pixels(layer, torch.full((4 * SIDE, 4 * SIDE), 0.1)).depth, layer.depth
-    )
+    assert torch.equal(farther_than_pixels(layer, torch.full((SIDE, SIDE), 0.1)).depth, layer.depth)

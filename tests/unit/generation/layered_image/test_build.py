@@ -6,7 +6,7 @@ from image_layers import FAR_RANGES, input_image, is_finite, layer, random_depth
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import downsample
-from diff4splat.generation.layered_image.build import build_layered_image
+from diff4splat.generation.layered_image.build import build_layered_image, farthest_depth
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
@@ -72,12 +72,20 @@ def test_pixels_take_the_depth_of_the_larger_copy() -> None:
     torch.testing.assert_close(moved, torch.full_like(moved, 0.5 * 7 / 4))
 
 
-def test_the_background_layer_is_not_seen_before_farther_pixels_of_the_larger_copy() -> None:
+def test_no_extended_layer_is_seen_before_farther_pixels_of_the_larger_copy() -> None:
     image = input_image(random_rgb(*SIZE_PX))
     fine = FineMaps(rgb=image.rgb, depth=torch.full(SIZE_PX, 7.0), smooth=False)
     maps = ImageMaps(depth=torch.full(SMALL, 4.0), displacement=None, fine=fine)
     layers = build_layered_image(downsample(image, FACTOR), image, maps, MARGIN).layers
-    assert layers[2].depth.shape == SMALL and float(layers[2].depth.min()) > 7.0
+    background, border = layers[2:4]
+    assert background.depth.shape == SMALL and float(background.depth.min()) > 7.0
+    inside = border.depth[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    assert inside.numel() and float(inside.min()) > 7.0
+
+
+def test_the_farthest_pixel_decides() -> None:
+    small, pixels = torch.tensor([[1.0, 5.0]]), torch.tensor([[2.0, 1.0, 3.0, 4.0]] * 2)
+    assert farthest_depth(small, pixels).tolist() == [[2.0, 5.0]]
 
 
 def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:

@@ -160,3 +160,11 @@ def test_fewer_levels_are_the_first_of_all() -> None:
     assert len(levels) == 4
     for found, wanted in zip(levels, whole(image), strict=False):
         torch.testing.assert_close(found, wanted)
+
+
+def test_depthwise_convolutions_stay_in_float32_under_autocast() -> None:
+    features, convolution = torch.randn(1, 4, 8, 8), SameConv2d(4, 4, 3, 2, groups=4)
+    with torch.autocast("cpu", torch.bfloat16):
+        found, dense = convolution(features.bfloat16()), SameConv2d(4, 4, 3, 2, groups=1)(features)
+    assert found.dtype == torch.float32 and dense.dtype == torch.bfloat16
+    torch.testing.assert_close(found, convolution(features.bfloat16().float()))
