@@ -26,6 +26,7 @@ from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
 from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
+from diff4splat.models.object_mask.mask_heads import HeadShape
 from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.placement.initial_weights import (
     InitialWeights,
@@ -113,7 +114,12 @@ def _monocular_depth(config: ModelConfig) -> nn.Module:
 def _object_mask(config: ModelConfig) -> nn.Module:
     mask = config.object_mask
     kind = BackboneObjectMaskNet if mask.image_backbone else ObjectMaskNet
-    return kind(mask.width, config.text.width)
+    shape = HeadShape(
+        width=mask.width,
+        text_width=config.text.width,
+        instance_channels=mask.instance_channels,
+    )
+    return kind(shape)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:

@@ -70,6 +70,11 @@ class ObjectMask(Protocol):
     def __call__(self, image: Tensor, text: Tensor, text_mask: Tensor | None = None) -> Tensor:
         """For every pixel the logit that the prompt asks it to move."""
 
+    def predict_mask_and_instances(
+        self, image: Tensor, text: Tensor, text_mask: Tensor | None = None
+    ) -> tuple[Tensor, Tensor | None]:
+        """The logits, and vectors that tell objects apart, if it has any."""
+
 
 @runtime_checkable
 class VideoCodec(Protocol):

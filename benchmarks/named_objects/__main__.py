@@ -9,7 +9,8 @@ still     no pixel moves where the sentence asks for an object that is not there
 auc       an object has a higher most probable pixel than an absent one has
 
 ``--unknown-nouns`` asks by colour and a noun that no training shows, ``--objects 99`` for every
-object of an image in place of two.
+object of an image in place of two, ``--without-instances`` does not share probabilities among the
+pixels of one object.
 """
 
 import argparse
@@ -22,8 +23,8 @@ from torch import Tensor
 from benchmarks.named_objects.requests import OBJECTS, AskedImage, asked_image
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
-from diff4splat.generation.motion_networks import motion_prior
-from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.motion.networks import motion_prior
+from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.plan import MOTION_PARTS
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import pinhole
@@ -94,8 +95,11 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=120)
     parser.add_argument("--unknown-nouns", action="store_true")
     parser.add_argument("--objects", type=int, default=OBJECTS)
+    parser.add_argument("--without-instances", action="store_true")
     options = parser.parse_args()
     model, folder = load_model(options.model, parts=MOTION_PARTS), ClipFolder(options.clips)
+    if options.without_instances:
+        model.networks.object_mask.instances = None
     count = min(len(folder), options.most)
     asking = {"unknown_nouns": options.unknown_nouns, "most_objects": options.objects}
     images = [asked_image(folder.clip(index), **asking) for index in range(count)]

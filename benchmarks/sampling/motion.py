@@ -16,7 +16,7 @@ from diff4splat.evaluation.protocols.protocol import Protocol
 from diff4splat.evaluation.protocols.protocol_json import LoadedProtocol
 from diff4splat.evaluation.systems.evaluated_system import input_image
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
+from diff4splat.generation.motion.sampling import MotionRequest, sample_motion
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.model import Model

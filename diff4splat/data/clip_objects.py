@@ -40,6 +40,14 @@ def clip_objects(clip: ClipMetadata) -> tuple[ClipObject, ...]:
     )
 
 
+def object_numbers(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> UInt8[Tensor, "h w"]:
+    """Number from 1 of the object that a pixel shows, all parts alike; 0 where there is no note."""
+    numbers = torch.zeros(256, dtype=torch.uint8)
+    for number, one in enumerate(clip_objects(clip), 1):
+        numbers[list(one.instances)] = number
+    return numbers[instances.long()]
+
+
 def present_objects(
     clip: ClipMetadata, instances: UInt8[Tensor, "h w"], least_share: float
 ) -> list[tuple[ObjectNote, Bool[Tensor, "h w"]]]:

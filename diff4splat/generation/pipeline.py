@@ -29,7 +29,7 @@ from diff4splat.generation.inputs.request import (
 from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
-from diff4splat.generation.motion_sampling import MotionRequest
+from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
 from diff4splat.generation.priors import Copies, image_maps

@@ -17,13 +17,13 @@ from diff4splat.generation.inputs.input_image import InputImage, downsample, enl
 from diff4splat.generation.layered_image.mask_rim import with_rim
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
-from diff4splat.generation.motion_maps import (
+from diff4splat.generation.motion.displacement_maps import (
     depth_at,
     with_displacement,
     with_majority_displacement,
 )
-from diff4splat.generation.motion_networks import motion_prior
-from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.motion.networks import motion_prior
+from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import why_unguided
 from diff4splat.models.hub.model import Model
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH

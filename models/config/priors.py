@@ -38,9 +38,15 @@ class ObjectMaskConfig:
     """Channels at half the resolution; 0 leaves it out: the motion prior's own mask decides."""
     image_backbone: bool = False
     """Whether it has a second encoder, the image backbone (ADR 32)."""
+    instance_channels: int = 0
+    """Of the vectors that tell objects apart, 2 or more; 0 leaves them out (ADR 36)."""
 
     def __post_init__(self) -> None:
-        require_optional_width(self, "width")
+        for name in ("width", "instance_channels"):
+            require_optional_width(self, name)
+        fits = self.instance_channels != 1 and (self.used or not self.instance_channels)
+        expected = "0, or 2 or more with an object mask"
+        require(fits, "ObjectMaskConfig.instance_channels", expected, self.instance_channels)
         _require_backbone_fits(self)
 
     @property

@@ -16,7 +16,8 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
 from diff4splat.models.image_backbone.efficientnet_lite import FEATURE_CHANNELS, EfficientNetLite
-from diff4splat.models.image_unet.network import FOLDED_PX, upsample_path
+from diff4splat.models.image_unet.cells import FOLDED_PX
+from diff4splat.models.image_unet.network import upsample_path
 
 
 class BackboneUNet(nn.Module):

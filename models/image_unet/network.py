@@ -13,12 +13,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
-
-FOLDED_PX = 2
-"""Pixels per side that become channels before the first convolution."""
-LEVELS = 4
-MULTIPLE_PX = FOLDED_PX << (LEVELS - 1)
-"""Image sides must be multiples of it."""
+from diff4splat.models.image_unet.cells import FOLDED_PX, LEVELS
 
 
 class ImageUNet(nn.Module):

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.image_backbone.unet import BackboneUNet
-from diff4splat.models.image_unet.network import FOLDED_PX
+from diff4splat.models.image_unet.cells import FOLDED_PX
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 
 GROWTH = (1, 2, 3, 4, 4)

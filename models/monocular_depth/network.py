@@ -11,7 +11,8 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
 from diff4splat.models.blocks.initialise import zero_
-from diff4splat.models.image_unet.network import FOLDED_PX, ImageUNet
+from diff4splat.models.image_unet.cells import FOLDED_PX
+from diff4splat.models.image_unet.network import ImageUNet
 
 GROWTH = (1, 2, 3, 4)
 """Channels at 1/2, 1/4, 1/8 and 1/16 of the resolution, in multiples of the configured width."""

@@ -13,7 +13,8 @@ from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
 from diff4splat.models.blocks.initialise import zero_
-from diff4splat.models.image_unet.network import FOLDED_PX, pixel_coordinates
+from diff4splat.models.image_unet.cells import FOLDED_PX
+from diff4splat.models.image_unet.network import pixel_coordinates
 
 
 class MaskRefiner(nn.Module):

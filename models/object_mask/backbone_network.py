@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.image_backbone.unet import BackboneUNet
-from diff4splat.models.object_mask.mask_heads import MaskHeads
+from diff4splat.models.object_mask.mask_heads import HeadShape, MaskHeads
 from diff4splat.models.object_mask.network import MaskUNet
 
 GROWTH = (1, 2, 4, 6)
@@ -20,10 +20,10 @@ are smaller than cells of 1/32."""
 class BackboneObjectMaskNet(BackboneUNet, MaskHeads):
     """For every pixel the logit of the probability that the prompt asks it to move."""
 
-    def __init__(self, width: int, text_width: int) -> None:
-        super().__init__([width * share for share in GROWTH])
-        self.unet = MaskUNet(width)
-        self.add_heads(width, text_width, encoders=2)
+    def __init__(self, shape: HeadShape) -> None:
+        super().__init__([shape.width * share for share in GROWTH])
+        self.unet = MaskUNet(shape.width)
+        self.add_heads(shape, encoders=2)
 
     def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
         """``image`` is RGB in [0, 1], its sides multiples of 16."""

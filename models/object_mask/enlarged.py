@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.image_unet.network import MULTIPLE_PX
+from diff4splat.models.image_unet.cells import MULTIPLE_PX
 
 ENLARGEMENT = 1.5
 """Of the image's sides. Validation worlds of 128 px: docs/log/object-mask-backbone.md."""

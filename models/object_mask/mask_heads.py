@@ -11,6 +11,7 @@ through its weights instead, and vectors of pixels are never stored.
 """
 
 import math
+from dataclasses import dataclass
 
 import torch
 from jaxtyping import Bool, Float
@@ -18,8 +19,9 @@ from torch import Tensor, nn
 
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.vocabulary import NOUNS
-from diff4splat.models.image_unet.network import FOLDED_PX
+from diff4splat.models.image_unet.cells import FOLDED_PX
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
+from diff4splat.models.object_mask.instance_head import InstanceHead
 from diff4splat.models.object_mask.text_queries import TextQueries
 
 TEXT_CHANNELS = 96
@@ -27,15 +29,29 @@ START_LOGIT = -3.0
 """Of a fresh network: few pixels are asked for."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeadShape:
+    """Widths of an object mask."""
+
+    width: int
+    """Channels of the features of each encoder."""
+    text_width: int
+    instance_channels: int = 0
+    """Of the vectors that tell objects apart; 0 without them."""
+
+
 class MaskHeads(nn.Module):
     """The heads of an object mask; the networks that extend it give features."""
 
-    def add_heads(self, width: int, text_width: int, encoders: int = 1) -> None:
-        """``width`` channels of the features of each encoder; the last layers to be made."""
+    def add_heads(self, shape: HeadShape, encoders: int = 1) -> None:
+        """The last layers to be made."""
+        width = shape.width
         self.embedding_width = 2 * width
         self.embedding = nn.Conv2d(encoders * width, self.embedding_width * FOLDED_PX**2, 1)
         self.names = nn.Conv2d(self.embedding_width, len(NOUNS) + len(COLOR_NAMES) + 2, 1)
-        self.queries = TextQueries(text_width, TEXT_CHANNELS, self.embedding_width)
+        self.queries = TextQueries(shape.text_width, TEXT_CHANNELS, self.embedding_width)
+        channels = shape.instance_channels
+        self.instances = InstanceHead(encoders * width, channels) if channels else None
 
     def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
         """Of every cell of two pixels."""
@@ -49,6 +65,17 @@ class MaskHeads(nn.Module):
     ) -> Float[Tensor, "b h w"]:
         """Logits of one prompt per image; ``image`` is RGB in [0, 1], its sides multiples of 16."""
         return self.logits(self.features(image), text_tokens(text, text_mask))[:, 0]
+
+    def predict_mask_and_instances(
+        self,
+        image: Float[Tensor, "b 3 h w"],
+        text: Float[Tensor, "b s e"],
+        text_mask: Bool[Tensor, "b s"] | None = None,
+    ) -> tuple[Float[Tensor, "b h w"], Float[Tensor, "b k h w"] | None]:
+        """The logits, and what tells objects apart (``instance_vectors``) if it has learnt that."""
+        features = self.features(image)
+        logits = self.logits(features, text_tokens(text, text_mask))[:, 0]
+        return logits, None if self.instances is None else self.instances(features)
 
     def name_logits(
         self, features: Float[Tensor, "b c h2 w2"]

@@ -7,7 +7,7 @@ from torch import nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
 from diff4splat.models.image_unet.network import ImageUNet
-from diff4splat.models.object_mask.mask_heads import MaskHeads
+from diff4splat.models.object_mask.mask_heads import HeadShape, MaskHeads
 
 GROWTH = (1, 2, 5, 8)
 """Channels at 1/2, 1/4, 1/8 and 1/16 of the resolution, in multiples of the configured width."""
@@ -26,9 +26,9 @@ class MaskUNet(ImageUNet):
 class ObjectMaskNet(MaskUNet, MaskHeads):
     """For every pixel the logit of the probability that the prompt asks it to move."""
 
-    def __init__(self, width: int, text_width: int) -> None:
-        super().__init__(width)
-        self.add_heads(width, text_width)
+    def __init__(self, shape: HeadShape) -> None:
+        super().__init__(shape.width)
+        self.add_heads(shape)
 
 
 def _blocks(channels: int, count: int) -> nn.Sequential:

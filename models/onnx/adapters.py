@@ -104,9 +104,16 @@ class OnnxObjectMask(OnnxPart):
 
     def __call__(self, image: Tensor, text: Tensor, text_mask: Tensor | None = None) -> Tensor:
         """For every pixel the logit that the prompt asks it to move."""
+        return self.predict_mask_and_instances(image, text, text_mask)[0]
+
+    def predict_mask_and_instances(
+        self, image: Tensor, text: Tensor, text_mask: Tensor | None = None
+    ) -> tuple[Tensor, Tensor | None]:
+        """The logits, and vectors that tell objects apart, if it has any."""
         text, text_mask = text_or_none(text, text_mask, len(image), self.config.text.width)
         inputs = {"image": image, "text": text, "text_mask": text_mask}
-        return run_graph(self.model["object_mask"], inputs)["mask_logits"]
+        found = run_graph(self.model["object_mask"], inputs)
+        return found["mask_logits"], found.get("instances")
 
 
 class OnnxVae(OnnxPart):

@@ -5,7 +5,7 @@ from torch import Tensor, nn
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
-from diff4splat.models.image_unet.network import MULTIPLE_PX as IMAGE_MULTIPLE_PX
+from diff4splat.models.image_unet.cells import MULTIPLE_PX as IMAGE_MULTIPLE_PX
 from diff4splat.models.motion_unet.unet import MULTIPLE_PX as MOTION_MULTIPLE_PX
 from diff4splat.models.onnx_export.source import (
     GraphSource,
@@ -73,19 +73,26 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
-    """An image, enlarged as in ``object_mask.enlarged``, and text to logits of what is to move."""
+    """An image, enlarged as in ``object_mask.enlarged``, and text to logits of what is to move.
+
+    Where the model tells objects apart, ``instances`` are vectors and log scales of all pixels.
+    """
     size = _image_size(IMAGE_MULTIPLE_PX)
+    outputs = [output("mask_logits", "batch", *size)]
+    channels = config.object_mask.instance_channels
+    if channels:
+        outputs.append(output("instances", "batch", channels + 1, *size))
     return [
         GraphSource(
             name="object_mask",
             part="object_mask",
-            module=TensorFunction(network, lambda masks, *inputs: (masks(*inputs),)),
+            module=TensorFunction(network, _mask_and_instances),
             inputs=(
                 unit("image", "batch", 3, *size),
                 normal("text", "batch", "tokens", config.text.width),
                 mask("text_mask", "batch", "tokens"),
             ),
-            outputs=(output("mask_logits", "batch", *size),),
+            outputs=tuple(outputs),
         )
     ]
 
@@ -93,6 +100,11 @@ def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 def _image_size(multiple_px: int) -> tuple[str, str]:
     """Symbols of the sides that a network takes."""
     return f"{multiple_px}*rows", f"{multiple_px}*columns"
+
+
+def _mask_and_instances(network: nn.Module, *inputs: Tensor) -> tuple[Tensor, ...]:
+    found = network.predict_mask_and_instances(*inputs)
+    return tuple(one for one in found if one is not None)
 
 
 def _motion_and_mask(network: nn.Module, *inputs: Tensor) -> tuple[Tensor, Tensor]:

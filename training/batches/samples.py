@@ -12,6 +12,7 @@ from diff4splat.data.clip import Clip
 from diff4splat.training.batches.clip_batch import ClipBatch, collate
 from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.batches.sources import EndlessClips, open_mixture
+from diff4splat.training.recipe.data import SourceSettings
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
@@ -49,14 +50,15 @@ class ClipSamples:
         origin = Origin(key=key, source=self._name(number), settings=settings)
         return make_sample(clip, self.recipe.data, origin)
 
-    def clip(self, sample_index: int) -> tuple[Clip, str]:
-        """The clip of a sample as its source has it, and the name of the source.
+    def clip(self, sample_index: int) -> tuple[Clip, str, SourceSettings]:
+        """The clip of a sample as its source has it, and the source's name and settings.
 
         Raises:
             Diff4SplatError: the clip cannot be used; another index may do.
         """
         number = self._source(sample_index)
-        return self.sources[number].clip(sample_index), self._name(number)
+        settings = self.recipe.data.sources[number]
+        return self.sources[number].clip(sample_index), self._name(number), settings
 
     def collate(self, samples: list[ClipBatch]) -> ClipBatch:
         """Samples as one batch."""

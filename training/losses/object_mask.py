@@ -12,6 +12,11 @@ from diff4splat.metrics.masked import masked_mean
 SMOOTHING_PX = 1.0
 """Added to both areas, so that a missed speck has a finite gradient."""
 
+INSTANCE_WEIGHT = 4.0
+"""Of the cross-entropy of instances, against their overlap."""
+AREA_RANGE_PX = (80.0, 8000.0)
+"""Areas beyond count as these: a small object's pixels weigh up to 4.5 times as much."""
+
 NO_NAME_WEIGHT = 0.15
 """Of pixels of the ground, walls and the sky: most of an image."""
 
@@ -33,11 +38,14 @@ def dice_error(
 
     (V-Net, arXiv 1606.04797, eq. 1 without squares.)
     """
-    truth, predicted = masks.flatten(2).to(logits), logits.flatten(2).sigmoid()
-    shared = (truth * predicted).sum(-1)
+    truth = masks.flatten(2)
+    return masked_mean(_dice(logits.flatten(2), truth), truth.any(-1))
+
+
+def _dice(logits: Float[Tensor, "b r p"], truth: Bool[Tensor, "b r p"]) -> Float[Tensor, "b r"]:
+    truth, predicted = truth.to(logits), logits.sigmoid()
     both = truth.sum(-1) + predicted.sum(-1)
-    error = 1 - (2 * shared + SMOOTHING_PX) / (both + SMOOTHING_PX)
-    return masked_mean(error, masks.flatten(2).any(-1))
+    return 1 - (2 * (truth * predicted).sum(-1) + SMOOTHING_PX) / (both + SMOOTHING_PX)
 
 
 def name_error(
@@ -47,3 +55,20 @@ def name_error(
     error = torch.nn.functional.cross_entropy(logits, names, reduction="none")
     weights = torch.where(names > 0, 1.0, NO_NAME_WEIGHT).to(error)
     return (error * weights).flatten(1).sum(1) / weights.flatten(1).sum(1)
+
+
+def instance_error(
+    logits: Float[Tensor, "b s h w"], masks: Bool[Tensor, "b s h w"], valid: Bool[Tensor, "b s"]
+) -> Float[Tensor, " b"]:
+    """Cross-entropy and 1 − overlap of what belongs to the object of each seed; 0 without any.
+
+    Pixels of the object weigh by the root of half the image's area over the object's.
+    """
+    truth, flat = masks.flatten(2), logits.flatten(2)
+    area = truth.sum(-1, keepdim=True).clamp(*AREA_RANGE_PX)
+    weight = (truth.shape[-1] / (2 * area)).clamp(1, 20).sqrt()
+    error = torch.nn.functional.binary_cross_entropy_with_logits(
+        flat, truth.to(flat), reduction="none"
+    )
+    error = (error * torch.where(truth, weight, 1.0)).mean(-1)
+    return masked_mean(INSTANCE_WEIGHT * error + _dice(flat, truth), valid)

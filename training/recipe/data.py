@@ -25,7 +25,7 @@ class SourceSettings:
     depth_loss: Literal["true", "always", "never"] = "true"
     """``true`` leaves out depth whose scale was only assumed (``pseudo``)."""
     motion_loss: Literal["true", "never"] = "true"
-    """``never`` leaves out tracks and masks of moving clips."""
+    """``never`` leaves out tracks and masks of moving clips. Stage ``object_mask``: requests."""
     views: int = 0
     """Cameras that are read of each clip, such as 1 for monocular use; 0 reads ``data.views``."""
     unit: Literal["", "median_depth", "metre", "known"] = ""

@@ -146,6 +146,8 @@ class ObjectMaskLosses:
     """1 − overlap (V-Net, arXiv 1606.04797): small objects count as large ones."""
     names: float = 0.3
     """Cross-entropy of noun and colour of every pixel, without a prompt."""
+    instances: float = 0.0
+    """Cross-entropy and overlap of what belongs to one object, whatever its name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

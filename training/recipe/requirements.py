@@ -35,6 +35,9 @@ def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
     require(fits, f"{what}: model.motion_unet.width", "a motion network for its kind", 0)
     fits = stage.kind != "object_mask" or model.object_mask.used
     require(fits, f"{what}: model.object_mask.width", "an object mask for its kind", 0)
+    needs = stage.kind == "object_mask" and stage.losses.instances
+    fits = not needs or model.object_mask.instance_channels
+    require(fits, f"{what}: model.object_mask.instance_channels", "2 or more for its loss", 0)
     fits = stage.kind != "monocular_depth" or model.monocular_depth.used
     require(fits, f"{what}: model.monocular_depth.channels", "a depth network for its kind", 0)
 

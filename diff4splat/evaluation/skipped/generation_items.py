@@ -22,8 +22,8 @@ from diff4splat.generation.inputs.image_size import (
 )
 from diff4splat.generation.inputs.input_cameras import path_frame
 from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
-from diff4splat.generation.motion_networks import motion_prior
-from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
+from diff4splat.generation.motion.networks import motion_prior
+from diff4splat.generation.motion.sampling import MotionRequest, sample_motion
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import FILL_PARTS, MOTION_PARTS
 from diff4splat.generation.priors import Copies, motion_copy

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from diff4splat.flow.guidance import Guidance
 from diff4splat.generation.inputs.input_cameras import to_camera_path
-from diff4splat.generation.motion_sampling import MotionRequest, sample_motion
+from diff4splat.generation.motion.sampling import MotionRequest, sample_motion
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.generation.video.video_sampling import Conditions, sample_video
 from diff4splat.geometry.rays import plucker_map, relative_to_first

@@ -13,8 +13,8 @@ from torch import Tensor
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.motion_networks import motion_prior
-from diff4splat.generation.motion_sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.motion.networks import motion_prior
+from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import largest_displacement_px
 from diff4splat.render.api import render

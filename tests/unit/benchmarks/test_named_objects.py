@@ -10,7 +10,7 @@ from benchmarks.named_objects.__main__ import auc, measure
 from benchmarks.named_objects.requests import asked_image
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.flow.guidance import CallCount
-from diff4splat.generation.motion_sampling import MotionSample
+from diff4splat.generation.motion.sampling import MotionSample
 from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
 

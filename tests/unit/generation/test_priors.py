@@ -11,7 +11,7 @@ from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
-from diff4splat.generation.motion_sampling import MotionRequest
+from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.priors import (
     ENLARGEMENT,
     Copies,

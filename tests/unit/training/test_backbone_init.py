@@ -16,6 +16,7 @@ from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.networks import Networks
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
+from diff4splat.models.object_mask.mask_heads import HeadShape
 from diff4splat.training import backbone_init
 from diff4splat.training.prerequisites import last_checkpoint
 from diff4splat.training.train_stage import StageRequest, train_stage
@@ -40,7 +41,7 @@ def test_a_shorter_backbone_takes_the_weights_that_it_has(monkeypatch: pytest.Mo
     torch.manual_seed(1)
     public = EfficientNetLite().state_dict()
     monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda: public)
-    network = BackboneObjectMaskNet(4, 8)
+    network = BackboneObjectMaskNet(HeadShape(width=4, text_width=8))
     backbone_init.start_from_public_backbones(Networks(object_mask=network), ["object_mask"])
     taken = network.backbone.state_dict()
     assert len(taken) < len(public)

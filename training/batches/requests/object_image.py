@@ -12,6 +12,7 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from diff4splat.data.clip import Clip
+from diff4splat.data.clip_objects import object_numbers
 from diff4splat.errors import InputError
 from diff4splat.training.batches.requests.present import PresentObject, named_objects
 
@@ -25,6 +26,9 @@ class ObjectImage:
 
     image: UInt8[Tensor, "h w 3"]
     objects: list[PresentObject]
+    """Those with a noun of captions."""
+    numbers: UInt8[Tensor, "h w"]
+    """Number of the object that a pixel shows, of any; 0 for all else."""
 
 
 def random_object_image(
@@ -51,7 +55,11 @@ def random_object_image(
         torch.from_numpy(cv2.resize(one, size_px[::-1], interpolation=kind))
         for one, kind in zip(maps, kinds, strict=True)
     )
-    return ObjectImage(image=rgb, objects=named_objects(clip.note, instances))
+    return ObjectImage(
+        image=rgb,
+        objects=named_objects(clip.note, instances),
+        numbers=object_numbers(clip.note, instances),
+    )
 
 
 def _random_window(

@@ -22,6 +22,10 @@ class RequestBatch:
     """1 + index in ``vocabulary.NOUNS`` of what a pixel shows; 0 for all else."""
     colors: UInt8[Tensor, "b h w"]
     """1 + index in ``colors.COLOR_NAMES``."""
+    objects: UInt8[Tensor, "b h w"]
+    """Number of the object that a pixel shows, whatever its name; 0 for all else."""
+    has_requests: Bool[Tensor, " b"]
+    """Whether the prompts of an image count: those of some sources do not."""
     captions: tuple[str, ...]
     """b r of them; those of one image follow each other."""
 
@@ -37,6 +41,8 @@ class RequestBatch:
             masks=self.masks.to(device),
             nouns=self.nouns.to(device),
             colors=self.colors.to(device),
+            objects=self.objects.to(device),
+            has_requests=self.has_requests.to(device),
         )
 
 
@@ -49,5 +55,7 @@ def collate_requests(samples: list[RequestBatch]) -> RequestBatch:
         masks=torch.cat([sample.masks for sample in samples]),
         nouns=torch.cat([sample.nouns for sample in samples]),
         colors=torch.cat([sample.colors for sample in samples]),
+        objects=torch.cat([sample.objects for sample in samples]),
+        has_requests=torch.cat([sample.has_requests for sample in samples]),
         captions=tuple(text for sample in samples for text in sample.captions),
     )

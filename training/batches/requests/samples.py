@@ -37,7 +37,7 @@ class RequestSamples:
         """
         key = SampleKey(self.clips.seed, self.recipe.name, sample_index, "requests")
         generator = key.generator()
-        clip, source = self.clips.clip(sample_index)
+        clip, source, settings = self.clips.clip(sample_index)
         seen = random_object_image(clip, self.recipe.data.size_px, generator)
         empty = torch.zeros(seen.image.shape[:2], dtype=torch.bool)
         requests = draw_image_requests(seen.objects, empty, REQUESTS, generator)
@@ -49,6 +49,8 @@ class RequestSamples:
             masks=torch.stack([request.mask for request in requests])[None],
             nouns=nouns[None],
             colors=colors[None],
+            objects=seen.numbers[None],
+            has_requests=torch.tensor([settings.motion_loss != "never"]),
             captions=tuple(request.caption for request in requests),
         )
 

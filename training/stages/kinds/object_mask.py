@@ -3,8 +3,8 @@
     images, with random light ─ object mask ─ features ─┐
     captions ─ text encoder (frozen) ─ queries ─────────┴ logits ─ cross-entropy, overlap
 
-The features alone also give noun and colour of every pixel. Captions name every object of an
-image in turn, some that it does not show, and none.
+The features alone also give noun and colour of every pixel, and which pixels are one object.
+Captions name every object of an image in turn, some that it does not show, and none.
 """
 
 import torch
@@ -15,9 +15,16 @@ from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.motion_unet.text_tokens import TextTokens, text_tokens
 from diff4splat.models.networks import Networks
 from diff4splat.models.object_mask.enlarged import enlarged, reduced
+from diff4splat.models.object_mask.instance_vectors import membership_logits
 from diff4splat.training.batches.coarse_images import coarse
+from diff4splat.training.batches.requests.instance_seeds import draw_seeds, stack_seeds
 from diff4splat.training.batches.requests.request_batch import RequestBatch
-from diff4splat.training.losses.object_mask import cross_entropy, dice_error, name_error
+from diff4splat.training.losses.object_mask import (
+    cross_entropy,
+    dice_error,
+    instance_error,
+    name_error,
+)
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import mask_preview
@@ -40,15 +47,19 @@ class ObjectMaskStage(ModelStage):
         self._text = TextConditioning(encoder=networks.text_encoder, plan=plan)
 
     def forward(self, batch: RequestBatch) -> Terms:
-        """The terms ``cross_entropy``, ``dice`` and ``names``."""
-        losses = self.plan.recipe.losses
+        """The terms ``cross_entropy``, ``dice`` and ``names``, and ``instances`` where it counts.
+
+        The first three are 0 for images whose requests do not count.
+        """
+        losses, counts = self.plan.recipe.losses, batch.has_requests
         rgb = self._random_light(self._random_sharpness(batch), batch)
         features = self._features(rgb)
         logits = self._logits_of(features, batch)
         errors = {
-            "cross_entropy": lambda: cross_entropy(logits, batch.masks),
-            "dice": lambda: dice_error(logits, batch.masks),
-            "names": lambda: self._name_error(features, batch),
+            "cross_entropy": lambda: cross_entropy(logits, batch.masks) * counts,
+            "dice": lambda: dice_error(logits, batch.masks) * counts,
+            "names": lambda: self._name_error(features, batch) * counts,
+            "instances": lambda: self._instance_error(features, batch),
         }
         return weighted_sum(
             [
@@ -109,6 +120,17 @@ class ObjectMaskStage(ModelStage):
             name_error(found, _nearest(names, size))
             for found, names in zip(self.object_mask.name_logits(features), truth, strict=True)
         )
+
+    def _instance_error(
+        self, features: Float[Tensor, "b c h2 w2"], batch: RequestBatch
+    ) -> Float[Tensor, " b"]:
+        """Of the objects of random seeds."""
+        size = batch.objects.shape[-2:]
+        vectors = reduced(self.object_mask.instances(features), size)
+        pairs = zip(batch.objects, self.random.per_sample(batch, "seeds"), strict=True)
+        seeds = stack_seeds([draw_seeds(numbers, generator) for numbers, generator in pairs])
+        logits = membership_logits(vectors, seeds.weights.to(vectors))
+        return instance_error(logits, seeds.masks, seeds.valid)
 
     def _random_sharpness(self, batch: RequestBatch) -> Float[Tensor, "b 3 h w"]:
         """All images of a step as sharp as one of the recipe's sides."""

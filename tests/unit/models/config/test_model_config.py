@@ -65,6 +65,7 @@ BOUND = [
     ("text", "encoder"),
     ("motion_unet", "mask_refiner_width"),
     ("object_mask", "width"),
+    ("object_mask", "instance_channels"),
     ("vae", "groups"),
     ("vae", "tile_px"),
     ("joint", "level_width"),
@@ -103,6 +104,13 @@ def test_the_mask_refiner_changes_the_fingerprint() -> None:
     refined = dataclasses.replace(motion, mask_refiner_width=4)
     configs = [dataclasses.replace(test_size(), motion_unet=one) for one in (motion, refined)]
     assert len({config.fingerprint() for config in (*configs, test_size())}) == 3
+
+
+def test_vectors_of_instances_change_the_fingerprint() -> None:
+    base = dataclasses.replace(test_size(), motion_unet=MotionUNetConfig(width=8))
+    masks = [ObjectMaskConfig(width=4, instance_channels=count) for count in (0, 2, 4)]
+    configs = [dataclasses.replace(base, object_mask=mask) for mask in masks]
+    assert len({config.fingerprint() for config in configs}) == 3
 
 
 @pytest.mark.parametrize("weight", [-0.1, math.nan, math.inf])

@@ -8,9 +8,11 @@ from torch import Tensor, nn
 
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
+from diff4splat.models.object_mask.mask_heads import HeadShape
 from diff4splat.models.object_mask.network import ObjectMaskNet
 
 WIDTH, TEXT_WIDTH = 4, 8
+SHAPE = HeadShape(width=WIDTH, text_width=TEXT_WIDTH)
 
 
 def depth() -> nn.Module:
@@ -22,7 +24,7 @@ def depth() -> nn.Module:
 
 def masks() -> nn.Module:
     torch.manual_seed(0)
-    network = BackboneObjectMaskNet(WIDTH, TEXT_WIDTH)
+    network = BackboneObjectMaskNet(SHAPE)
     text = torch.rand(2, 5, TEXT_WIDTH)
     # One prompt for every image, so that both networks are called with images alone.
     network.register_forward_pre_hook(
@@ -53,7 +55,7 @@ def test_depth_is_the_mean_of_both_encoders() -> None:
 
 
 def test_a_mask_without_the_backbones_features_is_that_of_the_unet() -> None:
-    both, alone = BackboneObjectMaskNet(WIDTH, TEXT_WIDTH), ObjectMaskNet(WIDTH, TEXT_WIDTH)
+    both, alone = BackboneObjectMaskNet(SHAPE), ObjectMaskNet(SHAPE)
     torch.nn.init.zeros_(both.embedding.weight[:, :WIDTH])
     weights = both.unet.state_dict()
     for name in ("embedding", "queries", "names"):

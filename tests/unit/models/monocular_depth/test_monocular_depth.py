@@ -3,7 +3,8 @@
 import pytest
 import torch
 
-from diff4splat.models.image_unet.network import MULTIPLE_PX, pixel_coordinates
+from diff4splat.models.image_unet.cells import MULTIPLE_PX
+from diff4splat.models.image_unet.network import pixel_coordinates
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 
 

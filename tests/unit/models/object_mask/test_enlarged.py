@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from diff4splat.models.image_unet.network import MULTIPLE_PX
+from diff4splat.models.image_unet.cells import MULTIPLE_PX
 from diff4splat.models.object_mask.enlarged import ENLARGEMENT, enlarged, reduced
 
 

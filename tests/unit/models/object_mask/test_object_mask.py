@@ -5,9 +5,9 @@ import torch
 from oracles_models import randomised
 from torch import Tensor
 
-from diff4splat.models.image_unet.network import FOLDED_PX
+from diff4splat.models.image_unet.cells import FOLDED_PX
 from diff4splat.models.motion_unet.text_tokens import text_tokens
-from diff4splat.models.object_mask.mask_heads import START_LOGIT
+from diff4splat.models.object_mask.mask_heads import START_LOGIT, HeadShape
 from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.object_mask.text_queries import QUERIES
 
@@ -16,7 +16,7 @@ WIDTH, TEXT_WIDTH = 4, 8
 
 def network() -> ObjectMaskNet:
     torch.manual_seed(0)
-    return randomised(ObjectMaskNet(WIDTH, TEXT_WIDTH)).double()
+    return randomised(ObjectMaskNet(HeadShape(width=WIDTH, text_width=TEXT_WIDTH))).double()
 
 
 def image(count: int = 2) -> Tensor:

@@ -7,10 +7,12 @@ import torch
 from torch import Tensor
 
 from diff4splat.training.losses.object_mask import (
+    INSTANCE_WEIGHT,
     NO_NAME_WEIGHT,
     SMOOTHING_PX,
     cross_entropy,
     dice_error,
+    instance_error,
     name_error,
 )
 
@@ -81,3 +83,42 @@ def test_names_are_weighted_pixel_by_pixel() -> None:
             weight += own
     assert float(name_error(logits, names)) == pytest.approx(total / weight)
     assert torch.autograd.gradcheck(lambda x: name_error(x, names), logits.requires_grad_())
+
+
+def instances_of(logits: Tensor, masks: Tensor) -> Tensor:
+    return instance_error(logits, masks, torch.ones(masks.shape[:2], dtype=torch.bool))
+
+
+def test_instance_error_weighs_pixels_of_small_objects() -> None:
+    logits, masks = example()
+    valid = torch.tensor([[True, False, True], [False] * 3])
+    expected = []
+    for seed in (0, 2):
+        truth, total = masks[0, seed].flatten(), 0.0
+        area = min(max(int(truth.sum()), 80), 8000)
+        weight = min(max(20 / (2 * area), 1), 20) ** 0.5
+        for logit, inside in zip(logits[0, seed].flatten().tolist(), truth.tolist(), strict=True):
+            probability = 1 / (1 + math.exp(-logit))
+            total -= weight * math.log(probability) if inside else math.log(1 - probability)
+        overlap = dice_error(logits[:1, seed : seed + 1], masks[:1, seed : seed + 1])
+        expected.append(INSTANCE_WEIGHT * total / 20 + float(overlap))
+    error = instance_error(logits, masks, valid)
+    assert float(error[0]) == pytest.approx(sum(expected) / 2)
+    assert float(error[1]) == 0.0
+
+
+def test_instance_error_has_gradients_and_takes_extremes() -> None:
+    logits, masks = example()
+    assert torch.autograd.gradcheck(lambda x: instances_of(x, masks), logits.requires_grad_())
+    for logit in (-1e4, 1e4):
+        extreme = torch.full((1, 2, 3, 3), logit, requires_grad=True)
+        value = instances_of(extreme, torch.zeros(1, 2, 3, 3, dtype=torch.bool))
+        value.sum().backward()
+        assert bool(value.isfinite().all()) and bool(extreme.grad.isfinite().all())
+
+
+def test_a_hundred_pixels_weigh_more_than_a_thousand() -> None:
+    small, large = (torch.zeros(1, 1, 128, 128, dtype=torch.bool) for _ in range(2))
+    small[..., :10, :10], large[..., :40, :25] = True, True
+    missed = [float(instances_of(torch.where(m, -5.0, -9.0), m) - 1) for m in (small, large)]
+    assert missed[0] / 100 > 1.5 * missed[1] / 1000 > 0

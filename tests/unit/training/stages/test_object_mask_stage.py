@@ -9,6 +9,8 @@ from stage_fixtures import make_stage, shake_heads, stage_recipe
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.object_mask.enlarged import reduced
+from diff4splat.models.object_mask.instance_vectors import membership_logits
 from diff4splat.training.batches.requests.request_batch import RequestBatch
 from diff4splat.training.recipe.losses import ObjectMaskLosses
 from diff4splat.training.recipe.recipe import Recipe
@@ -18,6 +20,11 @@ from diff4splat.training.stage import TOTAL
 BASE = tiny_size()
 MODEL = replace(
     BASE, motion_unet=MotionUNetConfig(width=8, heads=1), object_mask=ObjectMaskConfig(width=4)
+)
+
+
+WITH_INSTANCES = replace(
+    MODEL, object_mask=replace(MODEL.object_mask, width=8, instance_channels=4)
 )
 
 
@@ -43,6 +50,8 @@ def requests(first: int = 0) -> RequestBatch:
         masks=masks,
         nouns=masks[:, 0].to(torch.uint8) * 3,
         colors=masks[:, 0].to(torch.uint8) * 2,
+        objects=masks[:, 0].to(torch.uint8),
+        has_requests=torch.tensor([True, True]),
         captions=("a red ball rolls", "nothing moves") * 2,
     )
 
@@ -135,3 +144,56 @@ def test_the_kind_needs_an_object_mask() -> None:
 def test_an_object_mask_needs_a_motion_prior() -> None:
     with pytest.raises(ConfigError, match=r"ObjectMaskConfig\.width: expected 0 without"):
         replace(BASE, object_mask=ObjectMaskConfig(width=4))
+
+
+def instance_recipe() -> StageRecipe:
+    return replace(mask_recipe(), losses=ObjectMaskLosses(instances=1.0))
+
+
+def two_squares() -> RequestBatch:
+    """Two equal squares on a plain ground, told apart by their place alone."""
+    objects = torch.zeros(2, 32, 32, dtype=torch.uint8)
+    objects[:, 4:12, 4:12], objects[:, 18:26, 20:28] = 1, 2
+    images = torch.full((2, 32, 32, 3), 60, dtype=torch.uint8)
+    images[objects > 0] = torch.tensor([200, 40, 40], dtype=torch.uint8)
+    return replace(requests(), images=images, objects=objects)
+
+
+def test_it_learns_which_pixels_are_one_object() -> None:
+    stage, batch = make_stage(instance_recipe(), model=WITH_INSTANCES), two_squares()
+    optimiser = torch.optim.Adam(stage.object_mask.parameters(), lr=1e-2)
+    for _ in range(80):
+        optimiser.zero_grad()
+        terms = stage(batch)
+        terms[TOTAL].mean().backward()
+        optimiser.step()
+    assert float(terms["instances"].detach().mean()) < 0.5
+    vectors = reduced(stage.object_mask.instances(stage._features(_unit(batch))), (32, 32))
+    seed = torch.zeros(2, 1, 32, 32)
+    seed[:, :, 8, 8] = 1
+    found = membership_logits(vectors, seed.flatten(2))[:, 0] > 0
+    own, other = (found[batch.objects == number].double().mean() for number in (1, 2))
+    assert float(own) > 0.9 and float(other) < 0.1
+
+
+def _unit(batch: RequestBatch) -> torch.Tensor:
+    return batch.images.movedim(-1, 1) / 255
+
+
+def test_images_whose_requests_do_not_count_teach_objects_alone() -> None:
+    stage = make_stage(instance_recipe(), model=WITH_INSTANCES)
+    shake_heads(stage)
+    batch = replace(two_squares(), has_requests=torch.tensor([True, False]))
+    terms = {name: value.detach() for name, value in stage(batch).items()}
+    for name in ("cross_entropy", "dice", "names"):
+        assert float(terms[name][0]) > 0 and float(terms[name][1]) == 0
+    assert float(terms["instances"].min()) > 0
+
+
+def test_the_loss_of_instances_needs_a_network_that_has_them() -> None:
+    with pytest.raises(ConfigError, match=r"instance_channels: expected 2 or more"):
+        Recipe(name="x", seed=0, model=MODEL, stages=(instance_recipe(),))
+    with pytest.raises(ConfigError, match="instance_channels: expected 0, or 2 or more"):
+        ObjectMaskConfig(width=4, instance_channels=1)
+    with pytest.raises(ConfigError, match="instance_channels: expected 0, or 2 or more"):
+        ObjectMaskConfig(instance_channels=4)

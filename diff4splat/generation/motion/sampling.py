@@ -22,7 +22,13 @@ from diff4splat.flow.samplers import VelocityFn
 from diff4splat.flow.solve import ADAPTIVE, FITTED, FIXED_DEFAULT, SolverPath, solve
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.rigid_components import connected_components
-from diff4splat.generation.motion_networks import LEAST_PROBABILITY, LEAST_SHARE, MaskedMotion
+from diff4splat.generation.motion.networks import (
+    LEAST_PROBABILITY,
+    LEAST_SHARE,
+    MaskedMotion,
+    ObjectMaps,
+)
+from diff4splat.generation.motion.object_pooling import pooled_by_object
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.protocols import MotionPrior
@@ -103,12 +109,13 @@ def sample_motion(
     # Which pixels move is not sampled: image and text decide.
     mean, logits = network.predict_motion_and_mask(rgb, noise, noise.new_ones(1), request.text)
     named = request.text is not None and isinstance(network, MaskedMotion)
+    maps = ObjectMaps(logits=logits)
     if named:
-        logits = network.object_logits(rgb, request.text)
+        maps = network.object_maps(rgb, request.text)
     return MotionSample(
         field=_from_first(field),
         mean_field=_from_first(mean),
-        probability=bilateral_smooth(logits.sigmoid(), rgb)[0],
+        probability=_probability(maps, rgb),
         calls=calls,
         least_probability=LEAST_PROBABILITY if named else 0.0,
         least_share=LEAST_SHARE if named else 0.0,
@@ -133,6 +140,12 @@ def _sampler(settings: GenerationSettings) -> str:
 def _from_first(field: Float[Tensor, "1 3 t hc wc"]) -> Float[Tensor, "3 t2 hc wc"]:
     """With the first latent frame, at which nothing has moved."""
     return torch.cat([torch.zeros_like(field[0, :, :1]), field[0]], 1)
+
+
+def _probability(maps: ObjectMaps, rgb: Float[Tensor, "1 3 hh ww"]) -> Float[Tensor, "hh ww"]:
+    """Of motion, smoothed, and shared among the pixels of one object where these are known."""
+    smooth = bilateral_smooth(maps.logits.sigmoid(), rgb)[0]
+    return smooth if maps.instances is None else pooled_by_object(smooth, maps.instances[0])
 
 
 def bilateral_smooth(

@@ -9,7 +9,7 @@ from image_layers import input_image, random_rgb
 from diff4splat.generation.inputs.input_image import downsample
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.pixel_maps.pixel_layer import pixel_layer
-from diff4splat.generation.motion_maps import (
+from diff4splat.generation.motion.displacement_maps import (
     depth_at,
     reduced_displacement,
     with_displacement,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import torch
 
-from diff4splat.generation.motion_networks import motion_prior
+from diff4splat.generation.motion.networks import motion_prior
 from diff4splat.models.config.priors import MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
@@ -49,8 +49,10 @@ def test_models_without_an_object_mask_or_without_motion() -> None:
 def test_an_image_and_its_mirror_image_give_the_same_mask() -> None:
     prior = motion_prior(networks())
     image, text = torch.rand(1, 3, 32, 32), torch.randn(1, 5, CONFIG.text.width)
-    logits = prior.object_logits(image, text)
-    torch.testing.assert_close(prior.object_logits(image.flip(-1), text), logits.flip(-1))
+    maps = prior.object_maps(image, text)
+    logits = maps.logits
+    torch.testing.assert_close(prior.object_maps(image.flip(-1), text).logits, logits.flip(-1))
+    assert maps.instances is None
     own = prior.object_mask(enlarged(image), text)
     other = prior.object_mask(enlarged(image.flip(-1)), text).flip(-1)
     expected = reduced((own + other)[None] / 2, (32, 32))[0]

@@ -9,8 +9,8 @@ from image_layers import input_image, random_rgb
 
 from diff4splat.flow.guidance import CallCount, Guidance
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.motion_networks import LEAST_PROBABILITY, LEAST_SHARE, MaskedMotion
-from diff4splat.generation.motion_sampling import (
+from diff4splat.generation.motion.networks import LEAST_PROBABILITY, LEAST_SHARE, MaskedMotion
+from diff4splat.generation.motion.sampling import (
     MotionRequest,
     MotionSample,
     bilateral_smooth,
@@ -89,6 +89,13 @@ class Square:
         logits = torch.full((1, height, width), -9.0)
         logits[:, height // 4 : 3 * height // 4, width // 4 : 3 * width // 4] = self.logit
         return logits
+
+    def predict_mask_and_instances(
+        self, image: torch.Tensor, text: torch.Tensor, text_mask: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, None]:
+        """The logits, and nothing that tells objects apart."""
+        del text_mask
+        return self(image, text), None
 
 
 @torch.no_grad()

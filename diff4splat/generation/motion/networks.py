@@ -6,6 +6,7 @@ image, noise, text ─ motion U-Net ─ how
 
 from dataclasses import dataclass
 
+from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.networks import Networks
@@ -17,6 +18,16 @@ LEAST_PROBABILITY = 0.35
 LEAST_SHARE = 0.85
 """Of the highest probability; components below it are other objects, and stay (both chosen on
 validation worlds: docs/log/object-mask.md)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectMaps:
+    """What an object mask says of an image and a text."""
+
+    logits: Float[Tensor, "b h w"]
+    """That the text asks a pixel to move."""
+    instances: Float[Tensor, "b k h w"] | None = None
+    """What tells objects apart (``models.object_mask.instance_vectors``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,15 +59,18 @@ class MaskedMotion:
         """The clean motion, and for every pixel the logit that it moves."""
         return self.motion_unet.predict_motion_and_mask(image, noisy, level, text, text_mask)
 
-    def object_logits(self, image: Tensor, text: Tensor) -> Tensor:
-        """For every pixel the logit that the text asks it to move: a mean with the mirror image.
+    def object_maps(self, image: Tensor, text: Tensor) -> ObjectMaps:
+        """What the text asks to move, as a mean with the mirror image, and what is one object.
 
         Sides in a text are those of motion, so its object is the same in both.
         """
-        larger = enlarged(image)
+        larger, size_px = enlarged(image), image.shape[-2:]
+        logits, instances = self.object_mask.predict_mask_and_instances(larger, text)
         mirrored = self.object_mask(larger.flip(-1), text).flip(-1)
-        logits = (self.object_mask(larger, text) + mirrored) / 2
-        return reduced(logits[None], image.shape[-2:])[0]
+        return ObjectMaps(
+            logits=reduced((logits + mirrored)[None] / 2, size_px)[0],
+            instances=None if instances is None else reduced(instances, size_px),
+        )
 
 
 def motion_prior(networks: Networks) -> MotionPrior | None:
