@@ -13,6 +13,11 @@ from diff4splat.models.object_mask.instance_vectors import pair_logits
 CELL_PX = 2
 SHARPNESS = 2
 """Power of membership: what may belong to an object counts less than what surely does."""
+MEAN_WEIGHT = 0.4
+"""Of the mean over the object's pixels, against the pixel's own probability."""
+LOW_SHARE = 0.35
+"""Of the highest probability, above which a pixel moves: what is of the object alone has 0.4. All
+chosen on validation worlds (docs/log/object-mask-backbone.md)."""
 CHUNK = 4096
 """Pixels at a time: memory is that times the number of cells."""
 
@@ -20,7 +25,7 @@ CHUNK = 4096
 def pooled_by_object(
     probability: Float[Tensor, "h w"], instances: Float[Tensor, "k h w"]
 ) -> Float[Tensor, "h w"]:
-    """Half the mean over the pixels of the same object, half the pixel's own; the highest stays.
+    """A pixel's own, and the mean over the pixels of its object; the highest stays about as it is.
 
     ``instances`` are vectors and log scales of ``models.object_mask.instance_vectors``.
     """
@@ -28,7 +33,7 @@ def pooled_by_object(
     if highest <= 0:
         return probability
     means = _mean_over_object(probability, instances)
-    return highest * (means / means.max() + probability / highest) / 2
+    return highest * torch.lerp(probability / highest, means / means.max(), MEAN_WEIGHT)
 
 
 def _mean_over_object(

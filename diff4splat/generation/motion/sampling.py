@@ -28,7 +28,7 @@ from diff4splat.generation.motion.networks import (
     MaskedMotion,
     ObjectMaps,
 )
-from diff4splat.generation.motion.object_pooling import pooled_by_object
+from diff4splat.generation.motion.object_pooling import LOW_SHARE, pooled_by_object
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.protocols import MotionPrior
@@ -66,6 +66,8 @@ class MotionSample:
     """Of the most probable pixel, for anything to move."""
     least_share: float = 0.0
     """Of the highest probability, for a component to move beside the most probable one."""
+    low_share: float = 0.0
+    """Of the highest probability, for a pixel to move."""
 
     def mask(self, threshold: float) -> Bool[Tensor, "hh ww"]:
         """Pixels whose probability is above ``threshold``.
@@ -78,6 +80,7 @@ class MotionSample:
         if highest < self.least_probability:
             return torch.zeros_like(self.probability, dtype=torch.bool)
         low = min(threshold, max(highest / 2, HYSTERESIS_LOW))
+        low = max(low, self.low_share * highest)
         component = connected_components(self.probability > low)
         best = self.probability.new_zeros(int(component.max()) + 1)
         best = best.scatter_reduce(0, component.flatten(), self.probability.flatten(), "amax")
@@ -119,6 +122,7 @@ def sample_motion(
         calls=calls,
         least_probability=LEAST_PROBABILITY if named else 0.0,
         least_share=LEAST_SHARE if named else 0.0,
+        low_share=0.0 if maps.instances is None else LOW_SHARE,
     )
 
 

@@ -76,6 +76,13 @@ def test_components_far_below_the_highest_are_other_objects() -> None:
     assert torch.equal(sample_of(probability).mask(0.3), probability > 0)
 
 
+def test_a_pixel_far_below_the_highest_is_no_part_of_its_component() -> None:
+    probability = torch.tensor([[0.9, 0.4, 0.25, 0.0]])
+    sample = replace(sample_of(probability), low_share=0.35)
+    assert sample.mask(0.2).tolist() == [[True, True, False, False]]
+    assert sample_of(probability).mask(0.2).tolist() == [[True, True, True, False]]
+
+
 class Square:
     """Finds a square with one probability, whatever the prompt."""
 
@@ -109,6 +116,29 @@ def test_the_object_mask_says_what_moves(
     assert (sample.least_probability, sample.least_share) == (LEAST_PROBABILITY, LEAST_SHARE)
     mask = sample.mask(0.3)
     assert bool(mask[12:20, 12:20].all()) is found and not bool(mask[0, 0])
+
+
+class HalfFound(Square):
+    """A square of which the words find the left half, and which knows that it is one."""
+
+    def predict_mask_and_instances(
+        self, image: torch.Tensor, text: torch.Tensor, text_mask: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Logits of the left half; vectors that are 0 on the square and far from it elsewhere."""
+        logits = self(image, text)
+        square = logits > -9
+        logits[..., logits.shape[-1] // 2 :] = -9.0
+        far = 9.0 * (~square).float()
+        return logits, torch.stack([far, 0 * far, 0 * far], 1)
+
+
+@torch.no_grad()
+def test_an_object_moves_whole_where_words_find_half_of_it(network: MotionUNet) -> None:
+    gray = input_image(torch.full((SIDE_PX, SIDE_PX, 3), 0.5))
+    masked = MaskedMotion(motion_unet=moves_right(network, 1.0), object_mask=HalfFound(0.9))
+    mask = sample_motion(masked, gray, 2, request(text=True)).mask(0.2)
+    assert float(mask[11:21, 11:21].double().mean()) > 0.95
+    assert not mask[:4].any() and not mask[:, -4:].any()
 
 
 @torch.no_grad()

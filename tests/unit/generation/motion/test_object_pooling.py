@@ -5,7 +5,7 @@ import torch
 from torch import Tensor
 
 from diff4splat.generation.motion import object_pooling
-from diff4splat.generation.motion.object_pooling import pooled_by_object
+from diff4splat.generation.motion.object_pooling import LOW_SHARE, MEAN_WEIGHT, pooled_by_object
 
 
 def two_objects() -> tuple[Tensor, Tensor]:
@@ -23,8 +23,9 @@ def test_a_part_of_an_object_speaks_for_all_of_it() -> None:
     own, other = pooled[numbers == 0], pooled[numbers == 1]
     assert float(own.min()) > 10 * float(other.max())
     assert float(pooled.max()) == pytest.approx(0.8)
-    # Half of it is the mean over the object, half the pixel's own.
-    assert float(pooled[7, 5]) == pytest.approx(0.4, abs=1e-3)
+    assert float(pooled[7, 5]) == pytest.approx(0.8 * MEAN_WEIGHT, abs=1e-3)
+    # So all of it moves, and nothing else.
+    assert torch.equal(pooled > LOW_SHARE * pooled.max(), numbers == 0)
 
 
 def test_the_mean_is_that_over_cells_weighted_by_membership() -> None:
