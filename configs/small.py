@@ -209,7 +209,7 @@ def _object_mask(video: StageRecipe) -> StageRecipe:
         kind="object_mask",
         steps=6_000,
         trained=("object_mask",),
-        losses=ObjectMaskLosses(),
+        losses=ObjectMaskLosses(instances=0.7),
         optimizer=OptimizerSettings(
             learning_rate=1e-3, warmup_steps=200, part_rates=(("object_mask.backbone", 0.1),)
         ),

@@ -66,7 +66,7 @@ def small_size() -> ModelConfig:
         refinement=RefinementConfig(channels=48),
         monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2, image_backbone=True),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
-        object_mask=ObjectMaskConfig(width=24, image_backbone=True),
+        object_mask=ObjectMaskConfig(width=24, image_backbone=True, instance_channels=12),
         default_fill="none",
         default_guidance=1.0,
     )
