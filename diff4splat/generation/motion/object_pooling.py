@@ -1,24 +1,27 @@
 """Probability of motion shared among the pixels of one object, so that it moves whole (ADR 36).
 
 Words find the most telling part of an object; vectors of the object mask know what belongs to it.
-Axes: ``h w`` pixels, ``p`` all of them, ``s`` cells of two pixels, ``k`` channels.
+What may belong to an object counts less than what surely does: membership counts squared.
+Axes: ``h w`` pixels, ``s`` cells, ``c`` channels of a vector, ``k`` with its log scale.
 """
+
+import math
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.object_mask.instance_vectors import pair_logits
+from diff4splat.models.object_mask.instance_vectors import INSIDE_LOGIT
 
-CELL_PX = 2
-SHARPNESS = 2
-"""Power of membership: what may belong to an object counts less than what surely does."""
+MOST_CELLS = 4096
+"""Cells that a mean is over: of two pixels in an image of 128 by 128, larger in longer ones."""
 MEAN_WEIGHT = 0.4
 """Of the mean over the object's pixels, against the pixel's own probability."""
 LOW_SHARE = 0.35
 """Of the highest probability, above which a pixel moves: what is of the object alone has 0.4. All
 chosen on validation worlds (docs/log/object-mask-backbone.md)."""
-CHUNK = 4096
+SMALLEST = 1e-6
+CHUNK = 1024
 """Pixels at a time: memory is that times the number of cells."""
 
 
@@ -33,19 +36,37 @@ def pooled_by_object(
     if highest <= 0:
         return probability
     means = _mean_over_object(probability, instances)
-    return highest * torch.lerp(probability / highest, means / means.max(), MEAN_WEIGHT)
+    # Vectors so long that no cell is like another leave no mean.
+    means = means / means.max().clamp_min(SMALLEST)
+    return highest * torch.lerp(probability / highest, means, MEAN_WEIGHT)
 
 
 def _mean_over_object(
     probability: Float[Tensor, "h w"], instances: Float[Tensor, "k h w"]
 ) -> Float[Tensor, "h w"]:
-    cells = torch.nn.functional.avg_pool2d(
-        torch.cat([instances, probability[None]])[None], CELL_PX, ceil_mode=True
-    )[0].flatten(1)
-    vectors, log_scales, values = cells[:-2].mT, cells[-2], cells[-1]
-    of_pixels = instances[:-1].flatten(1).mT
-    means = []
-    for part in of_pixels.split(CHUNK):
-        membership = pair_logits(part, vectors, log_scales).sigmoid() ** SHARPNESS
-        means.append(membership @ values / membership.sum(1).clamp_min(1e-6))
-    return torch.cat(means).view_as(probability)
+    maps = torch.cat([instances, probability[None]])
+    side_px = max(math.ceil(math.sqrt(probability.numel() / MOST_CELLS)), 2)
+    cells = torch.nn.functional.avg_pool2d(maps[None], side_px, ceil_mode=True)[0].flatten(1)
+    to_logits, summed = _logit_weights(cells[:-2].mT, cells[-2]).mT, _with_ones(cells[-1:].mT)
+    vectors = instances[:-1].flatten(1).mT
+    factors = _with_ones(torch.cat([vectors, vectors.square().sum(1, keepdim=True)], 1))
+    sums = []
+    for part in factors.split(CHUNK):
+        # In place: there are 67 million pairs in an image of 128 by 128.
+        membership = (part @ to_logits).clamp_(max=INSIDE_LOGIT).sigmoid_()
+        sums.append(membership.mul_(membership) @ summed)
+    values, weights = torch.cat(sums).unbind(1)
+    return (values / weights.clamp_min(SMALLEST)).view_as(probability)
+
+
+def _logit_weights(
+    seeds: Float[Tensor, "s c"], log_scales: Float[Tensor, " s"]
+) -> Float[Tensor, "s f"]:
+    """So that a product with (v, |v|², 1) is the logit of ``instance_vectors.pair_logits``."""
+    scales = log_scales.exp()[:, None]
+    constant = INSIDE_LOGIT - scales * seeds.square().sum(1, keepdim=True)
+    return torch.cat([2 * scales * seeds, -scales, constant], 1)
+
+
+def _with_ones(columns: Float[Tensor, "n c"]) -> Float[Tensor, "n c2"]:
+    return torch.cat([columns, torch.ones_like(columns[:, :1])], 1)

@@ -51,10 +51,14 @@ def test_nothing_probable_and_odd_sides() -> None:
 
 
 def test_extreme_vectors_are_finite() -> None:
+    torch.manual_seed(0)
     probability = torch.rand(4, 4)
-    for length in (0.0, 1e4):
-        pooled = pooled_by_object(probability, length * torch.randn(3, 4, 4).clamp(-1, 6))
-        assert bool(pooled.isfinite().all())
+    for length in (0.0, 1e4, 1e8):
+        for log_scale in (-6.0, 6.0):
+            instances = length * torch.randn(3, 4, 4)
+            instances[-1] = log_scale
+            pooled = pooled_by_object(probability, instances)
+            assert bool(pooled.isfinite().all()) and float(pooled.max()) <= 1
 
 
 def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,3 +67,12 @@ def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = pooled_by_object(*given)
     monkeypatch.setattr(object_pooling, "CHUNK", 7)
     torch.testing.assert_close(pooled_by_object(*given), whole)
+
+
+def test_long_images_have_larger_cells() -> None:
+    numbers = torch.zeros(16, 2048)
+    numbers[:, 900:] = 1
+    instances = torch.stack([numbers * 9, torch.zeros(16, 2048), torch.zeros(16, 2048)])
+    probability = torch.zeros(16, 2048)
+    probability[:, 1000:1100] = 0.8
+    assert torch.equal(pooled_by_object(probability, instances) > 0.28, numbers == 1)
