@@ -130,3 +130,21 @@ def test_clips_without_masks_are_refused() -> None:
 def test_an_image_without_named_objects_asks_for_nothing() -> None:
     bare = replace(clip(), note=replace(clip().note, objects=()))
     assert not bool(samples(bare)[0].masks.any())
+
+
+def test_every_pixel_has_the_number_of_its_object() -> None:
+    source = samples()
+    for index in range(6):
+        batch = source[index]
+        for number, noun in ((1, "box"), (2, "ball")):
+            named = batch.nouns[0] == 1 + NOUNS.index(noun)
+            assert torch.equal(batch.objects[0] == number, named)
+
+
+@pytest.mark.parametrize(("motion_loss", "counts"), [("true", True), ("never", False)])
+def test_sentences_of_some_sources_do_not_count(motion_loss: str, counts: bool) -> None:
+    quiet = replace(RECIPE.data.sources[0], motion_loss=motion_loss)
+    recipe = replace(RECIPE, data=replace(RECIPE.data, sources=(quiet,)))
+    source = RequestSamples(ClipSamples(recipe, 0, [OneClip(clip())]))
+    assert source[0].has_requests.tolist() == [counts]
+    assert bool(source[0].objects.any())
