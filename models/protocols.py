@@ -73,7 +73,7 @@ class ObjectMask(Protocol):
     def predict_mask_and_instances(
         self, image: Tensor, text: Tensor, text_mask: Tensor | None = None
     ) -> tuple[Tensor, Tensor | None]:
-        """The logits, and vectors that tell objects apart, if it has any."""
+        """The logits, and vectors that separate instances, if it has any."""
 
 
 @runtime_checkable

@@ -39,7 +39,7 @@ class ObjectMaskConfig:
     image_backbone: bool = False
     """Whether it has a second encoder, the image backbone (ADR 32)."""
     instance_channels: int = 0
-    """Of the vectors that tell objects apart, 2 or more; 0 leaves them out (ADR 36)."""
+    """Of the vectors that separate instances, 2 or more; 0 leaves them out (ADR 36)."""
 
     def __post_init__(self) -> None:
         for name in ("width", "instance_channels"):

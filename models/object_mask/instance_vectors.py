@@ -34,7 +34,16 @@ def pair_logits(
     seeds: Float[Tensor, "*b s c"],
     log_scales: Float[Tensor, "*b s"],
 ) -> Float[Tensor, "*b p s"]:
-    """3 − |v − s|² · scale of the seed, for every pixel and seed."""
-    squares = vectors.square().sum(-1)[..., None] + seeds.square().sum(-1)[..., None, :]
-    distance = (squares - 2 * vectors @ seeds.mT).clamp_min(0)
-    return INSIDE_LOGIT - distance * log_scales.exp()[..., None, :]
+    """3 − |v − s|² · scale of the seed, for every pixel and seed.
+
+    One product of (v, |v|², 1) with weights of each seed: there may be 67 million pairs.
+    """
+    scales = log_scales.exp()[..., None]
+    constant = INSIDE_LOGIT - scales * _squares(seeds)
+    of_seeds = torch.cat([2 * scales * seeds, -scales, constant], -1)
+    of_pixels = torch.cat([vectors, _squares(vectors), torch.ones_like(vectors[..., :1])], -1)
+    return (of_pixels @ of_seeds.mT).clamp_(max=INSIDE_LOGIT)
+
+
+def _squares(vectors: Float[Tensor, "*b c"]) -> Float[Tensor, "*b 1"]:
+    return vectors.square().sum(-1, keepdim=True)

@@ -37,7 +37,7 @@ class HeadShape:
     """Channels of the features of each encoder."""
     text_width: int
     instance_channels: int = 0
-    """Of the vectors that tell objects apart; 0 without them."""
+    """Of the vectors that separate instances; 0 without them."""
 
 
 class MaskHeads(nn.Module):
@@ -72,7 +72,7 @@ class MaskHeads(nn.Module):
         text: Float[Tensor, "b s e"],
         text_mask: Bool[Tensor, "b s"] | None = None,
     ) -> tuple[Float[Tensor, "b h w"], Float[Tensor, "b k h w"] | None]:
-        """The logits, and what tells objects apart (``instance_vectors``) if it has learnt that."""
+        """The logits, and vectors that separate instances (``instance_vectors``), if it has any."""
         features = self.features(image)
         logits = self.logits(features, text_tokens(text, text_mask))[:, 0]
         return logits, None if self.instances is None else self.instances(features)

@@ -109,7 +109,7 @@ class OnnxObjectMask(OnnxPart):
     def predict_mask_and_instances(
         self, image: Tensor, text: Tensor, text_mask: Tensor | None = None
     ) -> tuple[Tensor, Tensor | None]:
-        """The logits, and vectors that tell objects apart, if it has any."""
+        """The logits, and vectors that separate instances, if it has any."""
         text, text_mask = text_or_none(text, text_mask, len(image), self.config.text.width)
         inputs = {"image": image, "text": text, "text_mask": text_mask}
         found = run_graph(self.model["object_mask"], inputs)

@@ -75,7 +75,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """An image, enlarged as in ``object_mask.enlarged``, and text to logits of what is to move.
 
-    Where the model tells objects apart, ``instances`` are vectors and log scales of all pixels.
+    Where the model separates instances, ``instances`` are vectors and log scales of all pixels.
     """
     size = _image_size(IMAGE_MULTIPLE_PX)
     outputs = [output("mask_logits", "batch", *size)]

@@ -27,7 +27,7 @@ class ObjectMaps:
     logits: Float[Tensor, "b h w"]
     """That the text asks a pixel to move."""
     instances: Float[Tensor, "b k h w"] | None = None
-    """What tells objects apart (``models.object_mask.instance_vectors``)."""
+    """Vectors that separate instances (``models.object_mask.instance_vectors``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +60,7 @@ class MaskedMotion:
         return self.motion_unet.predict_motion_and_mask(image, noisy, level, text, text_mask)
 
     def object_maps(self, image: Tensor, text: Tensor) -> ObjectMaps:
-        """What the text asks to move, as a mean with the mirror image, and what is one object.
+        """What the text asks to move, as a mean with the mirror image, and vectors of instances.
 
         Sides in a text are those of motion, so its object is the same in both.
         """

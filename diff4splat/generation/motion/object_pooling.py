@@ -1,4 +1,4 @@
-"""Probability of motion shared among the pixels of one object, so that it moves whole (ADR 36).
+"""Probability of motion shared among the pixels of one object (ADR 36).
 
 Words find the most telling part of an object; vectors of the object mask know what belongs to it.
 What may belong to an object counts less than what surely does: membership counts squared.
@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.object_mask.instance_vectors import INSIDE_LOGIT
+from diff4splat.models.object_mask.instance_vectors import pair_logits
 
 MOST_CELLS = 4096
 """Cells that a mean is over: of two pixels in an image of 128 by 128, larger in longer ones."""
@@ -47,26 +47,11 @@ def _mean_over_object(
     maps = torch.cat([instances, probability[None]])
     side_px = max(math.ceil(math.sqrt(probability.numel() / MOST_CELLS)), 2)
     cells = torch.nn.functional.avg_pool2d(maps[None], side_px, ceil_mode=True)[0].flatten(1)
-    to_logits, summed = _logit_weights(cells[:-2].mT, cells[-2]).mT, _with_ones(cells[-1:].mT)
-    vectors = instances[:-1].flatten(1).mT
-    factors = _with_ones(torch.cat([vectors, vectors.square().sum(1, keepdim=True)], 1))
+    vectors, log_scales, values = cells[:-2].mT, cells[-2], cells[-1]
+    summed = torch.stack([values, torch.ones_like(values)], 1)
     sums = []
-    for part in factors.split(CHUNK):
-        # In place: there are 67 million pairs in an image of 128 by 128.
-        membership = (part @ to_logits).clamp_(max=INSIDE_LOGIT).sigmoid_()
+    for part in instances[:-1].flatten(1).mT.split(CHUNK):
+        membership = pair_logits(part, vectors, log_scales).sigmoid_()
         sums.append(membership.mul_(membership) @ summed)
-    values, weights = torch.cat(sums).unbind(1)
-    return (values / weights.clamp_min(SMALLEST)).view_as(probability)
-
-
-def _logit_weights(
-    seeds: Float[Tensor, "s c"], log_scales: Float[Tensor, " s"]
-) -> Float[Tensor, "s f"]:
-    """So that a product with (v, |v|², 1) is the logit of ``instance_vectors.pair_logits``."""
-    scales = log_scales.exp()[:, None]
-    constant = INSIDE_LOGIT - scales * seeds.square().sum(1, keepdim=True)
-    return torch.cat([2 * scales * seeds, -scales, constant], 1)
-
-
-def _with_ones(columns: Float[Tensor, "n c"]) -> Float[Tensor, "n c2"]:
-    return torch.cat([columns, torch.ones_like(columns[:, :1])], 1)
+    above, below = torch.cat(sums).unbind(1)
+    return (above / below.clamp_min(SMALLEST)).view_as(probability)

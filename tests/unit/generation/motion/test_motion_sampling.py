@@ -100,7 +100,7 @@ class Square:
     def predict_mask_and_instances(
         self, image: torch.Tensor, text: torch.Tensor, text_mask: torch.Tensor | None = None
     ) -> tuple[torch.Tensor, None]:
-        """The logits, and nothing that tells objects apart."""
+        """The logits, and no vectors."""
         del text_mask
         return self(image, text), None
 

@@ -1,4 +1,4 @@
-"""Vectors that tell objects apart: distances against the formula, extremes, and place."""
+"""Vectors of instances: distances against the formula, extremes, and place."""
 
 import math
 

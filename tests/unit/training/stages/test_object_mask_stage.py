@@ -151,7 +151,7 @@ def instance_recipe() -> StageRecipe:
 
 
 def two_squares() -> RequestBatch:
-    """Two equal squares on a plain ground, told apart by their place alone."""
+    """Two equal squares on a plain ground, which differ in their place alone."""
     objects = torch.zeros(2, 32, 32, dtype=torch.uint8)
     objects[:, 4:12, 4:12], objects[:, 18:26, 20:28] = 1, 2
     images = torch.full((2, 32, 32, 3), 60, dtype=torch.uint8)
