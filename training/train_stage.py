@@ -18,6 +18,7 @@ from diff4splat.models.wan.tokenizer import TOKENIZER_FILE
 from diff4splat.progress.phases import Phases
 from diff4splat.training.backbone_init import start_from_public_backbones
 from diff4splat.training.batches.samples import ClipSamples
+from diff4splat.training.batches.sources import unused_sources
 from diff4splat.training.earlier_release import earlier_fingerprint
 from diff4splat.training.latent_statistics import CLIPS, measure_statistics, write_statistics
 from diff4splat.training.latents.samples import LatentSamples, open_samples
@@ -113,6 +114,8 @@ def _note_start(request: StageRequest, stage: StageRecipe) -> None:
         request.note(f"stages {removed} are left out: their kinds no longer exist")
     if (request.folder / stage.name / RECIPE_FILE).exists():
         return
+    for line in unused_sources(stage.data):
+        request.note(line)
     sources = stages_before(recipe, stage, request.folder, start)
     for part in parts_left_random(stage, sources, start):
         request.note(

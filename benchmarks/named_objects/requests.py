@@ -62,7 +62,8 @@ def _by_name(
     names = [one.named for one in objects]
     able = [i for i, one in enumerate(objects) if one.is_asked_for and is_unique(names, i)]
     for index in _some(able, generator, most):
-        yield _sentence(f"{names[index].color} {names[index].noun}", generator), objects[index]
+        name = f"{names[index].color} {names[index].noun}".strip()
+        yield _sentence(name, generator), objects[index]
     absent = caption_of_absent_object(names, generator)
     if absent is not None:
         yield absent, None

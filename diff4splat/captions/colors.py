@@ -7,7 +7,7 @@ weight because shading changes it.
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 
 from diff4splat.captions.srgb import linear_from_hex
 
@@ -35,20 +35,25 @@ COLOR_NAMES = tuple(_ANCHORS)
 
 def color_name(linear: Float64[np.ndarray, "3"]) -> str:
     """The name of a linear RGB colour."""
-    names, anchors = _anchors()
-    squared_distance = ((anchors - _lab(linear)) * np.array([0.55, 1.0, 1.0])) ** 2
-    return names[int(squared_distance.sum(1).argmin())]
+    return COLOR_NAMES[int(color_numbers(linear[None])[0])]
+
+
+def color_numbers(linear: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
+    """Indices in ``COLOR_NAMES`` of linear RGB colours."""
+    numbers, anchors = _anchors()
+    offsets = (anchors - _lab(linear)[:, None]) * np.array([0.55, 1.0, 1.0])
+    return numbers[(offsets**2).sum(2).argmin(1)]
 
 
 @cache
-def _anchors() -> tuple[tuple[str, ...], Float64[np.ndarray, "n 3"]]:
-    pairs = [(name, word) for name, words in _ANCHORS.items() for word in words.split()]
-    return tuple(name for name, _ in pairs), np.stack(
-        [_lab(linear_from_hex(word)) for _, word in pairs]
-    )
+def _anchors() -> tuple[Int64[np.ndarray, " n"], Float64[np.ndarray, "n 3"]]:
+    pairs = [(k, word) for k, name in enumerate(COLOR_NAMES) for word in _ANCHORS[name].split()]
+    colors = np.stack([linear_from_hex(word) for _, word in pairs])
+    return np.array([number for number, _ in pairs]), _lab(colors)
 
 
-def _lab(linear: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "3"]:
-    ratio = _XYZ_FROM_RGB @ linear / _WHITE
+def _lab(linear: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3"]:
+    ratio = linear @ _XYZ_FROM_RGB.T / _WHITE
     f = np.where(ratio > 0.008856, np.cbrt(ratio), 7.787 * ratio + 16 / 116)
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+    first, second, third = f[:, 0], f[:, 1], f[:, 2]
+    return np.stack([116 * second - 16, 500 * (first - second), 200 * (second - third)], 1)

@@ -3,7 +3,7 @@
     caption   = [ place ", " ] ( event { ", " event } | static ) [ ", " camera ] ;
     event     = object " " verb [ " " direction ] [ " beside " object ] ;
     static    = "nothing moves" [ " around " object { " and " object } ] ;
-    object    = ( "a" | "an" ) " " color " " noun ;
+    object    = ( "a" | "an" ) [ " " color ] " " noun ;
     direction = "to the left" | "to the right"
               | "toward the camera" | "away from the camera" ;
     camera    = "the camera " move { " and then " move } ;
@@ -16,10 +16,10 @@ or upward and downward motions.
 from dataclasses import dataclass
 
 from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.captions.vocabulary import (
     CAMERA_MOVES,
     DIRECTIONS,
-    NOUNS,
     PLACES,
     VERBS,
 )
@@ -31,6 +31,7 @@ class NamedObject:
     """An object, as captions name it."""
 
     color: str
+    """Empty for an object of several colours."""
     noun: str
 
 
@@ -89,8 +90,8 @@ def _event(event: Event, variant: int) -> str:
 
 
 def _object(named: NamedObject) -> str:
-    article = "an" if named.color[0] in "aeiou" else "a"
-    return f"{article} {named.color} {named.noun}"
+    name = f"{named.color} {named.noun}".strip()
+    return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
 
 
 def _pick(words: tuple[str, ...], variant: int) -> str:
@@ -134,9 +135,10 @@ def _static_objects(clauses: list[str]) -> tuple[NamedObject, ...]:
 def _parse_object(words: str) -> tuple[NamedObject, str]:
     """The object at the start of ``words``, and the words after it."""
     article, _, rest = words.partition(" ")
-    color, _, rest = rest.partition(" ")
-    nouns = [noun for noun in NOUNS if rest == noun or rest.startswith(f"{noun} ")]
-    if article not in ("a", "an") or color not in COLOR_NAMES or not nouns:
+    color, _, after = rest.partition(" ")
+    color, rest = (color, after) if color in COLOR_NAMES else ("", rest)
+    nouns = [noun for noun in ALL_NOUNS if rest == noun or rest.startswith(f"{noun} ")]
+    if article not in ("a", "an") or not nouns:
         raise InputError(f"caption: expected an object such as 'a red torus', got {words[:60]!r}")
     noun = max(nouns, key=len)
     return NamedObject(color, noun), rest[len(noun) :].strip()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.captions.synonyms import (
     ANY_OBJECT,
     COLOR_SYNONYMS,
@@ -18,7 +19,7 @@ from diff4splat.captions.synonyms import (
     SIDES,
     TRAVEL_VERBS,
 )
-from diff4splat.captions.vocabulary import CAMERA_MOVES, NOUNS, PLACES, VERBS
+from diff4splat.captions.vocabulary import CAMERA_MOVES, PLACES, VERBS
 
 NO_OBJECT = "the prompt names no object or colour that the model knows"
 NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
@@ -48,7 +49,7 @@ def known_words() -> dict[str, tuple[str, ...]]:
     """Every phrase, by kind."""
     travel = tuple(form for forms in TRAVEL_VERBS for form in forms)
     return {
-        "objects": (*_with_synonyms(NOUNS, NOUN_SYNONYMS), *ANY_OBJECT),
+        "objects": (*_with_synonyms(ALL_NOUNS, NOUN_SYNONYMS), *ANY_OBJECT),
         "colours": _with_synonyms(COLOR_NAMES, COLOR_SYNONYMS),
         "motions": (*(phrase for phrases in VERBS.values() for phrase in phrases), *travel),
         "directions": tuple(phrase for phrases in SIDES.values() for phrase in phrases),

@@ -40,8 +40,8 @@ def caption_of_object(
         return None
     named, others = objects[index], objects[:index] + objects[index + 1 :]
     like = any(may_be_confused(named.noun, other.noun) for other in others)
-    kinds = ["full", "full", "full"] + ["noun"] * (not like)
-    if not any(colors_alike(named.color, other.color) for other in others):
+    kinds = ["full", "full", "full"] * bool(named.color) + ["noun"] * (not like)
+    if named.color and not any(colors_alike(named.color, other.color) for other in others):
         kinds.append("color")
     return _caption(named, draw(kinds, generator), direction, generator)
 
@@ -108,8 +108,8 @@ def _name(named: NamedObject, kind: str, choices: Choices) -> str:
 
 
 def colors_alike(color: str, other: str) -> bool:
-    """Whether one object may be called both."""
-    return color == other or frozenset((color, other)) in LIKE_COLORS
+    """Whether one object may be called both; one of several colours may be called any."""
+    return not (color and other) or color == other or frozenset((color, other)) in LIKE_COLORS
 
 
 def colors_unlike(taken: Iterable[str]) -> list[str]:

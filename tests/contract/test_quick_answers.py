@@ -73,6 +73,7 @@ prepare align nowhere --out folder --reference tracks
 prepare align folder --out folder --reference megasam
 prepare curate nowhere --out folder
 prepare panoramas nowhere.exr --out folder
+prepare cutouts nowhere --photographs folder --out folder --license MIT
 prepare poses nowhere.mp4 --out poses.json
 prepare captions folder --out folder
 prepare pipeline nowhere.toml

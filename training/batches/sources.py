@@ -114,6 +114,23 @@ def open_mixture(data: DataSettings, seed: int) -> tuple[list[EndlessClips | Non
     return opened, data
 
 
+def unused_sources(data: DataSettings) -> list[str]:
+    """What to say of the folders of a mixture that give no clip, though they have a weight."""
+    if len(data.sources) < 2:
+        return []
+    return [
+        f"{source.folder} gives no clip: expected {_expected(source)}, got others alone; "
+        "change its still_share"
+        for source in data.sources
+        if source.weight and not _fitting(source, data).weight
+    ]
+
+
+def _expected(source: SourceSettings) -> str:
+    share = source.still_share
+    return " or ".join(["static clips"] * (share > 0) + ["moving clips"] * (share < 1))
+
+
 def _fitting(settings: SourceSettings, data: DataSettings) -> SourceSettings:
     """The settings with the share of static clips that the folder can give, or weight 0."""
     if settings.kind != "shards" or not settings.weight:

@@ -19,6 +19,9 @@ AREA_RANGE_PX = (80.0, 8000.0)
 
 NO_NAME_WEIGHT = 0.15
 """Of pixels of the ground, walls and the sky: most of an image."""
+UNKNOWN_NAME = 255
+"""In maps of names, of a pixel whose noun or colour has no number."""
+_LEAST_WEIGHT = 1e-6
 
 
 def cross_entropy(
@@ -51,10 +54,15 @@ def _dice(logits: Float[Tensor, "b r p"], truth: Bool[Tensor, "b r p"]) -> Float
 def name_error(
     logits: Float[Tensor, "b n h w"], names: Int[Tensor, "b h w"]
 ) -> Float[Tensor, " b"]:
-    """Cross-entropy of the name of every pixel; 0 is no name, and counts for less."""
-    error = torch.nn.functional.cross_entropy(logits, names, reduction="none")
-    weights = torch.where(names > 0, 1.0, NO_NAME_WEIGHT).to(error)
-    return (error * weights).flatten(1).sum(1) / weights.flatten(1).sum(1)
+    """Cross-entropy of the name of every pixel; 0 without any.
+
+    Name 0 is no name, and counts for less; ``UNKNOWN_NAME`` does not count.
+    """
+    error = torch.nn.functional.cross_entropy(
+        logits, names, reduction="none", ignore_index=UNKNOWN_NAME
+    )
+    weights = torch.where(names > 0, 1.0, NO_NAME_WEIGHT).to(error) * (names != UNKNOWN_NAME)
+    return (error * weights).flatten(1).sum(1) / weights.flatten(1).sum(1).clamp_min(_LEAST_WEIGHT)
 
 
 def instance_error(

@@ -16,8 +16,8 @@ from diff4splat.cli.datasets.prepare_curation import (
 from diff4splat.cli.datasets.prepare_datasets import (
     PrepareDoctor,
     PrepareImport,
-    PreparePanoramas,
 )
+from diff4splat.cli.datasets.prepare_images import PrepareCutouts, PreparePanoramas
 from diff4splat.cli.datasets.prepare_pipeline import PreparePipeline
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -53,6 +53,7 @@ Prepare = (
     | Annotated[PrepareImport, subcommand("import")]
     | Annotated[PrepareDoctor, subcommand("doctor")]
     | Annotated[PreparePanoramas, subcommand("panoramas")]
+    | Annotated[PrepareCutouts, subcommand("cutouts")]
     | Annotated[PreparePoses, subcommand("poses")]
     | Annotated[PrepareAlign, subcommand("align")]
     | Annotated[PrepareCaptions, subcommand("captions")]

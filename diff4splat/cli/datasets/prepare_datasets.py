@@ -1,4 +1,4 @@
-"""``diff4splat prepare doctor``, ``import`` and ``panoramas``: data that others made."""
+"""``diff4splat prepare doctor`` and ``import``: data sets that others made."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,35 +126,3 @@ class PrepareImport:
         text = summary(rows)
         write_clip_sheet(self.out, self.out / "clips.png")
         note(f"{text}; look at clips.png and report.csv in {self.out}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class PreparePanoramas:
-    """Cut photographs without depth from panoramas, to train depth on (data.photographs)."""
-
-    panoramas: Annotated[
-        tuple[Path, ...], tyro.conf.Positional, InputPath(what="a panorama", folder=False)
-    ]
-    """Equirectangular images, twice as wide as high; radiance of OpenEXR files is exposed."""
-    out: OutFolder
-    """Folder for the photographs."""
-    views: Annotated[int, Number(least=1, most=1000)] = 24
-    """Photographs of each panorama, all around; those of one plain colour are dropped."""
-    size: Annotated[int, Number(least=16, most=4096)] = 160
-    """Side in pixels."""
-    seed: Annotated[int, Number(least=0)] = 0
-    """Random seed of pitch, roll and field of view."""
-
-    def run(self) -> None:
-        """Cut and write."""
-        from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.data_prep.panoramas.cut import PanoramaJob, cut_panoramas
-
-        job = PanoramaJob(
-            panoramas=self.panoramas,
-            folder=self.out,
-            views=self.views,
-            size_px=self.size,
-            seed=self.seed,
-        )
-        note(f"wrote {cut_panoramas(job, ConsolePhases())} photographs to {self.out}")

@@ -4,6 +4,7 @@ from hypothesis import strategies as st
 
 from diff4splat.captions.colors import COLOR_NAMES, color_name
 from diff4splat.captions.counterfactual import rephrase
+from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.captions.grammar import (
     CaptionFacts,
     Event,
@@ -15,7 +16,6 @@ from diff4splat.captions.grammar import (
 from diff4splat.captions.vocabulary import (
     CAMERA_MOVES,
     DIRECTIONS,
-    NOUNS,
     OPPOSITE,
     PLACES,
     VERBS,
@@ -24,7 +24,7 @@ from diff4splat.data_prep.synthetic.palettes import PALETTES, linear_from_hex
 from diff4splat.errors import InputError
 
 # plain words: building our classes inside a strategy would run their type checks there
-things = st.tuples(st.sampled_from(COLOR_NAMES), st.sampled_from(NOUNS))
+things = st.tuples(st.sampled_from(("", *COLOR_NAMES)), st.sampled_from(ALL_NOUNS))
 events = st.tuples(
     things,
     st.sampled_from(sorted(VERBS)),

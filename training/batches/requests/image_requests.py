@@ -21,7 +21,7 @@ from diff4splat.captions.requests import (
 from diff4splat.captions.scene_captions import caption_of_moving, caption_of_static
 from diff4splat.captions.unknown_nouns import caption_of_unknown_noun
 from diff4splat.training.batches.requests.displacement import draw_direction
-from diff4splat.training.batches.requests.present import TRAINING_NOUNS, PresentObject
+from diff4splat.training.batches.requests.present import PresentObject, absent_nouns
 
 KIND_SHARES = {
     "named": 0.45,
@@ -61,7 +61,7 @@ def _draw(
     empty: Bool[Tensor, "h w"],
     generator: torch.Generator,
 ) -> ImageRequest:
-    if kind == "unknown":
+    if kind == "unknown" and any(one.moves or one.named.color for one in objects):
         return _unknown_noun(objects, empty, generator)
     chosen = _chosen(kind, objects, generator)
     names = [one.named for one in objects]
@@ -91,8 +91,9 @@ def _unknown_noun(
 ) -> ImageRequest:
     """Objects of one colour, or of none; without a colour, those that move in the clip."""
     shown = {one.named.color for one in objects}
-    named = sorted(shown)
-    colors = draw((named, named, named, colors_unlike(shown), []), generator)
+    named, others = sorted(shown - {""}), colors_unlike(shown)
+    without = [[]] if any(one.moves for one in objects) else []
+    colors = draw([named, named, named, others or named, *without], generator)
     color = draw(colors, generator) if colors else ""
     asked = [one.mask for one in objects if (one.named.color == color if color else one.moves)]
     return ImageRequest(
@@ -112,7 +113,8 @@ def _caption(names: list[NamedObject], chosen: list[int], generator: torch.Gener
 
 def _absent_caption(names: list[NamedObject], generator: torch.Generator) -> str | None:
     if draw_share(generator) > GRAMMAR_SHARE:
-        return caption_of_absent_object(names, generator, TRAINING_NOUNS)
+        return caption_of_absent_object(names, generator, absent_nouns(names, generator))
     other_color = draw_share(generator) < 0.5
-    absent = absent_object(names, generator, other_color=other_color, nouns=TRAINING_NOUNS)
+    nouns = absent_nouns(names, generator)
+    absent = absent_object(names, generator, other_color=other_color, nouns=nouns)
     return None if absent is None else caption_of_moving([absent], names, generator)

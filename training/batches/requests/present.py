@@ -10,16 +10,25 @@ from jaxtyping import Bool, UInt8
 from torch import Tensor
 
 from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.cutout_nouns import ALL_NOUNS, CUTOUT_NOUNS
 from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.random_draws import draw_share
 from diff4splat.captions.vocabulary import NOUNS, UNSEEN_NOUNS
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
+from diff4splat.training.losses.object_mask import UNKNOWN_NAME
 
-AREA_SHARES = (0.003, 0.4)
+AREA_SHARES = (0.003, 0.7)
 """Smallest and largest share of the image that an object is asked for with."""
 TRAINING_NOUNS = tuple(noun for noun in NOUNS if noun not in UNSEEN_NOUNS)
 """Nouns that may be asked for where they are absent: one that is only ever asked for so would seem
 to be never there."""
+
+
+def absent_nouns(objects: list[NamedObject], generator: torch.Generator) -> tuple[str, ...]:
+    """Nouns to ask for where they are absent: those of cutouts half of the time beside cutouts."""
+    has_cutouts = any(one.noun in CUTOUT_NOUNS for one in objects)
+    return CUTOUT_NOUNS if has_cutouts and draw_share(generator) < 0.5 else TRAINING_NOUNS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,11 +48,11 @@ class PresentObject:
 
 
 def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[PresentObject]:
-    """Objects with a noun of captions in an image of ``View.instances``."""
+    """Objects with a noun of captions or cutouts in an image of ``View.instances``."""
     return [
         PresentObject(named=NamedObject(note.color, note.name), mask=mask, moves=bool(note.motion))
         for note, mask in present_objects(clip, instances, PRESENT_SHARE)
-        if note.name in NOUNS
+        if note.name in ALL_NOUNS
     ]
 
 
@@ -53,6 +62,10 @@ def name_maps(
     """Noun and colour of every pixel, as ``RequestBatch`` has them; ``empty`` masks nothing."""
     nouns, colors = (torch.zeros(empty.shape, dtype=torch.uint8) for _ in range(2))
     for one in objects:
-        nouns[one.mask] = 1 + NOUNS.index(one.named.noun)
-        colors[one.mask] = 1 + COLOR_NAMES.index(one.named.color)
+        nouns[one.mask] = _number(one.named.noun, NOUNS)
+        colors[one.mask] = _number(one.named.color, COLOR_NAMES)
     return nouns, colors
+
+
+def _number(name: str, names: tuple[str, ...]) -> int:
+    return 1 + names.index(name) if name in names else UNKNOWN_NAME

@@ -19,7 +19,7 @@ class RequestBatch:
     images: UInt8[Tensor, "b h w 3"]
     masks: Bool[Tensor, "b r h w"]
     nouns: UInt8[Tensor, "b h w"]
-    """1 + index in ``vocabulary.NOUNS`` of what a pixel shows; 0 for all else."""
+    """1 + index in ``vocabulary.NOUNS`` of what a pixel shows; 0 for none, or ``UNKNOWN_NAME``."""
     colors: UInt8[Tensor, "b h w"]
     """1 + index in ``colors.COLOR_NAMES``."""
     objects: UInt8[Tensor, "b h w"]

@@ -24,6 +24,7 @@ from diff4splat.training.batches.sources import (
     EndlessClips,
     FolderClips,
     open_source,
+    unused_sources,
     world_clips,
 )
 from diff4splat.training.recipe.data import DataSettings, SourceSettings
@@ -181,6 +182,19 @@ def test_a_source_of_no_weight_is_never_asked() -> None:
     given_ = (SourceSettings(weight=0.0), SourceSettings())
     samples = ClipSamples(recipe(*given_), 0, [Counting(exact_clip(0, True))] * 2)
     assert {samples._source(index) for index in range(50)} == {1}
+
+
+def test_folders_that_give_no_clip_are_named(tmp_path: Path, folder: Path) -> None:
+    stills = write_shards(tmp_path / "stills", still=2, moving=0)
+    shards = [
+        SourceSettings(kind="shards", folder=str(one), still_share=share, weight=weight)
+        for one, share, weight in ((folder, 0.0, 1), (stills, 0.0, 1), (stills, 0.0, 0))
+    ]
+    (line,) = unused_sources(replace(DATA, sources=tuple(shards)))
+    assert str(stills) in line and "moving clips" in line and "still_share" in line
+    fitting = replace(shards[1], still_share=0.5)
+    assert not unused_sources(replace(DATA, sources=(shards[0], fitting)))
+    assert not unused_sources(replace(DATA, sources=(shards[1],)))
 
 
 def test_samples_say_which_source_they_come_from(folder: Path) -> None:

@@ -10,6 +10,7 @@ from diff4splat.training.losses.object_mask import (
     INSTANCE_WEIGHT,
     NO_NAME_WEIGHT,
     SMOOTHING_PX,
+    UNKNOWN_NAME,
     cross_entropy,
     dice_error,
     instance_error,
@@ -83,6 +84,16 @@ def test_names_are_weighted_pixel_by_pixel() -> None:
             weight += own
     assert float(name_error(logits, names)) == pytest.approx(total / weight)
     assert torch.autograd.gradcheck(lambda x: name_error(x, names), logits.requires_grad_())
+
+
+def test_pixels_of_unknown_name_do_not_count() -> None:
+    logits = torch.randn(1, 4, 2, 3, generator=torch.Generator().manual_seed(0)).double()
+    names = torch.tensor([[[0, 1, UNKNOWN_NAME], [2, 0, UNKNOWN_NAME]]])
+    assert torch.equal(name_error(logits, names), name_error(logits[..., :2], names[..., :2]))
+    nothing = logits.requires_grad_()
+    error = name_error(nothing, torch.full((1, 2, 3), UNKNOWN_NAME))
+    error.sum().backward()
+    assert float(error.detach()) == 0 and not bool(nothing.grad.any())
 
 
 def instances_of(logits: Tensor, masks: Tensor) -> Tensor:

@@ -5,12 +5,18 @@ import torch
 from torch import Tensor
 
 from diff4splat.captions.colors import COLOR_NAMES
+from diff4splat.captions.cutout_nouns import CUTOUT_NOUNS
 from diff4splat.captions.grammar import NamedObject, parse_caption
 from diff4splat.captions.synonyms import names
 from diff4splat.errors import InputError
 from diff4splat.training.batches.requests import image_requests
 from diff4splat.training.batches.requests.image_requests import ImageRequest, draw_image_requests
-from diff4splat.training.batches.requests.present import TRAINING_NOUNS, PresentObject
+from diff4splat.training.batches.requests.present import (
+    TRAINING_NOUNS,
+    PresentObject,
+    name_maps,
+)
+from diff4splat.training.losses.object_mask import UNKNOWN_NAME
 
 SIDE = 20
 EMPTY = torch.zeros(SIDE, SIDE, dtype=torch.bool)
@@ -122,3 +128,42 @@ def test_of_an_unknown_noun_the_colour_says_what_moves(monkeypatch: pytest.Monke
         assert not said and not {one.named.noun for one in OBJECTS} & set(request.caption.split())
         seen.add(color)
     assert seen > {"none", "red", "blue", "green"} and not seen & {"turquoise", "orange"}
+
+
+CUTOUTS = [
+    present("", "cat", _square(0, 0, 8)),
+    present("red", "apple", _square(10, 10, 8)),
+]
+"""The cat has several colours."""
+
+
+@pytest.mark.usefixtures("known")
+def test_an_object_of_several_colours_is_asked_for_by_its_noun() -> None:
+    asked = [request for request in drawn(CUTOUTS) if torch.equal(request.mask, CUTOUTS[0].mask)]
+    assert len(asked) > 60
+    for request in asked:
+        words = set(request.caption.replace(",", " ").split())
+        subject = words - {"red"} if "apple" in words else words
+        assert "cat" in words and not set(COLOR_NAMES) & subject, request.caption
+
+
+@pytest.mark.usefixtures("known")
+def test_no_colour_alone_asks_beside_an_object_of_several() -> None:
+    asked = [request for request in drawn(CUTOUTS) if torch.equal(request.mask, CUTOUTS[1].mask)]
+    assert asked and all("apple" in request.caption for request in asked)
+
+
+def test_absent_nouns_are_those_of_cutouts_too_beside_cutouts() -> None:
+    nouns = set(CUTOUT_NOUNS) - {"cat", "apple", "animal"}
+    absent = [r.caption for r in drawn(CUTOUTS, 600) if not bool(r.mask.any())]
+    assert sum(any(f" {noun} " in f" {text} " for noun in nouns) for text in absent) > 20
+    worlds = " ".join(request.caption for request in drawn(OBJECTS, 600))
+    assert not {"astronaut", "zebra", "accordion"} & set(worlds.split())
+
+
+def test_names_without_a_number_are_marked() -> None:
+    nouns, colors = name_maps(CUTOUTS, EMPTY)
+    assert (nouns[:8, :8] == UNKNOWN_NAME).all() and (colors[:8, :8] == UNKNOWN_NAME).all()
+    assert (nouns[10:18, 10:18] == UNKNOWN_NAME).all()
+    assert (colors[10:18, 10:18] == 1 + COLOR_NAMES.index("red")).all()
+    assert nouns[0, 10] == 0 and colors[0, 10] == 0

@@ -1,0 +1,1 @@
+"""Named cutouts, pasted over photographs: images that teach names of objects."""

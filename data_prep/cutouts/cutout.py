@@ -1,0 +1,100 @@
+"""Cutouts: images of one object with transparency, and the noun of each.
+
+Axes: ``h w`` pixels.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float32
+
+from diff4splat.captions.colors import COLOR_NAMES, color_numbers
+from diff4splat.captions.cutout_nouns import ALL_NOUNS
+from diff4splat.captions.srgb import linear_from_srgb
+from diff4splat.errors import FileFormatError, InputError
+
+FLUENT_EMOJI = Path(__file__).parent / "fluent_emoji.json"
+"""Nouns of the images of npm package ``@lobehub/fluent-emoji-3d`` (MIT), but for objects of the
+families that no training shows."""
+OPAQUE = 0.5
+MAIN_COLOR_SHARE = 0.5
+"""Share of an object's pixels from which it has the name of their colour."""
+_SUFFIXES = (".png", ".webp")
+_COLOR_SIDE_PX = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cutout:
+    """One object, as large as its image."""
+
+    noun: str
+    rgba: Float32[np.ndarray, "h w 4"]
+    """sRGB in [0, 1], not multiplied by the opacity."""
+
+
+def read_names(file: Path) -> dict[str, str]:
+    """File names without their suffix → nouns, from JSON.
+
+    Raises:
+        FileFormatError: the file is no such table, or has a noun that captions do not know.
+    """
+    try:
+        table = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise FileFormatError(f"{file}: expected JSON, got {error}") from error
+    if not isinstance(table, dict) or not all(isinstance(noun, str) for noun in table.values()):
+        raise FileFormatError(f'{file}: expected {{"file name": "noun", ...}}, got something else')
+    unknown = sorted(set(table.values()) - set(ALL_NOUNS))
+    if unknown:
+        raise FileFormatError(
+            f"{file}: expected nouns that captions know, got {', '.join(unknown[:5])}; "
+            "use others, or add them to captions/cutout_nouns.py"
+        )
+    return table
+
+
+def find_cutouts(folder: Path, names: dict[str, str]) -> dict[Path, str]:
+    """The named images of a folder and their nouns, in order of file names.
+
+    Raises:
+        InputError: none of the names is there.
+    """
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in _SUFFIXES)
+    found = {file: names[file.stem] for file in files if file.stem in names}
+    if not found:
+        raise InputError(
+            f"{folder}: expected PNG or WebP images with names of the table, got none of "
+            f"{len(names)}; check the folder and --names"
+        )
+    return found
+
+
+def read_cutout(file: Path, noun: str) -> Cutout:
+    """The object, without the empty rows and columns around it.
+
+    Raises:
+        FileFormatError: damaged, without transparency, or wholly transparent.
+    """
+    pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or pixels.ndim != 3 or pixels.shape[2] != 4 or pixels.dtype != np.uint8:
+        raise FileFormatError(f"{file}: expected an image of 8 bits with transparency")
+    rgba = cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGBA).astype(np.float32) / 255
+    opaque = rgba[..., 3] > OPAQUE
+    if not opaque.any():
+        raise FileFormatError(f"{file}: expected an object, got transparent pixels alone")
+    rows, columns = (np.flatnonzero(opaque.any(axis)) for axis in (1, 0))
+    return Cutout(noun=noun, rgba=rgba[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
+
+
+def main_color(cutout: Cutout) -> str:
+    """Name of the colour of most pixels; empty for an object of several."""
+    small = cv2.resize(cutout.rgba, (_COLOR_SIDE_PX, _COLOR_SIDE_PX), interpolation=cv2.INTER_AREA)
+    pixels = small[small[..., 3] > OPAQUE][:, :3]
+    if not len(pixels):
+        return ""
+    counts = np.bincount(color_numbers(linear_from_srgb(pixels.astype(np.float64))))
+    most = int(counts.argmax())
+    return COLOR_NAMES[most] if counts[most] >= MAIN_COLOR_SHARE * len(pixels) else ""

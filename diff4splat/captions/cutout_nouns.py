@@ -1,0 +1,48 @@
+"""Nouns of objects that training knows from cutouts alone (``prepare cutouts``)."""
+
+from diff4splat.captions.vocabulary import NOUNS
+
+CUTOUT_NOUNS = tuple(
+    """
+abacus, accordion, alien, ambulance, anchor, angel, ant, apple, astronaut, aubergine, avocado,
+axe, baby, backpack, bacon, badger, bag, bagel, banana, banjo, barber pole, basket, bat,
+bathtub, battery, bean, bear, beaver, bed, bee, beetle, bell, bicycle, bin, bison, boar, boat,
+bomb, bone, book, boomerang, boot, bouquet, boy, brain, bread, brick, briefcase, broccoli,
+broom, brush, bucket, buffalo, burger, burrito, bus, butter, butterfly, cabinet, cactus, cake,
+camel, candle, candy, canoe, cap, carrot, castle, cat, cheese, cherry, chestnut, chick, chicken,
+chicken leg, child, chili pepper, chocolate, church, clipboard, clock, cloud, coat, cockroach,
+cocktail glass, coconut, coffin, coin, comb, compass, computer, computer mouse, cook, cookie,
+cow, crab, crayon, cricket, crocodile, croissant, crown, crystal ball, cucumber, cupcake,
+cyclist, dagger, dancer, deer, diamond, die, dinosaur, disc, disk, doctor, dodo, dog, doll,
+dolphin, donkey, door, doughnut, dragon, dress, duck, dumpling, eagle, ear, egg, elephant, elf,
+envelope, eye, face, fairy, fan, farmer, fax machine, feather, ferris wheel, fire, fire engine,
+fire extinguisher, firecracker, firefighter, fishing rod, fist, flamingo, flute, foot, fountain,
+fox, fries, frog, fuel pump, game controller, garlic, ghost, giraffe, girl, glass, glasses,
+glove, goat, goggles, golfer, goose, gorilla, gourd, grapes, guard, guitar, hammer, hamster,
+hand, hat, headphones, headstone, hedgehog, helicopter, helmet, hippo, honey jar, hook, horn,
+horse, hot dog, hourglass, hut, ice cream, ice cube, jar, jeep, jellyfish, joystick, kangaroo,
+key, keyboard, kite, kiwi, knife, koala, ladder, ladybird, lantern, laptop, leaf, leg, lemon,
+leopard, letter box, light bulb, lion, lipstick, lizard, llama, lobster, lock, log, lollipop,
+magnet, magnifying glass, mammoth, man, mango, maracas, mechanic, medal, megaphone, melon,
+microphone, microscope, mirror, monkey, moose, mosque, motorcycle, mouse, nest, newspaper, nose,
+notebook, octopus, olive, onion, orange fruit, orangutan, otter, owl, ox, painter, palette, palm
+tree, pan, pancake, panda, paperclip, parachute, parrot, pawn, peach, peacock, pear, pen,
+pencil, penguin, pepper, person, petri dish, phone, piano, pickaxe, pie, pig, pill, pin, pinata,
+pineapple, pizza, plane, plate, plug, plunger, police officer, popcorn, potato, pretzel, prince,
+princess, printer, projector, pudding, puzzle piece, rabbit, raccoon, racket, radio, ram, rat,
+razor, rhino, rice ball, rickshaw, ring, robot, rocket, roller skate, rooster, rose, ruler,
+runner, sailboat, salt shaker, sandal, sandwich, satellite, satellite dish, saxophone, scales,
+scarf, scissors, scooter, scorpion, screw, screwdriver, scroll, seal, shark, sheep, shell,
+shield, ship, shirt, shoe, shrimp, sign, skate, skateboard, ski, skier, skull, skunk, sled,
+sloth, snail, snowboarder, snowman, soap, sock, spaceship, speaker, spider, sponge, spool,
+spoon, squid, squirrel, statue, steak, stethoscope, stone, strawberry, student, suitcase,
+sunflower, surfer, sushi, swan, syringe, taco, target, teapot, teddy bear, telephone, telescope,
+television, tent, test tube, tie, tiger, toilet, tomato, toolbox, tooth, toothbrush, torch,
+tractor, traffic light, train, tram, trolley, trophy, trousers, truck, trumpet, turkey, turtle,
+umbrella, unicorn, vampire, van, vest, violin, waffle, wand, watermelon, whale, wheel,
+wheelchair, window, wine glass, wizard, wolf, woman, worker, wrench, x-ray, yo-yo, zebra, zombie
+""".replace("\n", " ")
+    .strip()
+    .split(", ")
+)
+ALL_NOUNS = (*NOUNS, *CUTOUT_NOUNS)
