@@ -5,6 +5,7 @@ Axes: ``h w`` pixels.
 
 import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -16,14 +17,22 @@ from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.captions.srgb import linear_from_srgb
 from diff4splat.errors import FileFormatError, InputError
 
-FLUENT_EMOJI = Path(__file__).parent / "fluent_emoji.json"
-"""Nouns of the images of npm package ``@lobehub/fluent-emoji-3d`` (MIT), but for objects of the
-families that no training shows."""
+PUBLIC_NAMES = {
+    "fluent-emoji": Path(__file__).parent / "fluent_emoji.json",
+    "openclipart": Path(__file__).parent / "openclipart.json",
+}
+"""Nouns of npm package ``@lobehub/fluent-emoji-3d`` (MIT) and of Debian package
+``openclipart-png`` (public domain)."""
 OPAQUE = 0.5
+MOST_SIDE_PX = 256
+"""Larger images are reduced: an object is shown with fewer pixels."""
 MAIN_COLOR_SHARE = 0.5
 """Share of an object's pixels from which it has the name of their colour."""
 _SUFFIXES = (".png", ".webp")
 _COLOR_SIDE_PX = 32
+_LEAST_OPACITY = 1e-6
+_KEPT = 1500
+"""Cutouts in memory, of at most a megabyte: some files take half a second to decode."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +45,7 @@ class Cutout:
 
 
 def read_names(file: Path) -> dict[str, str]:
-    """File names without their suffix → nouns, from JSON.
+    """Paths within the folder of cutouts, without their suffix → nouns, from JSON.
 
     Raises:
         FileFormatError: the file is no such table, or has a noun that captions do not know.
@@ -62,8 +71,9 @@ def find_cutouts(folder: Path, names: dict[str, str]) -> dict[Path, str]:
     Raises:
         InputError: none of the names is there.
     """
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in _SUFFIXES)
-    found = {file: names[file.stem] for file in files if file.stem in names}
+    files = sorted(file for file in folder.rglob("*") if file.suffix.lower() in _SUFFIXES)
+    keys = {file: file.relative_to(folder).with_suffix("").as_posix() for file in files}
+    found = {file: names[key] for file, key in keys.items() if key in names}
     if not found:
         raise InputError(
             f"{folder}: expected PNG or WebP images with names of the table, got none of "
@@ -72,6 +82,7 @@ def find_cutouts(folder: Path, names: dict[str, str]) -> dict[Path, str]:
     return found
 
 
+@lru_cache(maxsize=_KEPT)
 def read_cutout(file: Path, noun: str) -> Cutout:
     """The object, without the empty rows and columns around it.
 
@@ -81,12 +92,26 @@ def read_cutout(file: Path, noun: str) -> Cutout:
     pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.ndim != 3 or pixels.shape[2] != 4 or pixels.dtype != np.uint8:
         raise FileFormatError(f"{file}: expected an image of 8 bits with transparency")
-    rgba = cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGBA).astype(np.float32) / 255
-    opaque = rgba[..., 3] > OPAQUE
+    opaque = pixels[..., 3] > 255 * OPAQUE
     if not opaque.any():
         raise FileFormatError(f"{file}: expected an object, got transparent pixels alone")
     rows, columns = (np.flatnonzero(opaque.any(axis)) for axis in (1, 0))
-    return Cutout(noun=noun, rgba=rgba[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
+    part = pixels[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    rgba = cv2.cvtColor(part, cv2.COLOR_BGRA2RGBA).astype(np.float32) / 255
+    return Cutout(noun=noun, rgba=_reduced(rgba))
+
+
+def _reduced(rgba: Float32[np.ndarray, "h w 4"]) -> Float32[np.ndarray, "p q 4"]:
+    """No larger than ``MOST_SIDE_PX``; colours weigh by their opacity."""
+    scale = MOST_SIDE_PX / max(rgba.shape[:2])
+    if scale >= 1:
+        return rgba
+    sides = tuple(max(1, round(scale * side)) for side in rgba.shape[1::-1])
+    opacity = np.maximum(rgba[..., 3:], _LEAST_OPACITY)
+    small = cv2.resize(
+        np.concatenate([rgba[..., :3] * opacity, opacity], -1), sides, interpolation=cv2.INTER_AREA
+    )
+    return np.concatenate([small[..., :3] / small[..., 3:], small[..., 3:]], -1)
 
 
 def main_color(cutout: Cutout) -> str:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -46,7 +46,7 @@ class PrepareCutouts:
     """Paste named cutouts over photographs, to teach names of objects."""
 
     cutouts: Annotated[Path, tyro.conf.Positional, InputPath(what="a folder", file=False)]
-    """Folder of PNG or WebP images of one object each, with transparency."""
+    """Folder of PNG or WebP images of one object each, with transparency, and its subfolders."""
     photographs: Annotated[Path, InputPath(what="a folder of photographs", file=False)]
     """Folder of photographs: backgrounds, and textures of the objects."""
     out: OutFolder
@@ -54,7 +54,10 @@ class PrepareCutouts:
     license: str
     """SPDX name of the licence of cutouts and photographs, such as MIT."""
     names: Annotated[Path | None, InputPath(what="a table of names", folder=False)] = None
-    """JSON: file names without suffix, and nouns. Default: those of the Fluent emoji (3D)."""
+    """JSON: paths in the folder of cutouts, without suffix, and nouns. Default: --package."""
+    package: Literal["fluent-emoji", "openclipart"] = "fluent-emoji"
+    """Which public set of cutouts the folder holds: npm @lobehub/fluent-emoji-3d or Debian
+    openclipart-png."""
     images: Annotated[int, Number(least=1)] = 8000
     """Number of images."""
     size: Annotated[int, Number(least=16, most=4096)] = 128
@@ -68,12 +71,12 @@ class PrepareCutouts:
         """Compose, write, and write a contact sheet."""
         from diff4splat.cli.common.console import ConsolePhases, note
         from diff4splat.data_prep.clip_sheet import write_clip_sheet
-        from diff4splat.data_prep.cutouts.cutout import FLUENT_EMOJI
+        from diff4splat.data_prep.cutouts.cutout import PUBLIC_NAMES
         from diff4splat.data_prep.cutouts.write import CutoutJob, write_cutouts
 
         job = CutoutJob(
             cutouts=self.cutouts,
-            names=self.names or FLUENT_EMOJI,
+            names=self.names or PUBLIC_NAMES[self.package],
             photographs=self.photographs,
             folder=self.out,
             license=self.license,

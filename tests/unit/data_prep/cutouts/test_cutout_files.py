@@ -8,11 +8,13 @@ import pytest
 from PIL import Image
 
 from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.cutout_nouns import ALL_NOUNS
+from diff4splat.captions.cutout_nouns import ALL_NOUNS, CUTOUT_NOUNS
 from diff4splat.captions.synonyms import names
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.data_prep.cutouts.cutout import (
-    FLUENT_EMOJI,
+    MOST_SIDE_PX,
+    PUBLIC_NAMES,
+    Cutout,
     find_cutouts,
     main_color,
     read_cutout,
@@ -42,8 +44,6 @@ def test_an_object_of_several_colours_has_no_colour() -> None:
     stripes = Image.new("RGBA", (32, 30), "red")
     for place, color in enumerate(("green", "blue")):
         stripes.paste(Image.new("RGBA", (32, 10), color), (0, 10 * (1 + place)))
-    from diff4splat.data_prep.cutouts.cutout import Cutout
-
     rgba = np.asarray(stripes, np.float32) / 255
     assert main_color(Cutout(noun="ball", rgba=rgba)) == ""
     nothing = np.zeros((4, 4, 4), np.float32)
@@ -78,9 +78,26 @@ def test_pictures_without_a_name_are_passed_over(tmp_path: Path) -> None:
         find_cutouts(tmp_path, {"c": "apple"})
 
 
-def test_the_table_of_emoji_names_no_family_of_test_worlds() -> None:
-    table = read_names(FLUENT_EMOJI)
-    assert len(table) > 1000 and set(table.values()) <= set(ALL_NOUNS)
+@pytest.mark.parametrize("package", PUBLIC_NAMES)
+def test_tables_of_public_cutouts_name_no_family_of_test_worlds(package: str) -> None:
+    file = PUBLIC_NAMES[package]
+    table = read_names(file)
+    assert len(table) > 500 and set(table.values()) <= set(ALL_NOUNS)
     hidden = {name for noun in UNSEEN_NOUNS for name in names(noun)}
     assert hidden.isdisjoint(table.values())
-    assert list(table) == sorted(table) == list(json.loads(FLUENT_EMOJI.read_text()))
+    assert list(table) == sorted(table) == list(json.loads(file.read_text()))
+
+
+def test_every_noun_of_cutouts_has_one() -> None:
+    tables = [read_names(file) for file in PUBLIC_NAMES.values()]
+    assert set(CUTOUT_NOUNS) <= {noun for table in tables for noun in table.values()}
+
+
+def test_cutouts_of_subfolders_are_found_and_large_ones_reduced(tmp_path: Path) -> None:
+    (tmp_path / "fruit").mkdir()
+    large = Image.new("RGBA", (700, 350), (255, 0, 0, 255))
+    large.save(tmp_path / "fruit" / "a.png")
+    (file,) = find_cutouts(tmp_path, {"fruit/a": "apple"})
+    cutout = read_cutout(file, "apple")
+    assert cutout.rgba.shape == (MOST_SIDE_PX // 2, MOST_SIDE_PX, 4)
+    assert np.allclose(cutout.rgba, [1, 0, 0, 1], atol=1e-5)
