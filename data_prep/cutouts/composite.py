@@ -45,12 +45,17 @@ def compose(
     cutouts: list[Cutout],
     size_px: tuple[int, int],
     random: np.random.Generator,
+    keep_colors: bool = False,
 ) -> Composite:
-    """``cutouts`` before a part of the photograph; those hidden by later ones keep their number."""
+    """``cutouts`` before a part of the photograph; those hidden by later ones keep their number.
+
+    ``keep_colors`` leaves out other colours and textures.
+    """
     image = _part(photograph, size_px, random).astype(np.float32) / 255
     numbers = np.zeros(size_px, np.uint8)
     objects: list[PastedObject] = []
-    for cutout, layer in _layers(photograph, cutouts, size_px, random):
+    texture = None if keep_colors else photograph
+    for cutout, layer in _layers(texture, cutouts, size_px, random):
         objects.append(PastedObject(noun=cutout.noun, color=main_color(cutout)))
         image = _over(layer, _with_shadow(image, layer[..., 3], random))
         numbers[layer[..., 3] > OPAQUE] = len(objects)
@@ -59,7 +64,7 @@ def compose(
 
 
 def _layers(
-    photograph: UInt8[np.ndarray, "p q 3"],
+    texture: UInt8[np.ndarray, "p q 3"] | None,
     cutouts: list[Cutout],
     size_px: tuple[int, int],
     random: np.random.Generator,
@@ -67,8 +72,11 @@ def _layers(
     """Objects and their layers, those of many pixels first: they lie behind."""
     layers = []
     for cutout in cutouts:
-        changed = recolored(cutout, random)
-        shown = lit(textured(changed, photograph, random), random)
+        changed = shown = cutout
+        if texture is not None:
+            changed = recolored(cutout, random)
+            shown = textured(changed, texture, random)
+        shown = lit(shown, random)
         layers.append((changed, placed(shown, draw_placement(shown, size_px, random), size_px)))
     return sorted(layers, key=lambda one: -float(one[1][..., 3].sum()))
 

@@ -42,6 +42,8 @@ class CutoutJob:
     images: int
     size_px: int = 128
     seed: int = 0
+    keep_colors: bool = False
+    """Of the cutouts; otherwise some get others, and textures."""
 
     def __post_init__(self) -> None:
         if self.images < 1 or self.size_px < 8 or self.seed < 0:
@@ -70,7 +72,7 @@ def write_cutouts(job: CutoutJob, phases: Phases, append: bool = False) -> int:
                 file = photographs[int(random.integers(len(photographs)))]
                 photograph = to_bytes(read_photo(file, convert=True).rgb)
                 sides = (job.size_px, job.size_px)
-                composite = compose(photograph, chosen, sides, random)
+                composite = compose(photograph, chosen, sides, random, job.keep_colors)
                 writer.write(clip_of(composite, identifier(job, number), job.license))
                 advance()
     return len(left)

@@ -64,6 +64,8 @@ class PrepareCutouts:
     """Side in pixels."""
     seed: Annotated[int, Number(least=0)] = 0
     """Random seed of what is pasted where."""
+    keep_colors: bool = False
+    """Give no cutout other colours or textures: to measure, not to train."""
     append: bool = False
     """Add to an existing folder; existing images are kept."""
 
@@ -83,6 +85,7 @@ class PrepareCutouts:
             images=self.images,
             size_px=self.size,
             seed=self.seed,
+            keep_colors=self.keep_colors,
         )
         written = write_cutouts(job, ConsolePhases(), self.append)
         write_clip_sheet(self.out, self.out / "clips.png")

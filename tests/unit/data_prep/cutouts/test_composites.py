@@ -34,11 +34,9 @@ def test_equal_seeds_give_equal_images() -> None:
 
 
 def test_numbers_mark_the_pixels_that_show_the_object(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("recolored", "lit"):
-        monkeypatch.setattr(composite, name, lambda one, random: one)
-    monkeypatch.setattr(composite, "textured", lambda one, photo, random: one)
+    monkeypatch.setattr(composite, "lit", lambda one, random: one)
     black = np.zeros((80, 80, 3), np.uint8)
-    seen = compose(black, [cutout((0.0, 0.0, 1.0))], SIZE, np.random.default_rng(1))
+    seen = compose(black, [cutout((0.0, 0.0, 1.0))], SIZE, np.random.default_rng(1), True)
     assert seen.rgb.shape == (*SIZE, 3) and seen.numbers.shape == SIZE
     assert set(np.unique(seen.numbers)) == {0, 1}
     assert np.array_equal(seen.rgb[..., 2] > 127, seen.numbers == 1)
