@@ -61,7 +61,8 @@ def _draw(
     empty: Bool[Tensor, "h w"],
     generator: torch.Generator,
 ) -> ImageRequest:
-    if kind == "unknown" and any(one.moves or one.named.color for one in objects):
+    kind = _possible(kind, objects)
+    if kind == "unknown":
         return _unknown_noun(objects, empty, generator)
     chosen = _chosen(kind, objects, generator)
     names = [one.named for one in objects]
@@ -70,6 +71,14 @@ def _draw(
         return ImageRequest(caption=_caption(names, chosen, generator), mask=mask)
     caption = None if kind == "static" else _absent_caption(names, generator)
     return ImageRequest(caption=caption or caption_of_static(names, generator), mask=empty)
+
+
+def _possible(kind: str, objects: list[PresentObject]) -> str:
+    """Images in which nothing moves, or has one colour, ask for named objects instead."""
+    moves = any(one.moves for one in objects)
+    colored = any(one.named.color for one in objects)
+    able = {"moving": moves, "unknown": moves or colored}.get(kind, True)
+    return kind if able or not objects else "named"
 
 
 def _chosen(kind: str, objects: list[PresentObject], generator: torch.Generator) -> list[int]:
