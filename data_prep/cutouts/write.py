@@ -16,8 +16,9 @@ from diff4splat.data.clip import Clip, ClipMetadata, ObjectNote, View
 from diff4splat.data.shard_writer import ShardOptions, ShardWriter
 from diff4splat.data_prep.cutouts.composite import Composite, PastedObject, compose
 from diff4splat.data_prep.cutouts.cutout import Cutout, find_cutouts, read_cutout, read_names
-from diff4splat.errors import ConfigError, InputError
+from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole, stack_cameras
+from diff4splat.io.photos.find import find_photographs
 from diff4splat.io.photos.images import read_photo
 from diff4splat.io.pixels import to_bytes
 from diff4splat.progress.phases import Phases
@@ -25,7 +26,6 @@ from diff4splat.progress.phases import Phases
 SOURCE = "diff4splat cutouts 1"
 COUNTS = (1, 1, 2, 2, 3, 3, 4, 5)
 """Cutouts of an image, one of these."""
-_PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +61,7 @@ def write_cutouts(job: CutoutJob, phases: Phases, append: bool = False) -> int:
         OutputError: the folder has clips and ``append`` is False, or cannot be written.
     """
     cutouts = list(find_cutouts(job.cutouts, read_names(job.names)).items())
-    photographs = find_photographs(job.photographs)
+    photographs = find_photographs(job.photographs, "--photographs")
     with ShardWriter(job.folder, ShardOptions(generator=SOURCE), append) as writer:
         names = {identifier(job, number): number for number in range(job.images)}
         left = [number for name, number in names.items() if name not in writer.identifiers]
@@ -81,21 +81,6 @@ def write_cutouts(job: CutoutJob, phases: Phases, append: bool = False) -> int:
 def identifier(job: CutoutJob, number: int) -> str:
     """Name of an image's clip."""
     return f"cutouts-{job.size_px}-{job.seed}-{number:06d}"
-
-
-def find_photographs(folder: Path) -> list[Path]:
-    """Photographs of a folder, by name.
-
-    Raises:
-        InputError: there are none.
-    """
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in _PHOTOGRAPHS)
-    if not files:
-        raise InputError(
-            f"{folder}: expected photographs ({', '.join(_PHOTOGRAPHS)}), got none; "
-            "correct --photographs"
-        )
-    return files
 
 
 def draw_cutouts(cutouts: list[tuple[Path, str]], random: np.random.Generator) -> list[Cutout]:

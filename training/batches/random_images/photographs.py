@@ -9,11 +9,9 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from diff4splat.errors import InputError
+from diff4splat.io.photos.find import find_photographs
 from diff4splat.io.photos.images import read_photo
 from diff4splat.io.pixels import to_bytes
-
-SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 
 
 def read_photographs(folder: Path, side_px: int) -> UInt8[Tensor, "n 3 s s"]:
@@ -22,12 +20,7 @@ def read_photographs(folder: Path, side_px: int) -> UInt8[Tensor, "n 3 s s"]:
     Raises:
         InputError: the folder has no photographs, or one cannot be read.
     """
-    files = sorted(file for file in folder.glob("*") if file.suffix.lower() in SUFFIXES)
-    if not files:
-        raise InputError(
-            f"{folder}: expected photographs ({', '.join(SUFFIXES)}), got none; "
-            "correct data.photographs or leave it out"
-        )
+    files = find_photographs(folder, "data.photographs or leave it out")
     squares = (middle_square(read_photo(file, convert=True).rgb, side_px) for file in files)
     return torch.stack([torch.from_numpy(to_bytes(square)) for square in squares])
 
