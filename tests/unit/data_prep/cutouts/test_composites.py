@@ -43,13 +43,31 @@ def test_numbers_mark_the_pixels_that_show_the_object(monkeypatch: pytest.Monkey
     assert seen.objects[0].noun == "apple" and seen.objects[0].color == "blue"
 
 
-def test_small_objects_lie_before_large_ones() -> None:
-    random = np.random.default_rng(0)
-    for _ in range(20):
-        one = compose(photograph(), [cutout(side=30), cutout(side=20)], SIZE, random)
-        shown = [int((one.numbers == number).sum()) for number in (1, 2)]
-        assert shown[1] > 0 or shown[0] > 0
-        assert len(one.objects) == 2
+def centred(one: Cutout, size_px: tuple[int, int], random: np.random.Generator) -> Placement:
+    """In the middle, as large as it is."""
+    half = 0.5 * np.array(one.rgba.shape[1::-1])
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    return Placement(
+        corners_px=(corners + np.array(size_px[::-1]) / 2).astype(np.float32), blur_px=0.0
+    )
+
+
+@pytest.mark.parametrize("sides", [(30, 20), (20, 30)])
+def test_small_objects_lie_before_large_ones(
+    monkeypatch: pytest.MonkeyPatch, sides: tuple[int, int]
+) -> None:
+    monkeypatch.setattr(composite, "draw_placement", centred)
+    cutouts = [cutout(side=side) for side in sides]
+    one = compose(photograph(), cutouts, SIZE, np.random.default_rng(0))
+    areas = [int((one.numbers == number).sum()) for number in (1, 2)]
+    assert areas == [30 * 30 - 20 * 20, 20 * 20] and len(one.objects) == 2
+
+
+def test_pixels_that_are_half_transparent_mix_with_the_photograph() -> None:
+    half = cutout((1.0, 0.5, 0.0))
+    half.rgba[..., 3] = 0.5
+    layer = placed(half, centred(half, SIZE, np.random.default_rng(0)), SIZE)
+    assert np.allclose(layer[24, 32], [0.5, 0.25, 0.0, 0.5], atol=1e-5)
 
 
 def test_without_cutouts_the_photograph_remains() -> None:

@@ -48,6 +48,14 @@ def test_images_are_clips_with_notes_of_their_objects(job: CutoutJob) -> None:
         assert set(view.instances.unique().tolist()) <= {0, *(note.instance for note in notes)}
 
 
+def test_every_image_is_another(job: CutoutJob) -> None:
+    write_cutouts(replace(job, images=20), Phases())
+    clips = [ClipFolder(job.folder).clip(index) for index in range(20)]
+    assert len({clip.views[0].rgb.numpy().tobytes() for clip in clips}) == 20
+    nouns = [note.name for clip in clips for note in clip.note.objects]
+    assert 8 < nouns.count("apple") < 20 and 8 < nouns.count("cat") < 20
+
+
 def test_a_stopped_run_goes_on_with_the_same_images(job: CutoutJob) -> None:
     write_cutouts(replace(job, images=3), Phases())
     with pytest.raises(OutputError, match="append"):
