@@ -61,7 +61,8 @@ def known_words() -> dict[str, tuple[str, ...]]:
 def _with_synonyms(
     words: tuple[str, ...], synonyms: Mapping[str, tuple[str, ...]]
 ) -> tuple[str, ...]:
-    return tuple(one for word in words for one in (word, *synonyms.get(word, ())))
+    every = (one for word in words for one in (word, *synonyms.get(word, ())))
+    return tuple(dict.fromkeys(every))
 
 
 def read_prompt(prompt: str) -> PromptWords:
