@@ -70,14 +70,23 @@ def rows(model: Model, images: list[AskedImage]) -> dict[str, dict[str, float]]:
         values: dict[str, list[float]] = defaultdict(list)
         for image in images:
             for sentence, truth in image.requests:
-                sample = motion_of(model, change(image.rgb), sentence)
-                kind = "present" if bool(truth.any()) else "absent"
-                values[kind].append(float(sample.probability.max()))
-                for column, value in measure(sample, truth).items():
-                    values[column].append(value)
-        table[name] = {column: sum(all_) / len(all_) for column, all_ in values.items()}
-        table[name]["auc"] = auc(values["present"], values["absent"])
+                collect(values, motion_of(model, change(image.rgb), sentence), truth)
+        table[name] = means(values)
     return table
+
+
+def collect(values: dict[str, list[float]], sample: MotionSample, truth: Tensor) -> None:
+    """Add what ``measure`` says, and the highest probability."""
+    kind = "present" if bool(truth.any()) else "absent"
+    values[kind].append(float(sample.probability.max()))
+    for column, value in measure(sample, truth).items():
+        values[column].append(value)
+
+
+def means(values: dict[str, list[float]]) -> dict[str, float]:
+    """Of every column, with the area under the curve."""
+    table = {column: sum(all_) / len(all_) for column, all_ in values.items()}
+    return table | {"auc": auc(values["present"], values["absent"])}
 
 
 def auc(present: list[float], absent: list[float]) -> float:

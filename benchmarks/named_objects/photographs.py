@@ -16,14 +16,20 @@ import skimage.data
 import torch
 from torch import Tensor
 
-from benchmarks.named_objects.__main__ import THRESHOLD, auc, measure, motion_of
+from benchmarks.named_objects.__main__ import (
+    COLUMNS,
+    THRESHOLD,
+    collect,
+    means,
+    measure,
+    motion_of,
+)
 from diff4splat.generation.plan import MOTION_PARTS
 from diff4splat.io.photos.images import write_png
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.model import Model, load_model
 
 OUTLINES = Path(__file__).with_name("photographs.json")
-COLUMNS = ("overlap", "found", "whole", "still", "auc")
 SHORT_SIDE_PX, MULTIPLE_PX = 128, 16
 TILE_PX, DARK, PER_ROW = (160, 224), 0.2, 3
 
@@ -80,15 +86,11 @@ def row(model: Model, asked: list[Asked]) -> tuple[dict[str, float], list[np.nda
     tiles = []
     for one in asked:
         sample = motion_of(model, one.rgb, one.sentence)
-        kind = "present" if bool(one.truth.any()) else "absent"
-        values[kind].append(float(sample.probability.max()))
-        measured = measure(sample, one.truth)
-        for column, value in measured.items():
-            values[column].append(value)
-        print(f"  {one.photograph}, {one.name}:", {k: round(v, 2) for k, v in measured.items()})
+        collect(values, sample, one.truth)
+        measured = {key: round(value, 2) for key, value in measure(sample, one.truth).items()}
+        print(f"  {one.photograph}, {one.name}:", measured)
         tiles.append(tile(one, sample.mask(THRESHOLD)))
-    means = {column: sum(values[column]) / len(values[column]) for column in COLUMNS[:-1]}
-    return means | {"auc": auc(values["present"], values["absent"])}, tiles
+    return means(values), tiles
 
 
 def tile(one: Asked, mask: Tensor) -> np.ndarray:
@@ -108,9 +110,9 @@ def main() -> None:
     asked, columns = all_asked(), []
     lines = ["| model |" + " | ".join(COLUMNS) + " |", "|---|" + "---:|" * len(COLUMNS)]
     for name in options.models:
-        means, tiles = row(load_model(name, parts=MOTION_PARTS), asked)
+        values, tiles = row(load_model(name, parts=MOTION_PARTS), asked)
         columns.append(tiles)
-        lines.append(f"| {name} | " + " | ".join(f"{means[c]:.3f}" for c in COLUMNS) + " |")
+        lines.append(f"| {name} | " + " | ".join(f"{values[c]:.3f}" for c in COLUMNS) + " |")
     print("\n".join(lines))
     if options.out:
         groups = [np.concatenate(group, 1) for group in zip(*columns, strict=True)]

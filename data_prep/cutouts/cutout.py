@@ -65,21 +65,24 @@ def read_names(file: Path) -> dict[str, str]:
     return table
 
 
-def find_cutouts(folder: Path, names: dict[str, str]) -> dict[Path, str]:
-    """The named images of a folder and their nouns, in order of file names.
+def find_cutouts(folder: Path, names: dict[str, str]) -> dict[str, list[Path]]:
+    """Nouns, in order, and the images that a folder has of each, in order of their paths.
 
     Raises:
         InputError: none of the names is there.
     """
     files = sorted(file for file in folder.rglob("*") if file.suffix.lower() in _SUFFIXES)
     keys = {file: file.relative_to(folder).with_suffix("").as_posix() for file in files}
-    found = {file: names[key] for file, key in keys.items() if key in names}
+    found: dict[str, list[Path]] = {}
+    for file, key in keys.items():
+        if key in names:
+            found.setdefault(names[key], []).append(file)
     if not found:
         raise InputError(
             f"{folder}: expected PNG or WebP images with names of the table, got none of "
             f"{len(names)}; check the folder and --names"
         )
-    return found
+    return dict(sorted(found.items()))
 
 
 @lru_cache(maxsize=_KEPT)

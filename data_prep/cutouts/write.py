@@ -60,7 +60,7 @@ def write_cutouts(job: CutoutJob, phases: Phases, append: bool = False) -> int:
         FileFormatError, InputError: a table, a cutout or a photograph cannot be used.
         OutputError: the folder has clips and ``append`` is False, or cannot be written.
     """
-    cutouts = list(find_cutouts(job.cutouts, read_names(job.names)).items())
+    cutouts = find_cutouts(job.cutouts, read_names(job.names))
     photographs = find_photographs(job.photographs, "--photographs")
     with ShardWriter(job.folder, ShardOptions(generator=SOURCE), append) as writer:
         names = {identifier(job, number): number for number in range(job.images)}
@@ -83,13 +83,13 @@ def identifier(job: CutoutJob, number: int) -> str:
     return f"cutouts-{job.size_px}-{job.seed}-{number:06d}"
 
 
-def draw_cutouts(cutouts: list[tuple[Path, str]], random: np.random.Generator) -> list[Cutout]:
+def draw_cutouts(cutouts: dict[str, list[Path]], random: np.random.Generator) -> list[Cutout]:
     """One to five; every noun is as likely as another, however many cutouts it has."""
-    nouns = sorted({noun for _, noun in cutouts})
+    nouns = list(cutouts)
     count = min(int(random.choice(COUNTS)), len(nouns))
     chosen = []
     for index in random.choice(len(nouns), count, replace=False):
-        files = [file for file, noun in cutouts if noun == nouns[index]]
+        files = cutouts[nouns[index]]
         file = files[int(random.integers(len(files)))]
         chosen.append(read_cutout(file, nouns[index]))
     return chosen

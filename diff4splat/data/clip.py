@@ -82,6 +82,7 @@ class ObjectNote:
     name: str
     """Family, such as ``torus``."""
     color: str
+    """Empty for an object of several colours."""
     motion: str
     """Such as ``rolls to the left``; ``""`` is static."""
     object_number: int = 0

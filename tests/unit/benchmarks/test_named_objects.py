@@ -1,12 +1,14 @@
 """Requests of the benchmark of named objects, and what it measures of a mask."""
 
+import json
 import math
+from collections import defaultdict
 
 import pytest
 import torch
 from oracles_clips import make_clip
 
-from benchmarks.named_objects.__main__ import auc, measure
+from benchmarks.named_objects.__main__ import auc, collect, means, measure
 from benchmarks.named_objects.requests import asked_image
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.flow.guidance import CallCount
@@ -53,3 +55,27 @@ def test_every_object_can_be_asked_for() -> None:
     few, all_ = (asked_image(make_clip(), most_objects=most) for most in (1, 99))
     assert sum(bool(truth.any()) for _, truth in few.requests) == 1
     assert len(all_.requests) > len(few.requests)
+
+
+def test_outlines_of_photographs_are_shares_and_names_are_of_one_object() -> None:
+    pytest.importorskip("skimage", reason="pip install scikit-image")
+    from benchmarks.named_objects.photographs import OUTLINES, outlined
+
+    for content in json.loads(OUTLINES.read_text(encoding="utf-8")).values():
+        names = [name for one in content["objects"].values() for name in one["names"]]
+        names += content["absent"]
+        assert len(set(names)) == len(names)
+        for one in content["objects"].values():
+            assert all(0 <= share <= 1 for corner in one["outline"] for share in corner)
+            mask = outlined(one["outline"], torch.zeros(128, 192, 3))
+            assert 0.005 < float(mask.double().mean()) < 0.8
+
+
+def test_means_have_every_column() -> None:
+    values: dict[str, list[float]] = defaultdict(list)
+    truth = torch.zeros(4, 4, dtype=torch.bool)
+    collect(values, sample(torch.full((4, 4), 0.2)), truth)
+    truth[:2, :2] = True
+    collect(values, sample(torch.where(truth, 0.9, 0.0)), truth)
+    table = means(values)
+    assert all(table[column] == 1.0 for column in ("overlap", "found", "whole", "auc"))
