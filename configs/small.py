@@ -67,11 +67,11 @@ def small_recipe() -> Recipe:
         model=model,
         stages=(
             vae,
+            _monocular_depth(vae, data),
             pretrain,
             static,
             _motion(static, data.tracks),
             dynamic,
-            _monocular_depth(dynamic),
             video,
             _motion_diffusion(video),
             _object_mask(video),
@@ -139,13 +139,13 @@ def _dynamic(static: StageRecipe, tracks: int) -> StageRecipe:
     )
 
 
-def _monocular_depth(dynamic: StageRecipe) -> StageRecipe:
-    """Depth of single images: seven of each clip, without rendering.
+def _monocular_depth(vae: StageRecipe, data: DataSettings) -> StageRecipe:
+    """Depth of single images: seven of each clip, without rendering; LDRM starts from it.
 
     The image backbone has seen photographs, and learns slowly.
     """
     return replace(
-        dynamic,
+        vae,
         name="monocular_depth",
         kind="monocular_depth",
         steps=6_000,
@@ -156,7 +156,7 @@ def _monocular_depth(dynamic: StageRecipe) -> StageRecipe:
         optimizer=OptimizerSettings(
             learning_rate=1e-3, warmup_steps=100, part_rates=(("monocular_depth.backbone", 0.1),)
         ),
-        data=replace(dynamic.data, target_frames=4, tracks=0),
+        data=dynamic_data(replace(data, target_frames=4, tracks=0)),
         public_backbone=True,
         gates=(),
     )

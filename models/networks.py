@@ -49,6 +49,16 @@ PARTS = tuple(field.name for field in fields(Networks))
 """Names of the networks, in the order of their random streams."""
 
 
+def reconstruction_parts(config: ModelConfig) -> tuple[str, ...]:
+    """The parts that turn a true video into a scene."""
+    return ("vae", "ldrm", "deformation", *ldrm_start_parts(config))
+
+
+def ldrm_start_parts(config: ModelConfig) -> tuple[str, ...]:
+    """The depth prior, where LDRM corrects its depth; else nothing."""
+    return ("monocular_depth",) if config.refinement.depth_prior else ()
+
+
 def model_parts(config: ModelConfig) -> tuple[str, ...]:
     """The parts that a model of this configuration has."""
     absent = set()

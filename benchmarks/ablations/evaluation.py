@@ -26,8 +26,8 @@ from diff4splat.evaluation.systems.evaluated_system import (
     model_identity,
     reconstruct_clip,
 )
-from diff4splat.generation.plan import RECONSTRUCTION_PARTS
 from diff4splat.models.hub.model import Model, load_model
+from diff4splat.models.networks import reconstruction_parts
 from diff4splat.models.video_vae.latent_distribution import LatentDistribution
 from diff4splat.models.video_vae.vae import VideoVae
 from diff4splat.progress.phases import Phases
@@ -117,7 +117,8 @@ def evaluate(variant: Variant, folder: Path, held_out: HeldOut, phases: Phases) 
     """
     model = load_model(folder / MODEL_FOLDER)
     pictures = "true pictures" if variant.use_ground_truth_frames else "decoded pictures"
-    identity = model_identity(model, RECONSTRUCTION_PARTS, f"reconstruction, {pictures}")
+    parts = reconstruction_parts(model.config)
+    identity = model_identity(model, parts, f"reconstruction, {pictures}")
     subject = Reconstructor(
         reconstruct=partial(reconstruct_clip, _seeing(model, variant)),
         identity=replace(identity, name=variant.name, untrained=False),

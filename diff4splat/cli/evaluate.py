@@ -138,17 +138,19 @@ class Evaluate:
             reconstruct_clip,
         )
         from diff4splat.generation.pipeline import Diff4SplatPipeline
-        from diff4splat.generation.plan import RECONSTRUCTION_PARTS
-        from diff4splat.models.hub.model import load_model
+        from diff4splat.models.hub.model import load_model, with_parts
+        from diff4splat.models.networks import reconstruction_parts
 
         if self.task != "reconstruction":
             pipeline = Diff4SplatPipeline.from_pretrained(self.model)
             pipeline.to(require_device(self.device), self.dtype)
             return Generator(pipeline=pipeline, settings=self.settings())
-        model = load_model(self.model, RECONSTRUCTION_PARTS)
+        model = load_model(self.model, ())
+        parts = reconstruction_parts(model.config)
+        model = with_parts(model, parts)
         return Reconstructor(
             reconstruct=partial(reconstruct_clip, model),
-            identity=model_identity(model, RECONSTRUCTION_PARTS, "reconstruction"),
+            identity=model_identity(model, parts, "reconstruction"),
         )
 
     def video_networks(self) -> "VideoNetworks":

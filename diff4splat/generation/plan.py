@@ -25,8 +25,6 @@ MOTION_PARTS = ("text_encoder", "motion_unet", "object_mask")
 """What a prompt that moves something needs; some models have no object mask."""
 FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 """What fills hidden regions by video; some public models also have an image encoder."""
-RECONSTRUCTION_PARTS = ("vae", "ldrm", "deformation")
-"""What turns a true video into a scene."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
 DEPTH_GIVEN = "depth is given"
 REMOVED = "it is left out on request"
@@ -129,6 +127,9 @@ def plan_generation(
     fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:
+        if config.refinement.depth_prior and reasons["monocular_depth"] == DEPTH_GIVEN:
+            # LDRM starts from it, wherever the depth of the image comes from.
+            reasons["monocular_depth"] = ""
         # Without the video model its condition is reconstructed as it is.
         reasons["dit"] = facts.removed("dit")
         reasons["deformation"] = facts.removed("deformation") or _deformation_reason(

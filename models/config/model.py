@@ -118,6 +118,9 @@ class ModelConfig:
         whole = not used or self.ldrm.grid_stride == 1
         expected = "1 with a refinement decoder"
         require(whole, "LdrmConfig.grid_stride", expected, self.ldrm.grid_stride)
+        fits = self.monocular_depth.used or not self.refinement.depth_prior
+        what, expected = "RefinementConfig.depth_prior", "false without a depth prior"
+        require(fits, what, expected, self.refinement.depth_prior)
         fits = not used or self.token_px == REFINEMENT_TOKEN_PX
         expected = f"tokens of {REFINEMENT_TOKEN_PX} px with a refinement decoder"
         require(fits, "ModelConfig.vae", expected, self.token_px)

@@ -255,9 +255,15 @@ class RefinementConfig:
     border_cells: int = 16
     """Cells of 4 px by which the border layer extends the first frame, a multiple of 4; 0 leaves
     the layer out."""
+    depth_prior: bool = False
+    """Key frames start from the depth prior's depth in place of a plane (ours, ADR 38)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "match_channels")
+        known = isinstance(self.depth_prior, bool)
+        require(known, "RefinementConfig.depth_prior", "true or false", self.depth_prior)
+        fits = self.used or not self.depth_prior
+        require(fits, "RefinementConfig.depth_prior", "false without channels", self.depth_prior)
         for name in ("channels", "cost_volume_depths", "border_cells"):
             require_optional_width(self, name)
         coarse = self.border_cells % 4 == 0

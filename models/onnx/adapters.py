@@ -239,13 +239,14 @@ class OnnxDeformation(OnnxPart):
 
 
 def posed_inputs(video: PosedVideo) -> dict[str, Tensor]:
-    """Frames and cameras under the names that graphs have for them."""
+    """Frames, cameras and distances under the names that graphs have for them."""
     cameras = video.cameras
     return {
         "rgb": video.rgb,
         "focal_px": cameras.focal_px,
         "center_px": cameras.center_px,
         "world_from_camera": cameras.world_from_camera,
+        "prior_distance": video.distance_or_plane(),
     }
 
 

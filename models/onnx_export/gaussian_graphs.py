@@ -41,6 +41,7 @@ def ldrm_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """Raw maps, and with refinement the optical flow of one slot."""
     refined = config.refinement.used
     posed = refined or config.ldrm.input == "frames"
+    starts = config.refinement.depth_prior
     size = _pixels(config)
     cells = (f"{TOKEN_PATCH}*rows", f"{TOKEN_PATCH}*columns")
 
@@ -57,6 +58,7 @@ def ldrm_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
             normal("latent", "batch", config.vae.latent_channels, KEYS, *cells),
             normal("camera", "batch", 6, FRAMES, *size),
             *(posed_sources(config) if posed else ()),
+            *((normal("prior_distance", "batch", KEYS, *size),) if starts else ()),
         ),
         outputs=_map_outputs(config),
     )
@@ -85,15 +87,17 @@ def deformation_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
     ]
 
 
-def posed_video(rgb: Tensor, focal_px: Tensor, center_px: Tensor, pose: Tensor) -> PosedVideo:
-    """A video from the tensors of ``posed_sources``."""
+def posed_video(
+    rgb: Tensor, focal_px: Tensor, center_px: Tensor, pose: Tensor, prior: Tensor | None = None
+) -> PosedVideo:
+    """A video from the tensors of ``posed_sources`` and the depth prior's distance."""
     cameras = Camera(
         focal_px=focal_px,
         center_px=center_px,
         world_from_camera=pose,
         size_px=tuple(rgb.shape[3:]),
     )
-    return PosedVideo(rgb=rgb, cameras=cameras)
+    return PosedVideo(rgb=rgb, cameras=cameras, prior_distance=prior)
 
 
 def posed_sources(config: ModelConfig) -> tuple[InputSource, ...]:

@@ -4,7 +4,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.models.networks import Networks
+from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.networks import Networks, ldrm_start_parts
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.stages.input_selection import InputSelection
 from diff4splat.training.stages.metrics import reconstruction_metrics
@@ -18,6 +19,11 @@ class ReconstructionStage(ModelStage):
 
     Abstract: a kind says which parts run, how it renders a batch, and which losses it has.
     """
+
+    @classmethod
+    def needed(cls, model: ModelConfig) -> tuple[str, ...]:
+        """LDRM may start from the depth prior's depth."""
+        return (*cls.parts, *ldrm_start_parts(model))
 
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)

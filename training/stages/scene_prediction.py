@@ -36,6 +36,7 @@ from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH, plane_base
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.ldrm.refinement.prior_distance import with_prior_distance
 from diff4splat.models.networks import Networks
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians, concatenate
@@ -99,19 +100,29 @@ class ScenePredictor:
     def posed_video(
         self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]
     ) -> PosedVideo | None:
-        """Input of the refinement decoder: the true first frame, then decoded frames.
+        """Input of the refinement decoder, at the depth prior's depth if it uses that.
 
-        None where the model has no such decoder. Recipes may take true frames instead of decoding,
-        which is about a fifth of a dynamic step.
+        None where the model has no such decoder.
         """
-        if not self.plan.model.refinement.used:
+        refinement = self.plan.model.refinement
+        if not refinement.used:
             return None
+        video = PosedVideo(rgb=self._frames(batch, latent), cameras=batch.cameras)
+        prior = self.networks.monocular_depth if refinement.depth_prior else None
+        return with_prior_distance(video, prior)
+
+    def _frames(
+        self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]
+    ) -> Float[Tensor, "b 3 f h w"]:
+        """The true first frame, then decoded frames.
+
+        Recipes may take true frames instead of decoding, which is about a fifth of a dynamic step.
+        """
         truth = unit_rgb(batch.video).movedim(-1, 1)
         if self.plan.recipe.use_ground_truth_frames:
-            return PosedVideo(rgb=truth, cameras=batch.cameras)
+            return truth
         decoded = (self.networks.vae.decode(latent).float() + 1) / 2
-        rgb = torch.cat([truth[:, :, :1], decoded[:, :, 1:].clamp(0, 1)], 2)
-        return PosedVideo(rgb=rgb, cameras=batch.cameras)
+        return torch.cat([truth[:, :, :1], decoded[:, :, 1:].clamp(0, 1)], 2)
 
     def _deformations(self, maps: RawGaussianMaps, batch: ClipBatch) -> list[Tensor]:
         """Raw maps (b, 10, …) at every target time."""

@@ -10,7 +10,6 @@ from torch import Tensor
 from diff4splat import __version__
 from diff4splat.errors import ShapeError
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.plan import RECONSTRUCTION_PARTS
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
 from diff4splat.generation.video.canonical_scene import prune_cells
@@ -20,6 +19,7 @@ from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.deformation.keyframes import DeformationUnits
 from diff4splat.models.hub.model import Model, model_device, with_parts
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.models.networks import reconstruction_parts
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.scene import Provenance, Scene
@@ -45,7 +45,7 @@ def scene_from_video(
     settings, log = settings or GenerationSettings(), log or RunLog()
     _require_cameras(video, path)
     model.config.latent_grid(len(video), path.cameras.size_px)
-    device, model = model_device(model), with_parts(model, RECONSTRUCTION_PARTS)
+    device, model = model_device(model), with_parts(model, reconstruction_parts(model.config))
     # Parts that are read only now lie on the CPU.
     model.networks.to(device)
     seen = _encode(model, video, path)
@@ -79,11 +79,12 @@ def _encode(model: Model, video: Float[Tensor, "f h w 3"], path: CameraPath) -> 
 
 
 def _provenance(model: Model) -> Provenance:
+    parts = reconstruction_parts(model.config)
     return Provenance(
         generator=f"diff4splat {__version__} reconstruction",
         model=model.config.name,
-        weights_sha256=model.weights_sha256(RECONSTRUCTION_PARTS),
-        untrained=not model.trained.issuperset(RECONSTRUCTION_PARTS),
+        weights_sha256=model.weights_sha256(parts),
+        untrained=not model.trained.issuperset(parts),
     )
 
 

@@ -6,8 +6,11 @@ Axes: ``b`` batch, ``k`` key frames, ``e`` width of a token, ``h4 w4`` token gri
     tokens, posed video ─ decoder ─┬─ pixel head ── raw maps ─ depth ─ optical flow ─┐
                                    ├─ border head                                    │
                                    └──────────────────────── features ───────────────┴─ motion
+
+With a depth prior the pixel head corrects the prior's distance, else the plane's (ADR 38).
 """
 
+import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
@@ -25,7 +28,7 @@ class RefinementBranch(nn.Module):
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         channels = widths(config.refinement.channels)[0]
-        self.activation = config.activation
+        self.activation, self.depth_prior = config.activation, config.refinement.depth_prior
         self.decoder = RefinementDecoder(config)
         self.pixel_head = PixelHead(channels)
         margin = config.refinement.border_cells
@@ -38,9 +41,19 @@ class RefinementBranch(nn.Module):
         batch = len(tokens)
         features = self.decoder(tokens, posed_video)
         raw = self.pixel_head(features).unflatten(0, (batch, -1))
+        if self.depth_prior:
+            raw = _on_prior(raw, posed_video.distance_or_plane())
         features = features.unflatten(0, (batch, -1))
         border = None if self.border_head is None else self.border_head(features[:, 0])
         motion_input = features.transpose(1, 2)
         if moving:
             motion_input = motion_features(features, raw[:, :, -1], posed_video, self.activation)
         return RawGaussianMaps(gaussians=raw.transpose(1, 2), tokens=motion_input, border=border)
+
+
+def _on_prior(
+    raw: Float[Tensor, "b k 12 h w"], prior: Float[Tensor, "b k h w"]
+) -> Float[Tensor, "b k 12 h w"]:
+    """Raw maps whose distance corrects the prior's."""
+    appearance, distance = raw.tensor_split([-1], 2)
+    return torch.cat([appearance, distance + prior[:, :, None].to(distance)], 2)

@@ -6,6 +6,9 @@ cells of 4 pixels, ``h4 w4`` cells of 16 (the tokens' grid).
     frames ─ cells ─┬─ match ─ cost volume ─┐
                     └───────────────────────┴─ 1/4 ── 1/8 ── 1/16 ─┐
     tokens ─ linear ────────────────────────────────────────────── + ─ 1/16 ── 1/8 ── 1/4 ─ out
+
+The depth prior's distance, where there is one, is added to the first features; a fresh layer for it
+changes nothing.
 """
 
 import torch
@@ -13,6 +16,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import CELL_PX, ConvBlock, cells
+from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.ldrm.refinement.cost_volume import cost_volume
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
@@ -39,6 +43,8 @@ class RefinementDecoder(nn.Module):
         self.input_conv = nn.Conv2d(
             CELL_CHANNELS + 2 * refinement.cost_volume_depths, fine, 3, padding=1
         )
+        if refinement.depth_prior:
+            self.input_prior = zero_(nn.Conv2d(CELL_PX**2, fine, 3, padding=1, bias=False))
         self.fine, self.middle, self.coarse = ConvBlock(fine), ConvBlock(middle), ConvBlock(coarse)
         self.down_1 = nn.Conv2d(fine, middle, 2, stride=2)
         self.down_2 = nn.Conv2d(middle, coarse, 2, stride=2)
@@ -53,7 +59,11 @@ class RefinementDecoder(nn.Module):
     ) -> Float[Tensor, "n c h w"]:
         """Features of all key frames in order."""
         pixels = cells(posed_video.key_rgb.flatten(0, 1)) * 2 - 1
-        fine = self.fine(self.input_conv(torch.cat([pixels, *self._cost_volume(posed_video)], 1)))
+        features = self.input_conv(torch.cat([pixels, *self._cost_volume(posed_video)], 1))
+        if self.config.depth_prior:
+            prior = posed_video.distance_or_plane().flatten(0, 1)[:, None]
+            features = features + self.input_prior(cells(prior))
+        fine = self.fine(features)
         middle = self.middle(self.down_1(fine))
         coarse = self.coarse(self.down_2(middle))
         coarse = self.mid(coarse + self.tokens(tokens.transpose(1, 2).flatten(0, 1)))

@@ -24,6 +24,8 @@ class PosedVideo:
     """In [0, 1]; the first frame is the input image where there is one."""
     cameras: Camera
     """Batch shape (b, f), of the frames' size; the first of each is the identity."""
+    prior_distance: Float[Tensor, "b k h w"] | None = None
+    """Raw ray distance of the key frames' pixels by the depth prior; None is a plane, as is 0."""
 
     def __post_init__(self) -> None:
         batch, _, *video = self.rgb.shape
@@ -36,8 +38,18 @@ class PosedVideo:
 
     def sample(self, index: int) -> "PosedVideo":
         """One batch element, as a batch of one."""
-        row = slice(index, index + 1)
-        return PosedVideo(rgb=self.rgb[row], cameras=self.cameras[row])
+        row, prior = slice(index, index + 1), self.prior_distance
+        return PosedVideo(
+            rgb=self.rgb[row],
+            cameras=self.cameras[row],
+            prior_distance=None if prior is None else prior[row],
+        )
+
+    def distance_or_plane(self) -> Float[Tensor, "b k h w"]:
+        """The prior's distance; 0 without one."""
+        if self.prior_distance is not None:
+            return self.prior_distance
+        return torch.zeros_like(self.key_rgb[:, :, 0])
 
     @property
     def keys(self) -> Int[Tensor, " k"]:

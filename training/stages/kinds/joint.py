@@ -14,7 +14,7 @@ from torch import Tensor
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.hub.model import Model
-from diff4splat.models.networks import Networks
+from diff4splat.models.networks import Networks, ldrm_start_parts
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.latents.latent_batch import LatentBatch
 from diff4splat.training.latents.video_latents import encode_batch
@@ -44,8 +44,8 @@ class JointStage(ModelStage):
 
     @classmethod
     def needed(cls, model: ModelConfig) -> tuple[str, ...]:
-        """The depth prior makes the render conditions."""
-        return (*cls.parts, *condition_parts(model))
+        """The depth prior makes the render conditions, and LDRM may start from it."""
+        return tuple(dict.fromkeys((*cls.parts, *condition_parts(model), *ldrm_start_parts(model))))
 
     def __init__(self, networks: Networks, plan: StagePlan) -> None:
         super().__init__(networks, plan)

@@ -65,6 +65,7 @@ BOUND = [
     ("text", "encoder"),
     ("motion_unet", "mask_refiner_width"),
     ("object_mask", "width"),
+    ("refinement", "depth_prior"),
     ("object_mask", "instance_channels"),
     ("vae", "groups"),
     ("vae", "tile_px"),
@@ -104,6 +105,17 @@ def test_the_mask_refiner_changes_the_fingerprint() -> None:
     refined = dataclasses.replace(motion, mask_refiner_width=4)
     configs = [dataclasses.replace(test_size(), motion_unet=one) for one in (motion, refined)]
     assert len({config.fingerprint() for config in (*configs, test_size())}) == 3
+
+
+def test_a_start_at_the_depth_prior_changes_the_fingerprint_and_needs_one() -> None:
+    plane, prior = RefinementConfig(channels=6), RefinementConfig(channels=6, depth_prior=True)
+    base = dataclasses.replace(test_size(), monocular_depth=MonocularDepthConfig(channels=8))
+    prints = {dataclasses.replace(base, refinement=one).fingerprint() for one in (plane, prior)}
+    assert len(prints) == 2
+    with pytest.raises(ConfigError, match="false without a depth prior"):
+        dataclasses.replace(test_size(), refinement=prior)
+    with pytest.raises(ConfigError, match="false without channels"):
+        RefinementConfig(depth_prior=True)
 
 
 def test_vectors_of_instances_change_the_fingerprint() -> None:

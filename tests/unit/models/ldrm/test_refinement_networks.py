@@ -5,23 +5,30 @@ from dataclasses import replace
 import pytest
 import torch
 from oracles_models import randomised
+from torch import Tensor
 
 from diff4splat.errors import ShapeError
 from diff4splat.generation.video.canonical_scene import reconstruct_refined
 from diff4splat.geometry.camera import pinhole
 from diff4splat.geometry.rays import plucker_map
-from diff4splat.models.config.model import RefinementConfig
+from diff4splat.models.config.model import MonocularDepthConfig, RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement import motion_features
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.ldrm.refinement.prior_distance import with_prior_distance
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 
 REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
 CONFIG = replace(tiny_size(), refinement=REFINEMENT)
+ON_PRIOR = replace(
+    CONFIG,
+    refinement=replace(REFINEMENT, depth_prior=True),
+    monocular_depth=MonocularDepthConfig(channels=8),
+)
 
 
 def inputs(frames: int, size: tuple[int, int], batch: int = 1) -> tuple:
@@ -44,6 +51,52 @@ def test_fresh_maps_are_zero_and_of_key_frames(
     assert maps.gaussians.shape == (2, 12, 1 + frames // 4, *size)
     assert maps.border.shape == (2, 12, size[0] // 4 + 8, size[1] // 4 + 8)
     assert not maps.gaussians.any() and not maps.border.any()
+
+
+def test_a_fresh_network_has_the_distance_of_the_depth_prior() -> None:
+    latent, rays, video = inputs(5, (32, 48), 2)
+    distance = torch.randn(2, 2, 32, 48)
+    maps = Ldrm(ON_PRIOR)(latent, rays, replace(video, prior_distance=distance))
+    assert torch.equal(maps.gaussians[:, -1], distance)
+    assert not maps.gaussians[:, :-1].any()
+
+
+def test_a_trained_network_sees_and_corrects_the_distance_of_the_depth_prior() -> None:
+    network, (latent, rays, video) = randomised(Ldrm(ON_PRIOR)), inputs(5, (32, 32))
+    near, far = (torch.full((1, 2, 32, 32), value) for value in (-1.0, 1.0))
+    corrections = [
+        network(latent, rays, replace(video, prior_distance=one)).gaussians[:, -1] - one
+        for one in (near, far)
+    ]
+    assert all(bool(one.any()) for one in corrections)
+    assert not torch.allclose(*corrections, atol=1e-3)
+
+
+def test_no_depth_prior_is_a_plane() -> None:
+    network, (latent, rays, video) = randomised(Ldrm(ON_PRIOR)), inputs(5, (32, 32))
+    plane = replace(video, prior_distance=torch.zeros(1, 2, 32, 32))
+    maps = [network(latent, rays, one).gaussians for one in (video, plane)]
+    assert torch.equal(*maps)
+
+
+def test_the_depth_prior_sees_every_key_frame_enlarged() -> None:
+    *_, video = inputs(5, (32, 48), 2)
+    seen = []
+
+    def prior(image: Tensor) -> Tensor:
+        seen.append(image)
+        return image.mean(1, keepdim=True)
+
+    found = with_prior_distance(video, prior)
+    (image,) = seen
+    assert image.shape == (4, 3, 64, 96)
+    assert image.min() >= 0 and image.max() <= 1
+    assert found.prior_distance.shape == (2, 2, 32, 48)
+    want = video.key_rgb.mean(2)
+    assert float((found.prior_distance - want).abs().mean()) < 0.1
+    assert with_prior_distance(video, None) is video
+    second = found.sample(1)
+    assert torch.equal(second.prior_distance, found.prior_distance[1:])
 
 
 def test_nothing_moves_at_the_time_of_its_key_frame() -> None:

@@ -23,7 +23,7 @@ def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     names = [stage.name for stage in recipe_by_name(name).stages]
     # Small has one size, so one static stage. The motion network and the object mask read the
     # text encoder that the stage before them trains.
-    small = ["posed_video_pretrain", "static-low", "motion", "dynamic", "monocular_depth"]
+    small = ["monocular_depth", "posed_video_pretrain", "static-low", "motion", "dynamic"]
     is_small = name in ("small", "distil")
     middle = small if is_small else ["static-low", "static-high", "dynamic"]
     last = ["motion_diffusion", "object_mask"] if is_small else ["joint"]

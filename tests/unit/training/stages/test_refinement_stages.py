@@ -7,7 +7,7 @@ import torch
 from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 
 from diff4splat.io.pixels import unit_rgb
-from diff4splat.models.config.model import ModelConfig, RefinementConfig
+from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig, RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.latents.video_latents import encode_video, zero_latents
 from diff4splat.training.recipe.losses import MotionLosses, ReconstructionLosses
@@ -16,6 +16,11 @@ from diff4splat.training.stage import TOTAL
 
 REFINEMENT = RefinementConfig(channels=6, match_channels=4, cost_volume_depths=4, border_cells=4)
 MODEL: ModelConfig = replace(tiny_size(), refinement=REFINEMENT)
+ON_PRIOR: ModelConfig = replace(
+    MODEL,
+    refinement=replace(REFINEMENT, depth_prior=True),
+    monocular_depth=MonocularDepthConfig(channels=8),
+)
 PRETRAIN, MOTION = "posed_video_pretrain", "motion"
 
 
@@ -46,6 +51,23 @@ def test_terms_and_gradients_are_finite_and_reach_what_learns(name: str) -> None
     for part in recipe.trained:
         gradients = [p.grad for p in getattr(stage, part).parameters() if p.grad is not None]
         assert gradients and all(bool(g.isfinite().all()) for g in gradients), part
+
+
+@pytest.mark.parametrize("name", [PRETRAIN, "static-low", MOTION, "dynamic", "joint"])
+def test_the_depth_prior_is_where_key_frames_start_and_learns_nothing(name: str) -> None:
+    recipe = refined(name)
+    stage = make_stage(recipe, model=ON_PRIOR)
+    batch = make_batch(recipe, (0, 1))
+    latent = zero_latents(ON_PRIOR, batch)
+    flat = stage.scenes.posed_video(batch, latent)
+    assert not flat.prior_distance.any()
+    shake_heads(stage)
+    shaken = stage.scenes.posed_video(batch, latent)
+    assert bool(shaken.prior_distance.any()) and not shaken.prior_distance.requires_grad
+    stage(batch)[TOTAL].sum().backward()
+    assert all(p.grad is None for p in stage.monocular_depth.parameters())
+    if name != MOTION:
+        assert bool(stage.ldrm.refinement.decoder.input_prior.weight.grad.any())
 
 
 def test_motion_alone_is_the_dynamic_stage_without_images() -> None:
