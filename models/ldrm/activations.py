@@ -22,6 +22,10 @@ LOG_ODDS_LIMIT = 40.0
 """e^40 and its square are finite in float32; an opacity differs from 0 or 1 by 4e-18 there."""
 
 
+LARGEST_SHARE = 0.999
+"""Of the limit, in ``raw_log_ratio``: its inverse has no finite value at the limit."""
+
+
 def require_full_precision(tensor: Tensor, what: str) -> None:
     """Refuse half precision.
 
@@ -38,6 +42,13 @@ def log_ratio(raw: Float[Tensor, "*b"], limit: float) -> Float[Tensor, "*b"]:
     """L tanh(raw / L): the logarithm of a bounded factor, slope 1 at 0."""
     require_full_precision(raw, "raw log ratio")
     return limit * torch.tanh(raw / limit)
+
+
+def raw_log_ratio(ratio: Float[Tensor, "*b"], limit: float) -> Float[Tensor, "*b"]:
+    """The raw value that ``log_ratio`` brings to ``ratio``; beyond the limit, just below it."""
+    require_full_precision(ratio, "log ratio")
+    share = (ratio / limit).clamp(-LARGEST_SHARE, LARGEST_SHARE)
+    return limit * torch.atanh(share)
 
 
 def bounded_factor(raw: Float[Tensor, "*b"], limit: float) -> Float[Tensor, "*b"]:

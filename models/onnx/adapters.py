@@ -240,13 +240,15 @@ class OnnxDeformation(OnnxPart):
 
 def posed_inputs(video: PosedVideo) -> dict[str, Tensor]:
     """Frames, cameras and distances under the names that graphs have for them."""
-    cameras = video.cameras
+    cameras, start = video.cameras, video.start_or_plane()
     return {
         "rgb": video.rgb,
         "focal_px": cameras.focal_px,
         "center_px": cameras.center_px,
         "world_from_camera": cameras.world_from_camera,
-        "prior_distance": video.distance_or_plane(),
+        "prior": start.prior,
+        "parallax": start.parallax,
+        "confidence": start.confidence,
     }
 
 

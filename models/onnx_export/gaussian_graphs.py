@@ -17,7 +17,7 @@ from diff4splat.models.config.networks import (
 )
 from diff4splat.models.ldrm.refinement.decoder import widths
 from diff4splat.models.ldrm.refinement.motion_features import CUES, SLOT_CUES, track_slot
-from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, StartDistance
 from diff4splat.models.onnx.manifest import TensorSpec
 from diff4splat.models.onnx.shapes import Axis
 from diff4splat.models.onnx_export.source import (
@@ -41,7 +41,6 @@ def ldrm_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
     """Raw maps, and with refinement the optical flow of one slot."""
     refined = config.refinement.used
     posed = refined or config.ldrm.input == "frames"
-    starts = config.refinement.depth_prior
     size = _pixels(config)
     cells = (f"{TOKEN_PATCH}*rows", f"{TOKEN_PATCH}*columns")
 
@@ -58,7 +57,7 @@ def ldrm_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
             normal("latent", "batch", config.vae.latent_channels, KEYS, *cells),
             normal("camera", "batch", 6, FRAMES, *size),
             *(posed_sources(config) if posed else ()),
-            *((normal("prior_distance", "batch", KEYS, *size),) if starts else ()),
+            *(start_sources(config) if config.refinement.depth_prior else ()),
         ),
         outputs=_map_outputs(config),
     )
@@ -88,16 +87,20 @@ def deformation_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 
 
 def posed_video(
-    rgb: Tensor, focal_px: Tensor, center_px: Tensor, pose: Tensor, prior: Tensor | None = None
+    rgb: Tensor, focal_px: Tensor, center_px: Tensor, pose: Tensor, *start: Tensor
 ) -> PosedVideo:
-    """A video from the tensors of ``posed_sources`` and the depth prior's distance."""
+    """A video from the tensors of ``posed_sources``, and of ``start_sources`` if there are any."""
     cameras = Camera(
         focal_px=focal_px,
         center_px=center_px,
         world_from_camera=pose,
         size_px=tuple(rgb.shape[3:]),
     )
-    return PosedVideo(rgb=rgb, cameras=cameras, prior_distance=prior)
+    if not start:
+        return PosedVideo(rgb=rgb, cameras=cameras)
+    prior, parallax, confidence = start
+    distances = StartDistance(prior=prior, parallax=parallax, confidence=confidence)
+    return PosedVideo(rgb=rgb, cameras=cameras, start=distances)
 
 
 def posed_sources(config: ModelConfig) -> tuple[InputSource, ...]:
@@ -108,6 +111,12 @@ def posed_sources(config: ModelConfig) -> tuple[InputSource, ...]:
         pixels("center_px", "batch", FRAMES, 2),
         poses("world_from_camera", "batch", FRAMES, 4, 4),
     )
+
+
+def start_sources(config: ModelConfig) -> tuple[InputSource, ...]:
+    """Where key frames start: distances by prior and parallax, and the confidence of parallax."""
+    shape = ("batch", KEYS, *_pixels(config))
+    return normal("prior", *shape), normal("parallax", *shape), unit("confidence", *shape)
 
 
 def _map_outputs(config: ModelConfig) -> tuple[TensorSpec, ...]:

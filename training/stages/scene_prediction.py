@@ -36,7 +36,7 @@ from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH, plane_base
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
-from diff4splat.models.ldrm.refinement.prior_distance import with_prior_distance
+from diff4splat.models.ldrm.refinement.start_distance import with_start_distance
 from diff4splat.models.networks import Networks
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians, concatenate
@@ -109,7 +109,7 @@ class ScenePredictor:
             return None
         video = PosedVideo(rgb=self._frames(batch, latent), cameras=batch.cameras)
         prior = self.networks.monocular_depth if refinement.depth_prior else None
-        return with_prior_distance(video, prior)
+        return with_start_distance(video, prior, self.plan.model.activation)
 
     def _frames(
         self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]

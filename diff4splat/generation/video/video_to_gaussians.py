@@ -22,7 +22,7 @@ from diff4splat.models.ldrm.gaussian_head import PixelBase
 from diff4splat.models.ldrm.plane_prior import plane_base
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
-from diff4splat.models.ldrm.refinement.prior_distance import with_prior_distance
+from diff4splat.models.ldrm.refinement.start_distance import with_start_distance
 from diff4splat.progress.run_log import RunLog
 
 
@@ -75,10 +75,11 @@ def image_plane_base(model: Model, video: VideoLatent) -> PixelBase:
 
 
 def decode_posed_video(model: Model, video: VideoLatent) -> PosedVideo:
-    """The decoded video after the true first frame, at the depth prior's depth if LDRM uses it."""
+    """The decoded video after the true first frame; key frames start where LDRM wants them to."""
     decoded = (model.networks.vae.decode(video.latent).float() + 1) / 2
     first = video.first_frame.rgb.movedim(-1, 0)[None, :, None].to(decoded)
     rgb = torch.cat([first, decoded[:, :, 1:].clamp(0, 1)], 2)
     posed = PosedVideo(rgb=rgb, cameras=stack_cameras([video.cameras]))
-    used = model.config.refinement.depth_prior
-    return with_prior_distance(posed, model.networks.monocular_depth if used else None)
+    config, prior = model.config, model.networks.monocular_depth
+    used = config.refinement.depth_prior
+    return with_start_distance(posed, prior if used else None, config.activation)

@@ -7,8 +7,8 @@ cells of 4 pixels, ``h4 w4`` cells of 16 (the tokens' grid).
                     └───────────────────────┴─ 1/4 ── 1/8 ── 1/16 ─┐
     tokens ─ linear ────────────────────────────────────────────── + ─ 1/16 ── 1/8 ── 1/4 ─ out
 
-The depth prior's distance, where there is one, is added to the first features; a fresh layer for it
-changes nothing.
+With a depth prior, a linear layer of the distances at which key frames start is added to the first
+features; fresh, it adds nothing.
 """
 
 import torch
@@ -19,9 +19,11 @@ from diff4splat.models.blocks.conv_block import CELL_PX, ConvBlock, cells
 from diff4splat.models.blocks.initialise import zero_
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.ldrm.refinement.cost_volume import cost_volume
-from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, StartDistance
 
 CELL_CHANNELS = 3 * CELL_PX**2
+START_MAPS = 3
+"""The prior's distance, how parallax changes it, and the confidence of that."""
 GROWTH = (3, 5, 7)
 """Widths of the three resolutions, in thirds of the configured one."""
 
@@ -44,7 +46,8 @@ class RefinementDecoder(nn.Module):
             CELL_CHANNELS + 2 * refinement.cost_volume_depths, fine, 3, padding=1
         )
         if refinement.depth_prior:
-            self.input_prior = zero_(nn.Conv2d(CELL_PX**2, fine, 3, padding=1, bias=False))
+            channels = START_MAPS * CELL_PX**2
+            self.input_start = zero_(nn.Conv2d(channels, fine, 3, padding=1, bias=False))
         self.fine, self.middle, self.coarse = ConvBlock(fine), ConvBlock(middle), ConvBlock(coarse)
         self.down_1 = nn.Conv2d(fine, middle, 2, stride=2)
         self.down_2 = nn.Conv2d(middle, coarse, 2, stride=2)
@@ -61,8 +64,7 @@ class RefinementDecoder(nn.Module):
         pixels = cells(posed_video.key_rgb.flatten(0, 1)) * 2 - 1
         features = self.input_conv(torch.cat([pixels, *self._cost_volume(posed_video)], 1))
         if self.config.depth_prior:
-            prior = posed_video.distance_or_plane().flatten(0, 1)[:, None]
-            features = features + self.input_prior(cells(prior))
+            features = features + self.input_start(_start_cells(posed_video.start_or_plane()))
         fine = self.fine(features)
         middle = self.middle(self.down_1(fine))
         coarse = self.coarse(self.down_2(middle))
@@ -83,6 +85,11 @@ class RefinementDecoder(nn.Module):
     def _inverse_depths(self, device: torch.device) -> Float[Tensor, " d"]:
         nearest, farthest = self.config.depth_range
         return torch.linspace(1 / farthest, 1 / nearest, self.config.cost_volume_depths).to(device)
+
+
+def _start_cells(start: StartDistance) -> Float[Tensor, "n c h w"]:
+    maps = torch.stack([start.prior, start.parallax - start.prior, start.confidence], 2)
+    return cells(maps.flatten(0, 1))
 
 
 def widths(width: int) -> tuple[int, ...]:

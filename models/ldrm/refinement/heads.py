@@ -33,6 +33,18 @@ class PixelHead(nn.Module):
         return torch.cat([appearance, distance], 1)
 
 
+class ShareHead(nn.Module):
+    """How much of what parallax changes is taken over, per pixel; all of it when fresh."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.out = zero_(nn.Conv2d(width, CELL_PX**2, 1))
+
+    def forward(self, features: Float[Tensor, "n c h w"]) -> Float[Tensor, "n 1 h4 w4"]:
+        """Around 1, not bounded."""
+        return 1 + torch.nn.functional.pixel_shuffle(self.out(features), CELL_PX)
+
+
 class BorderHead(nn.Module):
     """Twelve raw channels for every cell of the first frame and of a margin on each side."""
 

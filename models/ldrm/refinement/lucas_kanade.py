@@ -14,6 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.blocks.resize import upsample_bilinear
+from diff4splat.models.ldrm.refinement.window_mean import window_mean
 
 PYRAMID = (2, 1)
 """Downsampling factors, coarse first."""
@@ -62,8 +63,8 @@ def _step(
     right, down = gradients
     products = (right * right, right * down, down * down, right * difference, down * difference)
     sums = [(weight * product).sum(1) for product in products]
-    a, b, c, p, q = _mean(torch.stack(sums, 1), WINDOW).unbind(1)
-    pull_x, pull_y = (DAMPING * (_mean(flow, SMOOTHING_WINDOW) - flow)).unbind(1)
+    a, b, c, p, q = window_mean(torch.stack(sums, 1), WINDOW).unbind(1)
+    pull_x, pull_y = (DAMPING * (window_mean(flow, SMOOTHING_WINDOW) - flow)).unbind(1)
     a, c, p, q = a + DAMPING, c + DAMPING, pull_x - p, pull_y - q
     change = torch.stack([c * p - b * q, a * q - b * p], 1) / (a * c - b * b)[:, None]
     return change.clamp(-LONGEST_STEP_PX, LONGEST_STEP_PX)
@@ -74,19 +75,6 @@ def _gradients(image: Float[Tensor, "n c h w"]) -> tuple[Tensor, Tensor]:
     padded = torch.nn.functional.pad(image, (1, 1, 1, 1), mode="replicate")
     right = (padded[..., 1:-1, 2:] - padded[..., 1:-1, :-2]) / 2
     return right, (padded[..., 2:, 1:-1] - padded[..., :-2, 1:-1]) / 2
-
-
-def _mean(maps: Float[Tensor, "n c h w"], side: int) -> Float[Tensor, "n c h w"]:
-    """Over a window within the image; as two matrix products, which are faster than pooling."""
-    rows, columns = (_averaging(length, side).to(maps) for length in maps.shape[-2:])
-    return rows @ maps @ columns.mT
-
-
-def _averaging(length: int, side: int) -> Float[Tensor, "l l"]:
-    """Matrix whose rows average a window centred on each index."""
-    index = torch.arange(length)
-    within = ((index[:, None] - index).abs() <= side // 2).float()
-    return within / within.sum(1, keepdim=True)
 
 
 def _downsample(maps: Float[Tensor, "n c h w"], factor: int) -> Float[Tensor, "n c h2 w2"]:

@@ -17,6 +17,25 @@ from diff4splat.models.config.networks import TIME_STRIDE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StartDistance:
+    """Raw ray distances of the key frames' pixels before LDRM corrects them (ADR 38)."""
+
+    prior: Float[Tensor, "b k h w"]
+    """By the depth prior, from each key frame alone."""
+    parallax: Float[Tensor, "b k h w"]
+    """The same, brought to agree with the other frames."""
+    confidence: Float[Tensor, "b k h w"]
+    """How much the other frames tell, 0 to 1."""
+
+    def sample(self, index: int) -> "StartDistance":
+        """One batch element, as a batch of one."""
+        row = slice(index, index + 1)
+        return StartDistance(
+            prior=self.prior[row], parallax=self.parallax[row], confidence=self.confidence[row]
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PosedVideo:
     """Decoded or true video with one camera per frame."""
 
@@ -24,8 +43,8 @@ class PosedVideo:
     """In [0, 1]; the first frame is the input image where there is one."""
     cameras: Camera
     """Batch shape (b, f), of the frames' size; the first of each is the identity."""
-    prior_distance: Float[Tensor, "b k h w"] | None = None
-    """Raw ray distance of the key frames' pixels by the depth prior; None is a plane, as is 0."""
+    start: StartDistance | None = None
+    """Where key frames start; None is a plane, as are distances of 0."""
 
     def __post_init__(self) -> None:
         batch, _, *video = self.rgb.shape
@@ -38,18 +57,19 @@ class PosedVideo:
 
     def sample(self, index: int) -> "PosedVideo":
         """One batch element, as a batch of one."""
-        row, prior = slice(index, index + 1), self.prior_distance
+        row, start = slice(index, index + 1), self.start
         return PosedVideo(
             rgb=self.rgb[row],
             cameras=self.cameras[row],
-            prior_distance=None if prior is None else prior[row],
+            start=None if start is None else start.sample(index),
         )
 
-    def distance_or_plane(self) -> Float[Tensor, "b k h w"]:
-        """The prior's distance; 0 without one."""
-        if self.prior_distance is not None:
-            return self.prior_distance
-        return torch.zeros_like(self.key_rgb[:, :, 0])
+    def start_or_plane(self) -> StartDistance:
+        """Where key frames start; planes without a depth prior."""
+        if self.start is not None:
+            return self.start
+        zero = torch.zeros_like(self.key_rgb[:, :, 0])
+        return StartDistance(prior=zero, parallax=zero, confidence=zero)
 
     @property
     def keys(self) -> Int[Tensor, " k"]:

@@ -17,8 +17,8 @@ from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.ldrm.raw_maps import RawGaussianMaps
 from diff4splat.models.ldrm.refinement import motion_features
-from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
-from diff4splat.models.ldrm.refinement.prior_distance import with_prior_distance
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, StartDistance
+from diff4splat.models.ldrm.refinement.start_distance import with_start_distance
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.gaussians import Gaussians
 
@@ -53,28 +53,35 @@ def test_fresh_maps_are_zero_and_of_key_frames(
     assert not maps.gaussians.any() and not maps.border.any()
 
 
-def test_a_fresh_network_has_the_distance_of_the_depth_prior() -> None:
+def start_at(prior: Tensor, change: float = 0.0, confidence: float = 0.5) -> StartDistance:
+    full = torch.full_like(prior, confidence)
+    return StartDistance(prior=prior, parallax=prior + change, confidence=full)
+
+
+def test_a_fresh_network_has_the_distance_at_which_key_frames_start() -> None:
     latent, rays, video = inputs(5, (32, 48), 2)
-    distance = torch.randn(2, 2, 32, 48)
-    maps = Ldrm(ON_PRIOR)(latent, rays, replace(video, prior_distance=distance))
-    assert torch.equal(maps.gaussians[:, -1], distance)
+    prior = torch.randn(2, 2, 32, 48)
+    maps = Ldrm(ON_PRIOR)(latent, rays, replace(video, start=start_at(prior, 0.25)))
+    torch.testing.assert_close(maps.gaussians[:, -1], prior + 0.25)
     assert not maps.gaussians[:, :-1].any()
 
 
-def test_a_trained_network_sees_and_corrects_the_distance_of_the_depth_prior() -> None:
+def test_a_trained_network_sees_where_key_frames_start() -> None:
     network, (latent, rays, video) = randomised(Ldrm(ON_PRIOR)), inputs(5, (32, 32))
-    near, far = (torch.full((1, 2, 32, 32), value) for value in (-1.0, 1.0))
+    flat = torch.zeros(1, 2, 32, 32)
+    starts = [start_at(flat), start_at(flat + 1), start_at(flat, 0.5), start_at(flat, 0.0, 1.0)]
     corrections = [
-        network(latent, rays, replace(video, prior_distance=one)).gaussians[:, -1] - one
-        for one in (near, far)
+        network(latent, rays, replace(video, start=one)).gaussians[:, -1] - one.parallax
+        for one in starts
     ]
     assert all(bool(one.any()) for one in corrections)
-    assert not torch.allclose(*corrections, atol=1e-3)
+    for other in corrections[1:]:
+        assert not torch.allclose(corrections[0], other, atol=1e-3)
 
 
 def test_no_depth_prior_is_a_plane() -> None:
     network, (latent, rays, video) = randomised(Ldrm(ON_PRIOR)), inputs(5, (32, 32))
-    plane = replace(video, prior_distance=torch.zeros(1, 2, 32, 32))
+    plane = replace(video, start=start_at(torch.zeros(1, 2, 32, 32), 0.0, 0.0))
     maps = [network(latent, rays, one).gaussians for one in (video, plane)]
     assert torch.equal(*maps)
 
@@ -87,16 +94,17 @@ def test_the_depth_prior_sees_every_key_frame_enlarged() -> None:
         seen.append(image)
         return image.mean(1, keepdim=True)
 
-    found = with_prior_distance(video, prior)
+    found = with_start_distance(video, prior, ON_PRIOR.activation)
     (image,) = seen
-    assert image.shape == (4, 3, 64, 96)
+    assert image.shape == (4, 3, 64, 64)  # multiples of 32
     assert image.min() >= 0 and image.max() <= 1
-    assert found.prior_distance.shape == (2, 2, 32, 48)
+    assert found.start.prior.shape == (2, 2, 32, 48)
     want = video.key_rgb.mean(2)
-    assert float((found.prior_distance - want).abs().mean()) < 0.1
-    assert with_prior_distance(video, None) is video
+    assert float((found.start.prior - want).abs().mean()) < 0.1
+    assert bool((found.start.parallax != found.start.prior).any())
+    assert with_start_distance(video, None, ON_PRIOR.activation) is video
     second = found.sample(1)
-    assert torch.equal(second.prior_distance, found.prior_distance[1:])
+    assert torch.equal(second.start.parallax, found.start.parallax[1:])
 
 
 def test_nothing_moves_at_the_time_of_its_key_frame() -> None:

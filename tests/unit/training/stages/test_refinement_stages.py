@@ -60,14 +60,14 @@ def test_the_depth_prior_is_where_key_frames_start_and_learns_nothing(name: str)
     batch = make_batch(recipe, (0, 1))
     latent = zero_latents(ON_PRIOR, batch)
     flat = stage.scenes.posed_video(batch, latent)
-    assert not flat.prior_distance.any()
+    assert not flat.start.prior.any()
     shake_heads(stage)
     shaken = stage.scenes.posed_video(batch, latent)
-    assert bool(shaken.prior_distance.any()) and not shaken.prior_distance.requires_grad
+    assert bool(shaken.start.prior.any()) and not shaken.start.parallax.requires_grad
     stage(batch)[TOTAL].sum().backward()
     assert all(p.grad is None for p in stage.monocular_depth.parameters())
     if name != MOTION:
-        assert bool(stage.ldrm.refinement.decoder.input_prior.weight.grad.any())
+        assert bool(stage.ldrm.refinement.decoder.input_start.weight.grad.any())
 
 
 def test_motion_alone_is_the_dynamic_stage_without_images() -> None:

@@ -1,0 +1,115 @@
+"""Depth from parallax: exact on a textured plane, nothing without parallax, finite always."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor
+
+from diff4splat.geometry.camera import Camera, pinhole
+from diff4splat.models.ldrm.refinement.parallax import LONGEST_CORRECTION, parallax_depth
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.ldrm.refinement.window_mean import window_mean
+
+SIZE, FOCAL_PX, DEPTH = (48, 64), 60.0, 5.0
+INNER = (..., slice(12, -12), slice(12, -12))
+
+
+def texture(x: Tensor, y: Tensor) -> Tensor:
+    """Smooth colours of a point (x, y) of the plane."""
+    waves = [
+        torch.sin(3.1 * x + 1.3 * y),
+        torch.sin(2.3 * y - 1.1 * x + 1),
+        torch.cos(2.7 * x) * torch.sin(2.9 * y),
+    ]
+    return 0.5 + 0.4 * torch.stack(waves)
+
+
+def plane_video(step: float, frames: int = 9, bare: float = 0.0) -> PosedVideo:
+    """A camera that moves sideways by ``step`` a frame before a plane at DEPTH.
+
+    Within ``bare`` of its middle the plane has one colour.
+    """
+    rows, columns = (torch.arange(side) + 0.5 for side in SIZE)
+    y, x = torch.meshgrid(rows, columns, indexing="ij")
+    x, y = (x - SIZE[1] / 2) * DEPTH / FOCAL_PX, (y - SIZE[0] / 2) * DEPTH / FOCAL_PX
+    views = [(x + step * frame, y) for frame in range(frames)]
+    near = [((x.square() + y.square()) < bare**2)[None] for x, y in views]
+    images = [torch.where(one, 0.5, texture(*view)) for one, view in zip(near, views, strict=True)]
+    rgb = torch.stack(images, 1)
+    return PosedVideo(rgb=rgb[None], cameras=cameras(step, frames))
+
+
+def cameras(step: float, frames: int) -> Camera:
+    poses = torch.eye(4).repeat(1, frames, 1, 1)
+    poses[..., 0, 3] = step * torch.arange(frames)
+    return pinhole(FOCAL_PX, SIZE).with_pose(poses)
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
+def test_a_plane_is_found_from_a_wrong_depth(factor: float) -> None:
+    video, truth = plane_video(0.05), torch.tensor(DEPTH).log()
+    start = torch.full((1, 3, *SIZE), factor * DEPTH).log()
+    found, confidence = parallax_depth(start, video)
+    assert float((found - truth)[INNER].abs().max()) < 0.02
+    assert float(confidence[INNER].min()) > 0.3
+
+
+def test_without_parallax_nothing_changes() -> None:
+    start = torch.randn(1, 3, *SIZE)
+    found, confidence = parallax_depth(start, plane_video(0.0))
+    torch.testing.assert_close(found, start)
+    assert float(confidence.max()) < 1e-6
+
+
+def test_one_frame_tells_nothing() -> None:
+    video = plane_video(0.05, frames=1)
+    start = torch.zeros(1, 1, *SIZE)
+    found, confidence = parallax_depth(start, video)
+    assert torch.equal(found, start) and not confidence.any()
+
+
+def test_where_there_is_no_texture_the_correction_is_that_of_the_neighbourhood() -> None:
+    start = torch.full((1, 3, *SIZE), 1.2 * DEPTH).log()
+    found, confidence = parallax_depth(start, plane_video(0.05, bare=0.8))
+    middle = (..., slice(22, 26), slice(30, 34))
+    assert float(confidence[:, 0][middle].max()) < 0.1
+    assert float((found[:, 0][middle] - torch.tensor(DEPTH).log()).abs().max()) < 0.08
+
+
+@pytest.mark.parametrize("log_depth", [-20.0, 0.0, 20.0])
+@pytest.mark.parametrize("step", [0.05, 1e4])
+def test_extreme_depths_and_cameras_give_finite_bounded_corrections(
+    log_depth: float, step: float
+) -> None:
+    video = replace(plane_video(0.05), cameras=cameras(step, 9))
+    start = torch.full((1, 3, *SIZE), log_depth)
+    found, confidence = parallax_depth(start, video)
+    assert bool(found.isfinite().all()) and bool(confidence.isfinite().all())
+    assert float((found - start).abs().max()) <= LONGEST_CORRECTION * 1.0001
+
+
+def test_samples_of_a_batch_do_not_see_each_other() -> None:
+    one, two = plane_video(0.05), plane_video(0.08)
+    both = PosedVideo(rgb=torch.cat([one.rgb, two.rgb]), cameras=_together(one, two))
+    start = torch.full((2, 3, *SIZE), 1.1 * DEPTH).log()
+    together, _ = parallax_depth(start, both)
+    alone = [parallax_depth(start[:1], video)[0] for video in (one, two)]
+    torch.testing.assert_close(together, torch.cat(alone), atol=1e-5, rtol=1e-5)
+
+
+def test_window_means_are_those_of_the_pixels_within_the_image() -> None:
+    maps = torch.rand(1, 1, 5, 4)
+    found = window_mean(maps, 3)
+    assert float(found[0, 0, 2, 2]) == pytest.approx(float(maps[0, 0, 1:4, 1:4].mean()))
+    assert float(found[0, 0, 0, 0]) == pytest.approx(float(maps[0, 0, :2, :2].mean()))
+
+
+def _together(one: PosedVideo, two: PosedVideo) -> Camera:
+    camera = one.cameras
+    return replace(
+        camera,
+        focal_px=torch.cat([camera.focal_px, two.cameras.focal_px]),
+        center_px=torch.cat([camera.center_px, two.cameras.center_px]),
+        world_from_camera=torch.cat([camera.world_from_camera, two.cameras.world_from_camera]),
+    )
