@@ -129,3 +129,18 @@ def test_stretch_is_the_ratio_of_activated_scales() -> None:
     scale = activations.bounded_factor(raw_scale, LIMIT)
     later = activations.bounded_factor(raw_scale + raw, LIMIT)
     torch.testing.assert_close(activations.stretch(raw, raw_scale, LIMIT).exp(), later / scale)
+
+
+@given(ratio=st.floats(-0.99 * LIMIT, 0.99 * LIMIT))
+def test_the_raw_value_of_a_log_ratio_gives_it_again(ratio: float) -> None:
+    wanted = torch.tensor([ratio], dtype=torch.float64)
+    raw = activations.raw_log_ratio(wanted, LIMIT)
+    torch.testing.assert_close(activations.log_ratio(raw, LIMIT), wanted)
+
+
+@pytest.mark.parametrize("ratio", [LIMIT, -LIMIT, 1e4, -1e4, 3e38])
+def test_beyond_the_limit_the_raw_value_is_finite(ratio: float) -> None:
+    raw = activations.raw_log_ratio(torch.tensor([ratio]), LIMIT)
+    again = float(activations.log_ratio(raw, LIMIT))
+    assert math.isfinite(float(raw))
+    assert again == pytest.approx(math.copysign(activations.LARGEST_SHARE * LIMIT, ratio), rel=1e-4)
