@@ -14,7 +14,9 @@ from torch import Tensor
 
 from diff4splat.errors import ConfigError
 from diff4splat.generation.layered_image.border_extension import border_extension
+from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.visibility import visible_in_earlier_frame
+from diff4splat.generation.video.keyframe_borders import keyframe_borders
 from diff4splat.geometry.camera import Camera, stack_cameras
 from diff4splat.geometry.depth import distance_from_depth
 from diff4splat.models.blocks.conv_block import CELL_PX
@@ -37,7 +39,7 @@ class CanonicalScene:
 
     gaussians: Gaussians
     cell_index: Int[Tensor, " m"]
-    """Cell of each of the first m Gaussians; those of the border layer have none and are static."""
+    """Cell of each of the first m Gaussians; those of borders have none and are static."""
     maps: RawGaussianMaps
 
 
@@ -59,7 +61,7 @@ def reconstruct(
 def reconstruct_refined(
     maps: RawGaussianMaps, video: PosedVideo, config: ActivationConfig, log: RunLog
 ) -> CanonicalScene:
-    """Key frames and border of a whole video; pixels that earlier key frames show are left out."""
+    """Key frames and borders of a whole video; pixels that earlier key frames show are left out."""
     cameras, raw = video.key_cameras[0], maps.gaussians[0].float()
     base = keyframe_plane_prior(video.key_rgb[0].movedim(1, -1), cameras)
     depth = key_depth(raw[-1], config)
@@ -71,7 +73,8 @@ def reconstruct_refined(
     if maps.border is None:
         return scene
     border = border_gaussians(maps.border[0].float(), base, depth[0], config)
-    return replace(scene, gaussians=concatenate([scene.gaussians, border]))
+    fine = [layer_gaussians(one) for one in keyframe_borders(base.rgb, depth.detach(), cameras)]
+    return replace(scene, gaussians=concatenate([scene.gaussians, border, *fine]))
 
 
 def keyframe_plane_prior(rgb: Float[Tensor, "k h w 3"], cameras: Camera) -> PixelBase:

@@ -24,10 +24,10 @@ from diff4splat.training.batches.requests.displacement import draw_direction
 from diff4splat.training.batches.requests.present import PresentObject, absent_nouns
 
 KIND_SHARES = {
-    "named": 0.45,
+    "named": 0.4,
     "moving": 0.1,
     "two": 0.1,
-    "unknown": 0.15,
+    "unknown": 0.2,
     "absent": 0.15,
     "static": 0.05,
 }
