@@ -1,9 +1,9 @@
 """Fine borders of a video's key frames: what lies just out of all frames.
 
-Axes: ``k`` key frames, ``h w`` pixels, ``hs ws`` cells of a border. LDRM's border layer has cells of
-4 pixels around the first frame alone. Before it lie cells as fine as pixels, beside the border of
-every key frame (ADR 30). Those that another key frame sees are left out, and those where an earlier
-key frame has a border too.
+Axes: ``k`` key frames, ``h w`` pixels, ``hs ws`` cells of a border. LDRM's border layer has cells
+of 4 pixels around the first frame alone. Before it lie cells as fine as pixels, beside the border
+of every key frame (ADR 30). Those that another key frame sees are left out, and those where an
+earlier key frame has a border too.
 """
 
 from collections.abc import Iterator
