@@ -63,7 +63,7 @@ def small_size() -> ModelConfig:
             width=64, blocks=3, time_frequencies=3, static_threshold_px=4.0
         ),
         activation=ActivationConfig(),
-        refinement=RefinementConfig(channels=48),
+        refinement=RefinementConfig(channels=48, depth_prior=True),
         monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2, image_backbone=True),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
         object_mask=ObjectMaskConfig(width=24, image_backbone=True, instance_channels=12),

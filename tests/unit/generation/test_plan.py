@@ -59,6 +59,13 @@ TABLE = [
         {"prompt": True, "fill": "video", "without": ("deformation",)},
         (PRIORS | VIDEO) - {"deformation"},
     ),
+    # LDRM starts from the depth prior, wherever the image's depth comes from.
+    (
+        "small",
+        PARTS,
+        {"prompt": True, "fill": "video", "depth_given": True},
+        PRIORS | VIDEO,
+    ),
     ("test", (), {"prompt": True, "without": ("dit",)}, VIDEO - {"dit"}),
     ("test", (), {"prompt": True, "without": ("text_encoder",)}, VIDEO),
     ("small", PRIORS, {"prompt": True}, PRIORS),

@@ -72,6 +72,7 @@ def since(old: ModelConfig, new: ModelConfig) -> ModelConfig:
         monocular_depth=replace(old.monocular_depth, photo_scale=2, image_backbone=True),
         motion_unet=replace(old.motion_unet, input_scale=2),
         object_mask=new.object_mask,
+        refinement=replace(old.refinement, depth_prior=True),
         default_guidance=new.default_guidance,
     )
 

@@ -136,7 +136,7 @@ def test_stages_that_do_not_exist_are_refused() -> None:
             "dynamic: .* expected 4 with a refinement",
         ),
         (
-            "model.refinement.channels=0",
+            "model.refinement.channels=0 model.refinement.depth_prior=false",
             "stage posed_video_pretrain: expected a refinement decoder",
         ),
         (
@@ -151,7 +151,7 @@ def test_stages_that_do_not_exist_are_refused() -> None:
 )
 def test_stages_require_data_and_networks_that_fit(change: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
-        override(recipe_by_name("small"), [change])
+        override(recipe_by_name("small"), change.split())
 
 
 def test_clips_reach_from_the_first_input_frame_to_the_last() -> None:
