@@ -6,9 +6,9 @@ the correction c = L − L₀, Gauss and Newton's steps minimise per pixel x of 
     mean_W Σ_s weight · (I_s(x_s(L)) − I(x))²  +  SMOOTHNESS · |c − mean c|²
 
 where x_s(L) is where the other frame s shows the pixel's point (Lucas and Kanade along epipolar
-lines). weight = 1 / (1 + (difference / RESIDUAL_SCALE)²): points that move or are occluded hardly
-count. Where nothing tells the depth, the correction is that of the neighbourhood; without any
-parallax it is 0.
+lines). weight = 1 / (1 + (difference / RESIDUAL_SCALE)²): points that are occluded, or that move
+across epipolar lines, hardly count; motion along them is taken for depth. Where nothing tells the
+depth, the correction is that of the neighbourhood; without any parallax it is 0.
 """
 
 from collections.abc import Iterator
