@@ -50,7 +50,8 @@ def test_a_network_decides_it_too_and_fills_by_video(photo: Path, tmp_path: Path
     card = generated(photo, tmp_path / "out", "--depth", str(graph), "--fill", "video")
     assert card["depth"]["family"] == "Depth Anything" and len(card["depth"]["sha256"]) == 64
     assert card["depth"]["kind"] == "inverse" and card["depth"]["offset_by"]
-    assert "dit" in card["networks_run"] and "monocular_depth" not in card["networks_run"]
+    # LDRM starts from the model's own depth prior, for the frames of the video.
+    assert {"dit", "ldrm", "monocular_depth"} <= set(card["networks_run"])
 
 
 def test_without_it_the_card_says_so(photo: Path, tmp_path: Path) -> None:

@@ -46,11 +46,12 @@ BUILDS_ON = {
     },
 }
 CONTINUES = {"static-high": "static-low", "dynamic": "static-high", "joint": "video_diffusion"}
+START = {"monocular_depth": "monocular_depth"}
 SMALL_BUILDS_ON = {
-    "posed_video_pretrain": {},
-    "static-low": {"vae": "vae", "ldrm": "posed_video_pretrain"},
-    "motion": {"vae": "vae", "ldrm": "static-low"},
-    "dynamic": {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
+    "posed_video_pretrain": START,
+    "static-low": START | {"vae": "vae", "ldrm": "posed_video_pretrain"},
+    "motion": START | {"vae": "vae", "ldrm": "static-low"},
+    "dynamic": START | {"vae": "vae", "ldrm": "static-low", "deformation": "motion"},
     "monocular_depth": {},
     "video_diffusion": {"vae": "vae", "monocular_depth": "monocular_depth"},
     "motion_diffusion": {"text_encoder": "video_diffusion"},
@@ -62,7 +63,7 @@ SMALL_BUILDS_ON = {
         "dit": "video_diffusion",
     },
 }
-"""What differs in ``small``: LDRM starts without an autoencoder, and has motion and priors."""
+"""What differs in ``small``: LDRM starts without an autoencoder, on the depth prior's depth."""
 SMALL_CONTINUES = {
     "static-low": "posed_video_pretrain",
     "dynamic": "motion",
