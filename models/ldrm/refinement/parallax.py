@@ -30,7 +30,7 @@ WINDOW_PX, SMOOTHING_WINDOW_PX, BLUR_PX = 9, 17, 3
 SMOOTHNESS, DAMPING, RESIDUAL_SCALE = 0.03, 1e-4, 0.05
 PROBE = 0.02
 """Change of L over which the image's derivative is taken."""
-LONGEST_STEP, LONGEST_CORRECTION = 0.1, 1.0
+LONGEST_STEP = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +56,6 @@ def parallax_depth(
         pull = SMOOTHNESS * (_mean(correction, SMOOTHING_WINDOW_PX) - correction)
         step = (pull - slope) / (curvature + SMOOTHNESS + DAMPING)
         correction = correction + step.clamp(-LONGEST_STEP, LONGEST_STEP)
-        correction = correction.clamp(-LONGEST_CORRECTION, LONGEST_CORRECTION)
     confidence = curvature / (curvature + SMOOTHNESS)
     batch = log_depth.shape[:2]
     return (first + correction).unflatten(0, batch), confidence.unflatten(0, batch)

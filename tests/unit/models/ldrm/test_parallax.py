@@ -7,8 +7,12 @@ import torch
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, pinhole
-from diff4splat.models.ldrm.refinement.parallax import LONGEST_CORRECTION, parallax_depth
+from diff4splat.models.config.networks import ActivationConfig
+from diff4splat.models.ldrm.refinement import parallax
+from diff4splat.models.ldrm.refinement.motion_features import key_depth
+from diff4splat.models.ldrm.refinement.parallax import LONGEST_STEP, STEPS, parallax_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
+from diff4splat.models.ldrm.refinement.start_distance import with_start_distance
 from diff4splat.models.ldrm.refinement.window_mean import window_mean
 
 SIZE, FOCAL_PX, DEPTH = (48, 64), 60.0, 5.0
@@ -86,7 +90,62 @@ def test_extreme_depths_and_cameras_give_finite_bounded_corrections(
     start = torch.full((1, 3, *SIZE), log_depth)
     found, confidence = parallax_depth(start, video)
     assert bool(found.isfinite().all()) and bool(confidence.isfinite().all())
-    assert float((found - start).abs().max()) <= LONGEST_CORRECTION * 1.0001
+    assert float((found - start).abs().max()) <= LONGEST_STEP * STEPS * 1.0001
+
+
+def test_frames_that_do_not_belong_together_change_depth_by_bounded_steps() -> None:
+    video = plane_video(0.05)
+    start = torch.zeros(1, 3, *SIZE)
+    found, _ = parallax_depth(start, replace(video, rgb=torch.rand_like(video.rgb).round()))
+    assert bool(found.any()) and float(found.abs().max()) <= LONGEST_STEP * STEPS * 1.0001
+
+
+def test_frames_beyond_the_ends_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    video, start = plane_video(0.05), torch.full((1, 3, *SIZE), 1.2 * DEPTH).log()
+    usual = parallax_depth(start, video)[0][:, 1]
+    monkeypatch.setattr(parallax, "DISTANCES", (2, 4, 8, 16))
+    torch.testing.assert_close(parallax_depth(start, video)[0][:, 1], usual)
+    monkeypatch.setattr(parallax, "DISTANCES", (2, 4))
+    torch.testing.assert_close(parallax_depth(start, video)[0][:, 1], usual)
+
+
+def test_points_out_of_the_other_frames_tell_nothing() -> None:
+    video = plane_video(0.05)
+    poses = video.cameras.world_from_camera.clone()
+    poses[..., 0, 3] = 100.0 * torch.arange(9)
+    poses[..., 1, 3] = 0.05 * torch.arange(9)
+    start = torch.full((1, 3, *SIZE), DEPTH).log()
+    away = replace(video, cameras=video.cameras.with_pose(poses))
+    found, confidence = parallax_depth(start, away)
+    assert torch.equal(found, start) and not confidence.any()
+
+
+def test_what_covers_another_frame_hardly_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    video, truth = plane_video(0.05), torch.tensor(DEPTH).log()
+    rgb = video.rgb.clone()
+    torch.manual_seed(0)
+    rgb[:, :, 8] = torch.rand(rgb[:, :, 8].shape).round()
+    covered = replace(video, rgb=rgb)
+    start = truth.expand(1, 3, *SIZE)
+
+    def worst() -> float:
+        return float((parallax_depth(start, covered)[0][:, 0] - truth)[INNER].abs().max())
+
+    weighted = worst()
+    monkeypatch.setattr(parallax, "RESIDUAL_SCALE", 1e6)
+    assert weighted < 0.1 and worst() > 3 * weighted
+
+
+def test_the_start_distance_has_the_depth_that_the_frames_agree_with() -> None:
+    video, config = plane_video(0.05), ActivationConfig()
+
+    def prior(image: Tensor) -> Tensor:
+        return torch.full_like(image[:, :1], torch.tensor(1.2 * DEPTH / 4).log())
+
+    start = with_start_distance(video, prior, config).start
+    near = key_depth(start.prior, config)
+    assert float((near / DEPTH - 1.2).abs().max()) < 0.02
+    assert float((key_depth(start.parallax, config)[INNER] / DEPTH - 1).abs().max()) < 0.02
 
 
 def test_samples_of_a_batch_do_not_see_each_other() -> None:

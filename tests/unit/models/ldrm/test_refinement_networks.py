@@ -66,6 +66,14 @@ def test_a_fresh_network_has_the_distance_at_which_key_frames_start() -> None:
     assert not maps.gaussians[:, :-1].any()
 
 
+def test_the_network_decides_how_much_of_the_parallax_it_takes() -> None:
+    network, (latent, rays, video) = Ldrm(ON_PRIOR), inputs(5, (32, 48))
+    torch.nn.init.constant_(network.refinement.parallax_share.out.bias, -0.75)
+    prior = torch.randn(1, 2, 32, 48)
+    maps = network(latent, rays, replace(video, start=start_at(prior, 0.4)))
+    torch.testing.assert_close(maps.gaussians[:, -1], prior + 0.1)
+
+
 def test_a_trained_network_sees_where_key_frames_start() -> None:
     network, (latent, rays, video) = randomised(Ldrm(ON_PRIOR)), inputs(5, (32, 32))
     flat = torch.zeros(1, 2, 32, 32)
