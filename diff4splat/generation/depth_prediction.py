@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.blocks.resize import nearest_multiple
 from diff4splat.models.config.networks import ActivationConfig
 from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
@@ -48,14 +49,12 @@ def _scaled(
     image: Float[Tensor, "1 3 h w"], scales: Sequence[float]
 ) -> Iterator[Float[Tensor, "1 3 h2 w2"]]:
     """The image at every scale whose sides differ from those before."""
-    sizes = [tuple(_whole(side * scale) for side in image.shape[2:]) for scale in scales]
+    sizes = [
+        tuple(nearest_multiple(side * scale, BACKBONE_MULTIPLE_PX) for side in image.shape[2:])
+        for scale in scales
+    ]
     for size in dict.fromkeys(sizes):
         yield _resized(image, size)
-
-
-def _whole(side: float) -> int:
-    """The nearest side that every depth network takes."""
-    return BACKBONE_MULTIPLE_PX * max(round(side / BACKBONE_MULTIPLE_PX), 1)
 
 
 def _resized(maps: Float[Tensor, "1 c h w"], size: tuple[int, ...]) -> Float[Tensor, "1 c h2 w2"]:

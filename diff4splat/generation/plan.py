@@ -1,7 +1,7 @@
 """Which networks one request needs, decided before any of them is loaded.
 
-    depth prior          if the model has one and no depth is given; without either the image lies
-                         on a plane
+    depth prior          if the model has one and no depth is given, or LDRM runs and starts from
+                         it; without any depth the image lies on a plane
     motion prior         if the model has one and a prompt asks for motion in words that it knows;
                          else the image is static
     object mask          with the motion prior
@@ -113,8 +113,13 @@ def plan_generation(
     Raises:
         ConfigError: the video model is asked to fill, but it is not trained and other parts are.
     """
+    fill = _fill_reason(config, trained, facts)
+    # LDRM may start from the depth prior, wherever the depth of the image comes from.
+    starts_ldrm = config.refinement.depth_prior and not fill
     reasons = {
-        "monocular_depth": _depth_reason(trained, facts),
+        "monocular_depth": (DEPTH_GIVEN if facts.depth_given and not starts_ldrm else "")
+        or _untrained("monocular_depth", trained)
+        or facts.removed("monocular_depth"),
         "motion_unet": _untrained("motion_unet", trained)
         or facts.removed("motion_unet", "text_encoder")
         or _motion_reason(trained, facts)
@@ -124,12 +129,8 @@ def plan_generation(
     reasons["object_mask"] = (
         reasons["motion_unet"] or _untrained("object_mask", trained) or facts.removed("object_mask")
     )
-    fill = _fill_reason(config, trained, facts)
     reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:
-        if config.refinement.depth_prior and reasons["monocular_depth"] == DEPTH_GIVEN:
-            # LDRM starts from it, wherever the depth of the image comes from.
-            reasons["monocular_depth"] = ""
         # Without the video model its condition is reconstructed as it is.
         reasons["dit"] = facts.removed("dit")
         reasons["deformation"] = facts.removed("deformation") or _deformation_reason(
@@ -154,12 +155,6 @@ def plan_generation(
 def _untrained(part: str, trained: Collection[str]) -> str:
     """Random models run whole; in others a part that is not trained stays out."""
     return "it is not trained" if trained and part not in trained else ""
-
-
-def _depth_reason(trained: Collection[str], facts: RequestFacts) -> str:
-    if facts.depth_given:
-        return DEPTH_GIVEN
-    return _untrained("monocular_depth", trained) or facts.removed("monocular_depth")
 
 
 def _motion_reason(trained: Collection[str], facts: RequestFacts) -> str:

@@ -7,6 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.blocks import resize
 from diff4splat.models.image_unet.cells import MULTIPLE_PX
 
 ENLARGEMENT = 1.5
@@ -15,13 +16,7 @@ ENLARGEMENT = 1.5
 
 def enlarged(image: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c h2 w2"]:
     """The image with larger sides, multiples of those that the network takes."""
-    height, width = (
-        max(round(side * ENLARGEMENT / MULTIPLE_PX), 1) * MULTIPLE_PX for side in image.shape[-2:]
-    )
-    larger = torch.nn.functional.interpolate(
-        image, (height, width), mode="bicubic", align_corners=False
-    )
-    return larger.clamp(0, 1)
+    return resize.enlarged(image, ENLARGEMENT, MULTIPLE_PX)
 
 
 def reduced(

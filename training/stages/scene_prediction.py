@@ -104,12 +104,10 @@ class ScenePredictor:
 
         None where the model has no such decoder.
         """
-        refinement = self.plan.model.refinement
-        if not refinement.used:
+        if not self.plan.model.refinement.used:
             return None
         video = PosedVideo(rgb=self._frames(batch, latent), cameras=batch.cameras)
-        prior = self.networks.monocular_depth if refinement.depth_prior else None
-        return with_start_distance(video, prior, self.plan.model.activation)
+        return with_start_distance(video, self.networks.monocular_depth, self.plan.model)
 
     def _frames(
         self, batch: ClipBatch, latent: Float[Tensor, "b c t h2 w2"]

@@ -37,10 +37,11 @@ def keyframe_borders(
             footprint_px=PIXEL_FOOTPRINT_PX,
         )
         border = fine_border(pixels, None)
-        others = [cameras[other] for other in range(len(rgb)) if other != key]
-        seen = [_sees(camera, border) for camera in (*others, *bordered)]
+        mask, others = border.mask, [cameras[other] for other in range(len(rgb)) if other != key]
+        for camera in (*others, *bordered):
+            mask = mask & ~_sees(camera, border)
         bordered.append(border.camera)
-        yield replace(border, mask=torch.stack([~border.mask, *seen]).logical_not().all(0))
+        yield replace(border, mask=mask)
 
 
 def _sees(camera: Camera, layer: ImageLayer) -> Bool[Tensor, "hs ws"]:

@@ -75,11 +75,9 @@ def image_plane_base(model: Model, video: VideoLatent) -> PixelBase:
 
 
 def decode_posed_video(model: Model, video: VideoLatent) -> PosedVideo:
-    """The decoded video after the true first frame; key frames start where LDRM wants them to."""
+    """The decoded video after the true first frame; with the start of its key frames."""
     decoded = (model.networks.vae.decode(video.latent).float() + 1) / 2
     first = video.first_frame.rgb.movedim(-1, 0)[None, :, None].to(decoded)
     rgb = torch.cat([first, decoded[:, :, 1:].clamp(0, 1)], 2)
     posed = PosedVideo(rgb=rgb, cameras=stack_cameras([video.cameras]))
-    config, prior = model.config, model.networks.monocular_depth
-    used = config.refinement.depth_prior
-    return with_start_distance(posed, prior if used else None, config.activation)
+    return with_start_distance(posed, model.networks.monocular_depth, model.config)

@@ -7,8 +7,8 @@ the correction c = L − L₀, Gauss and Newton's steps minimise per pixel x of 
 
 where x_s(L) is where the other frame s shows the pixel's point (Lucas and Kanade along epipolar
 lines). weight = 1 / (1 + (difference / RESIDUAL_SCALE)²): points that are occluded, or that move
-across epipolar lines, hardly count; motion along them is taken for depth. Where nothing tells the
-depth, the correction is that of the neighbourhood; without any parallax it is 0.
+across epipolar lines, hardly count; motion along them is taken for depth. Where colours do not
+determine the depth, the correction is that of the neighbourhood; without any parallax it is 0.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ DISTANCES = (2, 4, 8)
 """Frames between a key frame and those that it is compared with, before and after."""
 STEPS = 6
 WINDOW_PX, SMOOTHING_WINDOW_PX, BLUR_PX = 9, 17, 3
-SMOOTHNESS, DAMPING, RESIDUAL_SCALE = 0.03, 1e-4, 0.05
+SMOOTHNESS, RESIDUAL_SCALE = 0.03, 0.05
 PROBE = 0.02
 """Change of L over which the image's derivative is taken."""
 LONGEST_STEP = 0.1
@@ -46,7 +46,7 @@ class _OtherFrames:
 def parallax_depth(
     log_depth: Float[Tensor, "b k h w"], video: PosedVideo
 ) -> tuple[Float[Tensor, "b k h w"], Float[Tensor, "b k h w"]]:
-    """Logarithm of depth that the video agrees with, and how much it tells: 0 nothing, 1 all."""
+    """Logarithm of depth that the video agrees with, and a confidence from 0 to 1."""
     key_rgb = window_mean(video.key_rgb.flatten(0, 1).float(), BLUR_PX)
     cameras, others = flat_cameras(video.key_cameras), list(_other_frames(video))
     first = log_depth.flatten(0, 1)
@@ -54,7 +54,7 @@ def parallax_depth(
     for _ in range(STEPS):
         slope, curvature = _equation(first + correction, key_rgb, cameras, others)
         pull = SMOOTHNESS * (_mean(correction, SMOOTHING_WINDOW_PX) - correction)
-        step = (pull - slope) / (curvature + SMOOTHNESS + DAMPING)
+        step = (pull - slope) / (curvature + SMOOTHNESS)
         correction = correction + step.clamp(-LONGEST_STEP, LONGEST_STEP)
     confidence = curvature / (curvature + SMOOTHNESS)
     batch = log_depth.shape[:2]

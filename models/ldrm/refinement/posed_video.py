@@ -25,7 +25,7 @@ class StartDistance:
     parallax: Float[Tensor, "b k h w"]
     """The same, brought to agree with the other frames."""
     confidence: Float[Tensor, "b k h w"]
-    """How much the other frames tell, 0 to 1."""
+    """Of the parallax, 0 to 1."""
 
     def sample(self, index: int) -> "StartDistance":
         """One batch element, as a batch of one."""

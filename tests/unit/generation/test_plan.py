@@ -66,6 +66,12 @@ TABLE = [
         {"prompt": True, "fill": "video", "depth_given": True},
         PRIORS | VIDEO,
     ),
+    (
+        "small",
+        PARTS,
+        {"prompt": True, "fill": "video", "depth_given": True, "without": ("monocular_depth",)},
+        (PRIORS | VIDEO) - DEPTH,
+    ),
     ("test", (), {"prompt": True, "without": ("dit",)}, VIDEO - {"dit"}),
     ("test", (), {"prompt": True, "without": ("text_encoder",)}, VIDEO),
     ("small", PRIORS, {"prompt": True}, PRIORS),
@@ -137,8 +143,9 @@ def test_these_networks_run(
     skipped = [part.part for part in plan.skipped]
     assert sorted([*skipped, *plan.parts]) == sorted(model_parts(config(name)))
     assert plan.fills == ("ldrm" in parts) and plan.moves == ("motion_unet" in parts)
-    assert plan.has_depth == ("monocular_depth" in parts)
-    assert plan.shows_image == ("monocular_depth" in parts or "ldrm" not in parts)
+    has_depth = "monocular_depth" in parts or request_.get("depth_given", False)
+    assert plan.has_depth == has_depth
+    assert plan.shows_image == (has_depth or "ldrm" not in parts)
 
 
 @pytest.mark.parametrize(("request_", "trained", "part", "why", "error"), REASONS)

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, pinhole
-from diff4splat.models.config.networks import ActivationConfig
+from diff4splat.models.config.sizes import small_size
 from diff4splat.models.ldrm.refinement import parallax
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.parallax import LONGEST_STEP, STEPS, parallax_depth
@@ -137,15 +137,16 @@ def test_what_covers_another_frame_hardly_counts(monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_start_distance_has_the_depth_that_the_frames_agree_with() -> None:
-    video, config = plane_video(0.05), ActivationConfig()
+    video, config = plane_video(0.05), small_size()
 
     def prior(image: Tensor) -> Tensor:
         return torch.full_like(image[:, :1], torch.tensor(1.2 * DEPTH / 4).log())
 
     start = with_start_distance(video, prior, config).start
-    near = key_depth(start.prior, config)
+    near = key_depth(start.prior, config.activation)
     assert float((near / DEPTH - 1.2).abs().max()) < 0.02
-    assert float((key_depth(start.parallax, config)[INNER] / DEPTH - 1).abs().max()) < 0.02
+    found = key_depth(start.parallax, config.activation)[INNER]
+    assert float((found / DEPTH - 1).abs().max()) < 0.02
 
 
 def test_samples_of_a_batch_do_not_see_each_other() -> None:

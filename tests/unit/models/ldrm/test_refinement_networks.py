@@ -102,7 +102,7 @@ def test_the_depth_prior_sees_every_key_frame_enlarged() -> None:
         seen.append(image)
         return image.mean(1, keepdim=True)
 
-    found = with_start_distance(video, prior, ON_PRIOR.activation)
+    found = with_start_distance(video, prior, ON_PRIOR)
     (image,) = seen
     assert image.shape == (4, 3, 64, 64)  # multiples of 32
     assert image.min() >= 0 and image.max() <= 1
@@ -110,7 +110,8 @@ def test_the_depth_prior_sees_every_key_frame_enlarged() -> None:
     want = video.key_rgb.mean(2)
     assert float((found.start.prior - want).abs().mean()) < 0.1
     assert bool((found.start.parallax != found.start.prior).any())
-    assert with_start_distance(video, None, ON_PRIOR.activation) is video
+    assert with_start_distance(video, None, ON_PRIOR) is video
+    assert with_start_distance(video, prior, CONFIG) is video
     second = found.sample(1)
     assert torch.equal(second.start.parallax, found.start.parallax[1:])
 
