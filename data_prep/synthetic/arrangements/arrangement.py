@@ -24,6 +24,8 @@ from diff4splat.data_prep.synthetic.splits import Split
 from diff4splat.data_prep.synthetic.world import Light, World
 
 PORTRAIT_SHARE = 0.4
+HIGH_SHARE = 0.6
+"""Of arrangements without a room, which would be too low."""
 LEAST_LIGHT_DEG = 15.0
 FOV_DEG = 50.0
 """Every view has its own."""
@@ -36,7 +38,10 @@ def try_arrangement(
     kind = rng.weighted_choice(list(KINDS), list(KINDS.values()))
     is_portrait = rng.bernoulli(PORTRAIT_SHARE)
     backdrop = make_backdrop(kind, rng.child("backdrop"))
-    objects = arrange(split.families.names, rng.child("objects"), is_portrait=is_portrait)
+    is_high = kind != "room" and rng.child("high").bernoulli(HIGH_SHARE)
+    objects = arrange(
+        split.families.names, rng.child("objects"), is_portrait=is_portrait, is_high=is_high
+    )
     specs = [
         any_view(objects, backdrop, rng.child("view", number), is_portrait=is_portrait)
         for number in range(views)

@@ -1,9 +1,11 @@
 """Objects of any size, turned anyhow, on a surface or above it.
 
-A large one before a far backdrop is the composition of a portrait.
+A large one before a far backdrop is the composition of a portrait. In high arrangements all objects
+are far above the surface: seen from above, near objects have a far backdrop without any transition.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +21,8 @@ SIZES_M, PORTRAIT_SIZES_M = (0.18, 1.1), (0.8, 1.5)
 LEAST, MOST, MOST_IN_PORTRAIT = 3, 10, 3
 UPRIGHT_SHARE, STANDING_SHARE = 0.5, 0.7
 SPREAD_M, LIFT_M = 1.3, 0.9
+HIGH_LIFT_M = (0.3, 3.0)
+"""Of objects of high arrangements, evenly by the logarithm."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,15 +34,31 @@ class Arranged:
     radius_m: float
 
 
-def arrange(families: tuple[str, ...], rng: Rng, *, is_portrait: bool) -> list[Arranged]:
+def arrange(
+    families: tuple[str, ...], rng: Rng, *, is_portrait: bool, is_high: bool
+) -> list[Arranged]:
     """Objects around the origin, the largest near the middle."""
     sizes = PORTRAIT_SIZES_M if is_portrait else SIZES_M
     limits = (1, MOST_IN_PORTRAIT) if is_portrait else (LEAST, MOST)
     count = rng.integer(*limits)
-    return [_object(families, sizes, rng.child("object", number)) for number in range(count)]
+    lift = _high_lift if is_high else _low_lift
+    return [_object(families, sizes, rng.child("object", n), lift) for n in range(count)]
 
 
-def _object(families: tuple[str, ...], sizes_m: tuple[float, float], rng: Rng) -> Arranged:
+def _low_lift(rng: Rng) -> float:
+    return 0.0 if rng.bernoulli(STANDING_SHARE) else rng.uniform(0.0, LIFT_M)
+
+
+def _high_lift(rng: Rng) -> float:
+    return math.exp(rng.uniform(*(math.log(limit) for limit in HIGH_LIFT_M)))
+
+
+def _object(
+    families: tuple[str, ...],
+    sizes_m: tuple[float, float],
+    rng: Rng,
+    lift_m: Callable[[Rng], float],
+) -> Arranged:
     family = rng.choice(families)
     shape = FAMILIES[family].make(rng.child("shape"))
     extent = float(np.max(shape.bounds[1] - shape.bounds[0])) / shape.height
@@ -51,8 +71,7 @@ def _object(families: tuple[str, ...], sizes_m: tuple[float, float], rng: Rng) -
     points = np.concatenate([part.reshape(-1, 3) for part in parts])
     low, high = points.min(0), points.max(0)
     spread = SPREAD_M * rng.uniform_array(-1.0, 1.0, 2)
-    lift = 0.0 if rng.bernoulli(STANDING_SHARE) else rng.uniform(0.0, LIFT_M)
-    shift = np.array([spread[0], -lift - high[1], spread[1]])
+    shift = np.array([spread[0], -lift_m(rng) - high[1], spread[1]])
     placed = PlacedObject(
         family=family, shape=shape, parts=tuple(part + shift for part in parts), size_m=shape.height
     )

@@ -4,6 +4,7 @@ import torch
 
 from diff4splat.data.clip import Clip
 from diff4splat.data_prep.synthetic.arrangements.backdrops import KINDS, make_backdrop
+from diff4splat.data_prep.synthetic.arrangements.objects import HIGH_LIFT_M, arrange
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.rng import Rng
@@ -12,6 +13,7 @@ from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import ConfigError
 
 COUNT = 6
+FAMILIES = ("ball", "crate", "chair")
 
 
 def recipe(**settings) -> WorldRecipe:
@@ -41,6 +43,22 @@ def test_cameras_stay_above_the_surface_and_out_of_objects(clips: list[Clip]) ->
         for view in clip.views:
             depth = view.depth[view.depth > 0]
             assert len(depth) == 0 or float(depth.min()) > 0.005
+
+
+@pytest.mark.parametrize("is_portrait", [False, True])
+def test_high_objects_leave_a_gap_below_and_others_stand(is_portrait: bool) -> None:
+    gaps = {}
+    for is_high in (False, True):
+        items = [
+            item
+            for number in range(8)
+            for item in arrange(FAMILIES, Rng(3, number), is_portrait=is_portrait, is_high=is_high)
+        ]
+        low = [max(float(part[..., 1].max()) for part in item.placed.parts) for item in items]
+        gaps[is_high] = -np.array(low)
+    least, most = HIGH_LIFT_M
+    assert gaps[True].min() >= least - 1e-9 and gaps[True].max() <= most + 1e-9
+    assert np.median(gaps[False]) < 1e-9
 
 
 def test_the_image_row_does_not_tell_depth(clips: list[Clip]) -> None:

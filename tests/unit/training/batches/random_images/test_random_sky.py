@@ -4,13 +4,18 @@ import pytest
 import torch
 from torch import Tensor
 
-from diff4splat.training.batches.random_images.random_sky import SKY_DRAWS, SKY_SHARE, random_sky
+from diff4splat.training.batches.random_images.random_sky import (
+    DARK_SHARE,
+    SKY_DRAWS,
+    SKY_SHARE,
+    random_sky,
+)
 
 ABOVE, BELOW = (0.1, 0.2, 0.3), (0.9, 0.8, 0.7)
 
 
-def draws(chosen: float = 0.0, clouds: float = 0.0) -> Tensor:
-    values = torch.tensor([[chosen, clouds, *ABOVE, *BELOW]])
+def draws(chosen: float = 0.0, clouds: float = 0.0, bright: float = 1.0) -> Tensor:
+    values = torch.tensor([[chosen, clouds, *ABOVE, *BELOW, bright]])
     assert values.shape[1] == SKY_DRAWS
     return values
 
@@ -36,6 +41,16 @@ def test_clouds_are_those_of_the_sky() -> None:
     plain, cloudy = (random_sky(rgb, half_sky(), draws(clouds=share)) for share in (0.0, 0.5))
     own = rgb[:, :, :4] - rgb[:, :, :4].mean((2, 3), keepdim=True)
     torch.testing.assert_close((cloudy - plain)[:, :, :4], 0.5 * own, atol=1e-6, rtol=0)
+
+
+def test_some_skies_are_dark_down_to_black() -> None:
+    rgb = torch.rand(1, 3, 8, 6)
+    light, half, black = (
+        random_sky(rgb, half_sky(), draws(bright=share))[:, :, :4]
+        for share in (DARK_SHARE, DARK_SHARE / 2, 0.0)
+    )
+    torch.testing.assert_close(half, light / 2)
+    assert float(black.max()) == 0
 
 
 @pytest.mark.parametrize("known", [torch.zeros(1, 8, 6) > 0, torch.ones(1, 8, 6) > 0])
