@@ -71,7 +71,7 @@ def find_cutouts(folder: Path, names: dict[str, str]) -> dict[str, list[Path]]:
     Raises:
         InputError: none of the names is there.
     """
-    files = sorted(file for file in folder.rglob("*") if file.suffix.lower() in _SUFFIXES)
+    files = find_images(folder)
     keys = {file: file.relative_to(folder).with_suffix("").as_posix() for file in files}
     found: dict[str, list[Path]] = {}
     for file, key in keys.items():
@@ -85,8 +85,18 @@ def find_cutouts(folder: Path, names: dict[str, str]) -> dict[str, list[Path]]:
     return dict(sorted(found.items()))
 
 
+def find_images(folder: Path) -> list[Path]:
+    """PNG and WebP images in a folder and those within it, in order of their paths."""
+    return sorted(file for file in folder.rglob("*") if file.suffix.lower() in _SUFFIXES)
+
+
 @lru_cache(maxsize=_KEPT)
 def read_cutout(file: Path, noun: str) -> Cutout:
+    """The object with its noun, kept in memory; see ``read_rgba``."""
+    return Cutout(noun=noun, rgba=read_rgba(file))
+
+
+def read_rgba(file: Path) -> Float32[np.ndarray, "h w 4"]:
     """The object, without the empty rows and columns around it.
 
     Raises:
@@ -101,7 +111,7 @@ def read_cutout(file: Path, noun: str) -> Cutout:
     rows, columns = (np.flatnonzero(opaque.any(axis)) for axis in (1, 0))
     part = pixels[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     rgba = cv2.cvtColor(part, cv2.COLOR_BGRA2RGBA).astype(np.float32) / 255
-    return Cutout(noun=noun, rgba=_reduced(rgba))
+    return _reduced(rgba)
 
 
 def _reduced(rgba: Float32[np.ndarray, "h w 4"]) -> Float32[np.ndarray, "p q 4"]:

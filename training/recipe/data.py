@@ -59,6 +59,8 @@ class DataSettings:
     enlarged again. Stage ``object_mask``: the same, of square images."""
     photographs: str = ""
     """Stage ``monocular_depth``: folder of photographs without depth, one per sample and step."""
+    cutouts: str = ""
+    """Stage ``monocular_depth``: folder of images with transparency, shown in some images."""
     views: int = 3
     """Cameras per clip; the first is the input."""
     target_frames: int = 4

@@ -23,6 +23,11 @@ from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.random_images.photographs import read_photographs
+from diff4splat.training.batches.random_images.random_cutouts import (
+    CUTOUT_DRAWS,
+    read_cutouts,
+    with_cutouts,
+)
 from diff4splat.training.batches.random_images.random_sky import SKY_DRAWS, random_sky
 from diff4splat.training.batches.random_images.random_views import (
     DRAWS,
@@ -55,6 +60,7 @@ class MonocularDepthStage(ModelStage):
         # Processors differentiate depthwise convolutions faster so.
         self.monocular_depth.to(memory_format=torch.channels_last)
         data, weight = plan.recipe.data, plan.recipe.losses.window_consistency
+        self.cutouts = read_cutouts(Path(data.cutouts)) if data.cutouts else None
         self.photographs = None
         if weight:
             side_px = max(data.view_sides_px or data.size_px)
@@ -113,6 +119,9 @@ class MonocularDepthStage(ModelStage):
         draws = self._draws(batch, "view", len(images.rgb), count).to(images.rgb)
         view, photo, sky = draws.split([DRAWS, PHOTO_DRAWS, SKY_DRAWS], 1)
         views = random_views(images, (height, width), view)
+        if self.cutouts is not None:
+            draws = self._draws(batch, "cutout", len(images.rgb), CUTOUT_DRAWS).to(images.rgb)
+            views = with_cutouts(views, self.cutouts, draws)
         noise = torch.randn(views.rgb.shape, generator=self.random.per_step(batch, "noise"))
         rgb = random_sky(views.rgb, views.known, sky)
         return replace(views, rgb=random_photo(rgb, photo, noise.to(rgb)))
