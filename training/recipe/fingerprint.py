@@ -96,9 +96,9 @@ _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}
 """Sections of later releases, and what is 0 in a model without them."""
 _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
 _SOURCE_ADDED = {"depth_loss": "true", "motion_loss": "true", "views": 0, "unit": ""}
-_NOT_DECISIVE = ("workers", "in_memory", "photographs", "cutouts")
+_NOT_DECISIVE = ("workers", "in_memory", "photographs")
 _LOSS_ADDED = {"window_consistency": 0.0, "instances": 0.0}
-_ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False}
+_ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False, "cutouts": ""}
 """Settings of later releases, with the value that changes nothing."""
 
 

@@ -57,6 +57,8 @@ def _require_data(stage: StageRecipe, model: ModelConfig) -> None:
     if stage.kind == "monocular_depth":
         fits = not stage.losses.window_consistency or data.photographs
         require(fits, f"{what}.photographs", "a folder for losses.window_consistency", "none")
+        fits = not data.cutouts or data.view_sides_px
+        require(fits, f"{what}.view_sides_px", "sides of views that show data.cutouts", "none")
     if stage.kind == "monocular_depth" and model.monocular_depth.image_backbone:
         sides = data.view_sides_px or data.size_px
         fits = all(side % BACKBONE_MULTIPLE_PX == 0 for side in sides)

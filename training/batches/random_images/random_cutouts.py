@@ -8,15 +8,12 @@ camera moves. A cutout has one depth z: that of the surface at its foot, or a ne
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
-import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
-from diff4splat.data_prep.cutouts.cutout import OPAQUE, find_images, read_rgba
-from diff4splat.errors import InputError
+from diff4splat.data_prep.cutouts.cutout import OPAQUE
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.training.batches.random_images.random_views import DepthImages, depth_images
 
@@ -29,41 +26,6 @@ HEIGHTS, FEET, CENTERS = (0.2, 1.3), (0.4, 1.2), (0.1, 0.9)
 NEARNESS, LIGHTS = (0.35, 0.9), (0.5, 1.1)
 LEAST_SHARE = 0.01
 """Images that would show less of their cutout stay as they are."""
-SIDE_PX, MOST_CUTOUTS = 128, 3000
-
-
-def read_cutouts(folder: Path) -> UInt8[Tensor, "m 4 s s"]:
-    """Images with transparency in ``folder``, their objects on the lower edge of squares.
-
-    Raises:
-        InputError: the folder has none.
-        FileFormatError: one is damaged, without transparency, or wholly transparent.
-    """
-    files = find_images(folder)
-    if not files:
-        raise InputError(
-            f"{folder}: expected PNG or WebP images with transparency, got none; "
-            "name another folder as data.cutouts or leave it out"
-        )
-    chosen = files[:: -(-len(files) // MOST_CUTOUTS)]
-    return torch.stack([_square(read_rgba(file)) for file in chosen])
-
-
-def _square(rgba: np.ndarray) -> UInt8[Tensor, "4 s s"]:
-    """In the middle of the lower edge; colours continue where nothing is opaque."""
-    pixels = torch.from_numpy(rgba).movedim(-1, 0)
-    color, alpha = pixels[:3], pixels[3:]
-    mean = (color * alpha).sum((1, 2)) / alpha.sum().clamp_min(1e-6)
-    color = torch.where(alpha > 0, color, mean[:, None, None])
-    height, width = rgba.shape[:2]
-    side = max(height, width)
-    square = torch.cat([mean, mean.new_zeros(1)])[:, None, None].repeat(1, side, side)
-    left = (side - width) // 2
-    square[:, side - height :, left : left + width] = torch.cat([color, alpha])
-    small = torch.nn.functional.interpolate(
-        square[None], (SIDE_PX, SIDE_PX), mode="bilinear", antialias=True
-    )[0]
-    return (255 * small.clamp(0, 1)).round().to(torch.uint8)
 
 
 def with_cutouts(

@@ -22,12 +22,9 @@ from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.batches.random_images.cutouts import read_cutouts
 from diff4splat.training.batches.random_images.photographs import read_photographs
-from diff4splat.training.batches.random_images.random_cutouts import (
-    CUTOUT_DRAWS,
-    read_cutouts,
-    with_cutouts,
-)
+from diff4splat.training.batches.random_images.random_cutouts import CUTOUT_DRAWS, with_cutouts
 from diff4splat.training.batches.random_images.random_sky import SKY_DRAWS, random_sky
 from diff4splat.training.batches.random_images.random_views import (
     DRAWS,
