@@ -42,7 +42,7 @@ def free_views(
 def _free_view(kind: SceneKind, distance_m: float, area_radius_m: float, rng: Rng) -> ViewSpec:
     is_walled = kind.is_indoors or "street" in kind.tags
     azimuth_deg = INDOOR_AZIMUTH_DEG if is_walled else 180.0
-    distance_m *= math.exp(rng.uniform(*(math.log(share) for share in DISTANCE_SHARE)))
+    distance_m *= rng.log_uniform(*DISTANCE_SHARE)
     focus_m = FOCUS_SHARE * area_radius_m * rng.uniform_array(-1.0, 1.0, 3)
     focus_m[1] = -abs(float(focus_m[1]))
     eye_m = LEAST_EYE_SHARE * area_radius_m + float(focus_m[1])

@@ -6,6 +6,7 @@ module therefore converts raw Philox integers by exact arithmetic. (x >> 11) · 
 """
 
 import hashlib
+import math
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -39,6 +40,10 @@ class Rng:
     def uniform(self, low: float, high: float) -> float:
         """One number, uniform on [low, high)."""
         return low + (high - low) * float(self.unit(1)[0])
+
+    def log_uniform(self, low: float, high: float) -> float:
+        """One number of [low, high), uniform by its logarithm."""
+        return math.exp(self.uniform(math.log(low), math.log(high)))
 
     def integer(self, low: int, high: int) -> int:
         """One integer from low to high, both included."""

@@ -5,7 +5,6 @@ unsuitable world (no visible motion, or a held-out world without new content) is
 (index, attempt).
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -181,7 +180,7 @@ def _framing(recipe: WorldRecipe, split: Split, rng: Rng, is_still: bool) -> _Fr
     sampler, kind = ObjectSampler(split=split, scene=scene), SCENE_KINDS[scene]
     if not is_still and not sampler.motion_pairs():
         return None
-    radius = math.exp(rng.uniform(*(math.log(limit) for limit in kind.area_radius_m)))
+    radius = rng.log_uniform(*kind.area_radius_m)
     fov_deg = rng.uniform(35.0, 72.0)
     lens = LensSpec(size_px=recipe.size_px, fov_deg=fov_deg, frames=recipe.frames, fps=recipe.fps)
     arrange = rig_views if recipe.rig else free_views if recipe.free_cameras else sample_views

@@ -44,7 +44,7 @@ def _candidate(
         reach = target.radius_m / math.tan(math.radians(fov_deg) / 2)
         distance = reach * rng.uniform(*PORTRAIT_RADII) / 2
     else:
-        distance = math.exp(rng.uniform(*(math.log(limit) for limit in DISTANCES_M)))
+        distance = rng.log_uniform(*DISTANCES_M)
     steepest = OPEN_TILT_DEG if backdrop.is_open else MAX_TILT_DEG
     return ViewSpec(
         azimuth_rad=rng.uniform(-np.pi, np.pi),

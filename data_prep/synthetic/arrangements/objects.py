@@ -4,7 +4,6 @@ A large one before a far backdrop is the composition of a portrait. In high arra
 are far above the surface: seen from above, near objects have a far backdrop without any transition.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -50,7 +49,7 @@ def _low_lift(rng: Rng) -> float:
 
 
 def _high_lift(rng: Rng) -> float:
-    return math.exp(rng.uniform(*(math.log(limit) for limit in HIGH_LIFT_M)))
+    return rng.log_uniform(*HIGH_LIFT_M)
 
 
 def _object(
@@ -62,7 +61,7 @@ def _object(
     family = rng.choice(families)
     shape = FAMILIES[family].make(rng.child("shape"))
     extent = float(np.max(shape.bounds[1] - shape.bounds[0])) / shape.height
-    size = math.exp(rng.uniform(*(math.log(limit) for limit in sizes_m)))
+    size = rng.log_uniform(*sizes_m)
     shape = shape.of_height(size / extent)
     turn = about_y(rng.uniform(0.0, 2 * np.pi))
     if not rng.bernoulli(UPRIGHT_SHARE):

@@ -43,3 +43,11 @@ def test_the_grid_swallows_last_bits_and_negative_zeros() -> None:
     assert not np.signbit(quantise(value)[1])
     assert np.abs(quantise(value) - value).max() <= 2.0**-15
     assert quantise_number(0.30001, 2) == 0.25
+
+
+def test_log_uniform_numbers_have_a_uniform_logarithm() -> None:
+    stream = Rng("log uniform")
+    values = np.array([stream.log_uniform(0.01, 100.0) for _ in range(4000)])
+    assert values.min() >= 0.01 and values.max() < 100.0
+    shares = np.histogram(np.log10(values), bins=4, range=(-2, 2))[0] / len(values)
+    np.testing.assert_allclose(shares, 0.25, atol=0.03)
