@@ -39,7 +39,11 @@ class EnvironmentContext:
     def prop_area(self, families: tuple[str, ...], holds) -> PropArea:
         """The prop area for these families."""
         return PropArea(
-            plan=self.plan, area_radius_m=self.area_radius_m, holds=holds, families=families
+            plan=self.plan,
+            area_radius_m=self.area_radius_m,
+            holds=holds,
+            families=families,
+            split=self.sampler.split,
         )
 
 

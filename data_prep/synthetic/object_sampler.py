@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from diff4splat.data_prep.synthetic.layout.kinds import OUTSIDERS, SCENE_KINDS
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS, families_for
 from diff4splat.data_prep.synthetic.rng import Rng
-from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
+from diff4splat.data_prep.synthetic.shapes.registry import COMPOSITE, FAMILIES
 from diff4splat.data_prep.synthetic.splits import Split
 
 _VISITORS: dict[str, frozenset[str]] = {
@@ -74,4 +74,7 @@ class ObjectSampler:
         names = sorted({motion for motion, _ in pairs})
         weights = [2.0 if MOTIONS[name].travels else 1.0 for name in names]
         motion = rng.weighted_choice(names, weights)
-        return motion, rng.choice([family for name, family in pairs if name == motion])
+        families = [family for name, family in pairs if name == motion]
+        if COMPOSITE in families_for(motion):
+            return motion, self.split.draw_family(families, rng)
+        return motion, rng.choice(families)

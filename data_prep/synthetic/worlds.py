@@ -57,6 +57,8 @@ class WorldRecipe:
     """Static cameras of all kinds beside the input view; for depth of single images."""
     arrangements: bool = False
     """Static objects before a surface, a corner, a room or open ground, seen from any side."""
+    composite_share: float = 0.0
+    """Share of objects that are random shapes without a name."""
     families: Names = None
     textures: Names = None
     motions: Names = None
@@ -68,7 +70,7 @@ class WorldRecipe:
         _require_range("views", self.views, 4 if self.rig else 1, 64 if self.rig else 8)
         _require_range("size_px", min(self.size_px), 8, 4096)
         _require_range("size_px", max(self.size_px), 8, 4096)
-        for name in ("still_share", "against_share", "frozen_share"):
+        for name in ("still_share", "against_share", "frozen_share", "composite_share"):
             _require_range(name, getattr(self, name), 0.0, 1.0)
         _require_range("fps", self.fps, 0.1, 1000.0)
         if self.rig + self.free_cameras + self.arrangements > 1:
@@ -89,6 +91,7 @@ class WorldRecipe:
             motions=full.motions.only(self.motions, "motions"),
             palettes=full.palettes.only(self.palettes, "palettes"),
             scenes=full.scenes.only(self.scenes, "scenes"),
+            composite_share=self.composite_share,
         )
 
 
@@ -219,6 +222,7 @@ def world_identifier(recipe: WorldRecipe, index: int) -> str:
     """Identifier of the clip of a world."""
     kind = f"-rig{recipe.views}" if recipe.rig else "-free" if recipe.free_cameras else ""
     kind = "-arranged" if recipe.arrangements else kind
+    kind += f"-composite{round(100 * recipe.composite_share)}" if recipe.composite_share else ""
     return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{kind}"
 
 

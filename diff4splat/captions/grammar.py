@@ -21,6 +21,7 @@ from diff4splat.captions.vocabulary import (
     CAMERA_MOVES,
     DIRECTIONS,
     PLACES,
+    UNNAMED,
     VERBS,
 )
 from diff4splat.errors import InputError
@@ -137,7 +138,7 @@ def _parse_object(words: str) -> tuple[NamedObject, str]:
     article, _, rest = words.partition(" ")
     color, _, after = rest.partition(" ")
     color, rest = (color, after) if color in COLOR_NAMES else ("", rest)
-    nouns = [noun for noun in ALL_NOUNS if rest == noun or rest.startswith(f"{noun} ")]
+    nouns = [noun for noun in (*ALL_NOUNS, UNNAMED) if rest == noun or rest.startswith(f"{noun} ")]
     if article not in ("a", "an") or not nouns:
         raise InputError(f"caption: expected an object such as 'a red torus', got {words[:60]!r}")
     noun = max(nouns, key=len)

@@ -15,7 +15,7 @@ from diff4splat.captions.phrasings import (
 )
 from diff4splat.captions.random_draws import draw, draw_number, draw_share
 from diff4splat.captions.synonyms import may_be_confused
-from diff4splat.captions.vocabulary import DIRECTIONS, NOUNS
+from diff4splat.captions.vocabulary import DIRECTIONS, NOUNS, UNNAMED
 
 LIKE_COLORS = frozenset(
     frozenset(pair.split())
@@ -39,7 +39,7 @@ def caption_of_object(
     if not is_unique(objects, index):
         return None
     named, others = objects[index], objects[:index] + objects[index + 1 :]
-    like = any(may_be_confused(named.noun, other.noun) for other in others)
+    like = any(_may_fit(named.noun, other.noun) for other in others)
     kinds = ["full", "full", "full"] * bool(named.color) + ["noun"] * (not like)
     if named.color and not any(colors_alike(named.color, other.color) for other in others):
         kinds.append("color")
@@ -53,6 +53,7 @@ def caption_of_absent_object(
 
     None if the image has objects of all nouns and no other colour can be asked for.
     """
+    objects = [one for one in objects if one.noun != UNNAMED]
     direction = draw(tuple(DIRECTIONS), generator)
     kind = draw(("full", "full", "noun"), generator)
     found = absent_object(
@@ -72,6 +73,7 @@ def absent_object(
     nouns: Sequence[str] = NOUNS,
 ) -> NamedObject | None:
     """One of ``nouns`` that no object has, or another colour of one; None if there is neither."""
+    objects = [one for one in objects if one.noun != UNNAMED]
     nouns = [n for n in nouns if not any(may_be_confused(n, one.noun) for one in objects)]
     colors = COLOR_NAMES
     if objects and (other_color or not nouns):
@@ -89,8 +91,13 @@ def plain_caption(named: NamedObject, direction: str) -> str:
 def is_unique(objects: list[NamedObject], index: int) -> bool:
     """Whether colour and noun of the object at ``index`` fit no other."""
     named, others = objects[index], objects[:index] + objects[index + 1 :]
-    like = [other for other in others if may_be_confused(named.noun, other.noun)]
+    like = [other for other in others if _may_fit(named.noun, other.noun)]
     return not any(colors_alike(named.color, other.color) for other in like)
+
+
+def _may_fit(noun: str, other: str) -> bool:
+    """Whether ``noun`` may be said of the other object; "object" may, of any."""
+    return noun == UNNAMED or may_be_confused(noun, other)
 
 
 def _caption(named: NamedObject, kind: str, direction: str, generator: torch.Generator) -> str:

@@ -67,6 +67,8 @@ PLACES = {
     "courtyard": "in a courtyard",
     "seabed": "under water",
 }
+UNNAMED = "object"
+"""Name of random shapes, which no noun fits."""
 NOUNS = (
     "arch",
     "ball",

@@ -44,6 +44,8 @@ class PrepareSynthetic:
     """Place cameras after the first anywhere: above, close, rolled, other lenses; for depth."""
     arrangements: bool = False
     """Static objects before walls, in rooms or on open ground, from any side; for depth."""
+    composite_share: Annotated[float, Number(least=0, most=1)] = 0.0
+    """Fraction of objects that are random shapes without a name."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
     tracks: Annotated[int, Number(least=0)] = 512
@@ -79,6 +81,7 @@ class PrepareSynthetic:
             rig=self.rig,
             free_cameras=self.free_cameras,
             arrangements=self.arrangements,
+            composite_share=self.composite_share,
             motions=self.motions or None,
         )
         job = WorldJob(

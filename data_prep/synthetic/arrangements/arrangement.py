@@ -39,9 +39,7 @@ def try_arrangement(
     is_portrait = rng.bernoulli(PORTRAIT_SHARE)
     backdrop = make_backdrop(kind, rng.child("backdrop"))
     is_high = kind != "room" and rng.child("high").bernoulli(HIGH_SHARE)
-    objects = arrange(
-        split.families.names, rng.child("objects"), is_portrait=is_portrait, is_high=is_high
-    )
+    objects = arrange(split, rng.child("objects"), is_portrait=is_portrait, is_high=is_high)
     specs = [
         any_view(objects, backdrop, rng.child("view", number), is_portrait=is_portrait)
         for number in range(views)

@@ -15,6 +15,7 @@ from diff4splat.data_prep.synthetic.motions.context import rest_positions
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
+from diff4splat.data_prep.synthetic.splits import Split
 
 SIZES_M, PORTRAIT_SIZES_M = (0.18, 1.1), (0.8, 1.5)
 LEAST, MOST, MOST_IN_PORTRAIT = 3, 10, 3
@@ -33,15 +34,13 @@ class Arranged:
     radius_m: float
 
 
-def arrange(
-    families: tuple[str, ...], rng: Rng, *, is_portrait: bool, is_high: bool
-) -> list[Arranged]:
+def arrange(split: Split, rng: Rng, *, is_portrait: bool, is_high: bool) -> list[Arranged]:
     """Objects around the origin, the largest near the middle."""
     sizes = PORTRAIT_SIZES_M if is_portrait else SIZES_M
     limits = (1, MOST_IN_PORTRAIT) if is_portrait else (LEAST, MOST)
     count = rng.integer(*limits)
     lift = _high_lift if is_high else _low_lift
-    return [_object(families, sizes, rng.child("object", n), lift) for n in range(count)]
+    return [_object(split, sizes, rng.child("object", n), lift) for n in range(count)]
 
 
 def _low_lift(rng: Rng) -> float:
@@ -53,12 +52,12 @@ def _high_lift(rng: Rng) -> float:
 
 
 def _object(
-    families: tuple[str, ...],
+    split: Split,
     sizes_m: tuple[float, float],
     rng: Rng,
     lift_m: Callable[[Rng], float],
 ) -> Arranged:
-    family = rng.choice(families)
+    family = split.draw_family(split.families.names, rng)
     shape = FAMILIES[family].make(rng.child("shape"))
     extent = float(np.max(shape.bounds[1] - shape.bounds[0])) / shape.height
     size = rng.log_uniform(*sizes_m)

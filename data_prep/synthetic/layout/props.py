@@ -11,6 +11,7 @@ from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
 from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
+from diff4splat.data_prep.synthetic.splits import Split
 
 
 def shape_of_size(
@@ -48,6 +49,7 @@ class PropArea:
     area_radius_m: float
     holds: Callable[[float, float, float], bool]
     families: tuple[str, ...]
+    split: Split
     view_yaw: float = 0.0
 
 
@@ -66,7 +68,7 @@ def scatter(area: PropArea, count: int, rng: Rng, budget: int) -> list[PlacedObj
 
 
 def _try_prop(area: PropArea, rng: Rng) -> PlacedObject | None:
-    family = rng.choice(area.families)
+    family = area.split.draw_family(area.families, rng)
     size = area.area_radius_m * rng.uniform(0.22, 0.6) * rng.choice((0.6, 1.0, 1.0, 1.7))
     shape = shape_of_size(family, size, rng)
     if shape is None:

@@ -7,11 +7,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from diff4splat.captions.vocabulary import UNNAMED
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.families import (
     animals,
     buildings,
     chains,
+    composites,
     furniture,
     outlines,
     plants,
@@ -49,6 +51,8 @@ def _family(
     )
 
 
+COMPOSITE = "composite"
+"""The family that no split has: only recipes with a share of it do."""
 _SOLID = "move spin hop drop soft"
 _ROUND = "move hop drop soft"
 FAMILIES: dict[str, Family] = {
@@ -167,5 +171,12 @@ FAMILIES: dict[str, Family] = {
     "fish": _family(animals.make_fish, "fish", ((0.15, 0.5),), "swim", ""),
     "car": _family(
         animals.make_car, "car", ((1.3, 1.6), (0.06, 0.3)), "drive", "street ground table room"
+    ),
+    COMPOSITE: _family(
+        composites.make_composite,
+        UNNAMED,
+        ((0.05, 1.2), (1.2, 5.0)),
+        f"{_SOLID} tumble bounce hang orbit sway",
+        "room table ground street",
     ),
 }

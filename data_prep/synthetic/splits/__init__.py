@@ -5,6 +5,7 @@ one family, one texture and, when something moves, one motion that no training w
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -14,7 +15,8 @@ from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
 from diff4splat.data_prep.synthetic.materials import ROLES
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
 from diff4splat.data_prep.synthetic.palettes import PALETTES
-from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
+from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.registry import COMPOSITE, FAMILIES
 from diff4splat.errors import ConfigError
 
 SplitName = Literal["training", "held_out"]
@@ -54,12 +56,20 @@ class Split:
     motions: Allowed
     palettes: Allowed
     scenes: Allowed
+    composite_share: float = 0.0
+    """Share of objects that are random shapes without a name."""
+
+    def draw_family(self, families: Sequence[str], rng: Rng) -> str:
+        """One of ``families``, or composites with their share."""
+        if rng.child("composite").bernoulli(self.composite_share):
+            return COMPOSITE
+        return rng.choice(families)
 
 
 def known_names() -> dict[str, frozenset[str]]:
     """All existing names, by list."""
     textures = {option.family for role in ROLES.values() for option in role.options}
-    tables = (FAMILIES, textures, MOTIONS, PALETTES, SCENE_KINDS)
+    tables = (FAMILIES.keys() - {COMPOSITE}, textures, MOTIONS, PALETTES, SCENE_KINDS)
     lists = ("families", "textures", "motions", "palettes", "scenes")
     return {name: frozenset(table) for name, table in zip(lists, tables, strict=True)}
 

@@ -3,7 +3,7 @@
 Axes: ``h w`` pixels.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool
@@ -19,7 +19,7 @@ from diff4splat.captions.requests import (
     is_unique,
 )
 from diff4splat.captions.scene_captions import caption_of_moving, caption_of_static
-from diff4splat.captions.unknown_nouns import caption_of_unknown_noun
+from diff4splat.captions.unknown_nouns import caption_of_unknown_noun, draw_unknown_noun
 from diff4splat.training.batches.requests.displacement import draw_direction
 from diff4splat.training.batches.requests.present import PresentObject, absent_nouns
 
@@ -35,6 +35,8 @@ KIND_SHARES = {
 not there, nothing."""
 GRAMMAR_SHARE = 0.4
 """Share of captions in the grammar; the others are free or plain sentences."""
+GENERIC_SHARE = 0.25
+"""Share of requests that call random shapes objects; the others have an unknown noun for them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +66,8 @@ def _draw(
     kind = _possible(kind, objects)
     if kind == "unknown":
         return _unknown_noun(objects, empty, generator)
+    if kind in ("named", "moving", "two"):
+        objects = _with_nouns(objects, generator)
     chosen = _chosen(kind, objects, generator)
     names = [one.named for one in objects]
     if chosen:
@@ -71,6 +75,17 @@ def _draw(
         return ImageRequest(caption=_caption(names, chosen, generator), mask=mask)
     caption = None if kind == "static" else _absent_caption(names, generator)
     return ImageRequest(caption=caption or caption_of_static(names, generator), mask=empty)
+
+
+def _with_nouns(objects: list[PresentObject], generator: torch.Generator) -> list[PresentObject]:
+    """The same unknown noun for all random shapes of an image: what no known noun fits."""
+    if all(one.is_named for one in objects) or draw_share(generator) < GENERIC_SHARE:
+        return objects
+    noun = draw_unknown_noun(generator)
+    return [
+        one if one.is_named else replace(one, named=replace(one.named, noun=noun))
+        for one in objects
+    ]
 
 
 def _possible(kind: str, objects: list[PresentObject]) -> str:
@@ -98,16 +113,20 @@ def _chosen(kind: str, objects: list[PresentObject], generator: torch.Generator)
 def _unknown_noun(
     objects: list[PresentObject], empty: Bool[Tensor, "h w"], generator: torch.Generator
 ) -> ImageRequest:
-    """Objects of one colour, or of none; without a colour, those that move in the clip."""
+    """Objects of one colour, or of none; without a colour, those that move in the clip.
+
+    Of those, random shapes alone where there are any: the others have names.
+    """
     shown = {one.named.color for one in objects}
     named, others = sorted(shown - {""}), colors_unlike(shown)
     without = [[]] if any(one.moves for one in objects) else []
     colors = draw([named, named, named, others or named, *without], generator)
     color = draw(colors, generator) if colors else ""
-    asked = [one.mask for one in objects if (one.named.color == color if color else one.moves)]
+    asked = [one for one in objects if (one.named.color == color if color else one.moves)]
+    asked = [one for one in asked if not one.is_named] or asked
     return ImageRequest(
         caption=caption_of_unknown_noun(color, generator),
-        mask=torch.stack([empty, *asked]).any(0),
+        mask=torch.stack([empty, *(one.mask for one in asked)]).any(0),
     )
 
 

@@ -13,7 +13,7 @@ from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.cutout_nouns import ALL_NOUNS, CUTOUT_NOUNS
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.random_draws import draw_share
-from diff4splat.captions.vocabulary import NOUNS, UNSEEN_NOUNS
+from diff4splat.captions.vocabulary import NOUNS, UNNAMED, UNSEEN_NOUNS
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
 from diff4splat.training.losses.object_mask import UNKNOWN_NAME
@@ -41,6 +41,11 @@ class PresentObject:
     """In the clip."""
 
     @property
+    def is_named(self) -> bool:
+        """Whether a noun fits it: none does a random shape."""
+        return self.named.noun != UNNAMED
+
+    @property
     def is_asked_for(self) -> bool:
         """Whether it is neither too small nor most of the image."""
         least, most = (share * self.mask.numel() for share in AREA_SHARES)
@@ -48,11 +53,11 @@ class PresentObject:
 
 
 def named_objects(clip: ClipMetadata, instances: UInt8[Tensor, "h w"]) -> list[PresentObject]:
-    """Objects with a noun of captions or cutouts in an image of ``View.instances``."""
+    """Objects with a noun of captions or cutouts, and random shapes, in a ``View.instances``."""
     return [
         PresentObject(named=NamedObject(note.color, note.name), mask=mask, moves=bool(note.motion))
         for note, mask in present_objects(clip, instances, PRESENT_SHARE)
-        if note.name in ALL_NOUNS
+        if note.name in (*ALL_NOUNS, UNNAMED)
     ]
 
 

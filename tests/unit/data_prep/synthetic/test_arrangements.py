@@ -13,7 +13,7 @@ from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import ConfigError
 
 COUNT = 6
-FAMILIES = ("ball", "crate", "chair")
+SPLIT = WorldRecipe(families=("ball", "crate", "chair")).allowed()
 
 
 def recipe(**settings) -> WorldRecipe:
@@ -52,7 +52,7 @@ def test_high_objects_leave_a_gap_below_and_others_stand(is_portrait: bool) -> N
         items = [
             item
             for number in range(8)
-            for item in arrange(FAMILIES, Rng(3, number), is_portrait=is_portrait, is_high=is_high)
+            for item in arrange(SPLIT, Rng(3, number), is_portrait=is_portrait, is_high=is_high)
         ]
         low = [max(float(part[..., 1].max()) for part in item.placed.parts) for item in items]
         gaps[is_high] = -np.array(low)

@@ -10,6 +10,7 @@ from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.cutout_nouns import CUTOUT_NOUNS
 from diff4splat.captions.grammar import NamedObject, parse_caption
 from diff4splat.captions.synonyms import names
+from diff4splat.captions.vocabulary import UNNAMED
 from diff4splat.errors import InputError
 from diff4splat.training.batches.requests import image_requests
 from diff4splat.training.batches.requests.image_requests import ImageRequest, draw_image_requests
@@ -177,3 +178,55 @@ def test_an_image_in_which_nothing_moves_asks_no_more_for_absent_objects() -> No
         sum(not bool(r.mask.any()) for r in drawn(some, 900)) / 900 for some in (OBJECTS, still)
     ]
     assert empty[1] < empty[0] + 0.06
+
+
+SHAPES = [
+    present("red", UNNAMED, _square(0, 0, 5), moves=True),
+    present("red", "ball", _square(10, 10, 6), moves=True),
+    present("blue", UNNAMED, _square(0, 10, 6)),
+]
+"""Two random shapes beside a ball."""
+
+
+def _words(caption: str) -> set[str]:
+    return set(caption.replace(",", " ").replace(".", " ").split())
+
+
+def test_an_unknown_noun_is_said_of_random_shapes_before_named_objects(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(image_requests, "KIND_SHARES", {"unknown": 1.0})
+    red = [r for r in drawn(SHAPES) if "red" in _words(r.caption)]
+    assert red and all(torch.equal(request.mask, SHAPES[0].mask) for request in red)
+    balls = [r for r in drawn(SHAPES[1:]) if "red" in _words(r.caption)]
+    assert balls and all(torch.equal(request.mask, SHAPES[1].mask) for request in balls)
+
+
+def test_random_shapes_are_asked_for_by_a_noun_that_is_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(image_requests, "KIND_SHARES", {"named": 1.0})
+    single = drawn(SHAPES[1:])
+    asked = [r.caption for r in single if torch.equal(r.mask, SHAPES[2].mask)]
+    generic = [text for text in asked if {"object", "thing"} & _words(text)]
+    without_color = [text for text in asked if not {"blue", "red"} & _words(text)]
+    assert 0.05 < len(generic) / len(asked) < 0.6
+    assert without_color and not {"object", "thing"} & set().union(*map(_words, without_color))
+    assert not any("ball moves" in text for text in without_color)
+
+
+def test_no_random_shape_is_called_object_beside_another_object_of_its_colour() -> None:
+    called = [
+        request
+        for request in drawn(SHAPES, 900)
+        if "red object" in request.caption and "beside" not in request.caption
+    ]
+    named = [request for request in called if torch.equal(request.mask, SHAPES[1].mask)]
+    assert not named
+
+
+def test_absent_objects_are_no_random_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(image_requests, "KIND_SHARES", {"absent": 1.0})
+    for request in drawn(SHAPES):
+        assert not bool(request.mask.any())
+        assert "object" not in _words(request.caption.partition(" beside ")[0])
