@@ -1,11 +1,10 @@
-"""Captions about objects that no vocabulary has: other nouns, and words that name nothing.
+"""Captions about objects that no vocabulary has: a word that names nothing stands for each.
 
 A user's words are more than any list. Of an unknown one, colour and place in the sentence remain.
 """
 
 import torch
 
-from diff4splat.captions.other_nouns import OTHER_NOUNS
 from diff4splat.captions.phrasings import Choices, request
 from diff4splat.captions.random_draws import draw, draw_number
 from diff4splat.captions.vocabulary import DIRECTIONS
@@ -24,13 +23,6 @@ SECOND_ENDINGS = ("le", "er", "el", "in", "on", "ey", "et", "illar", "mill", "po
 
 
 def draw_unknown_noun(generator: torch.Generator) -> str:
-    """An English noun of no vocabulary, or a word that names nothing, as often."""
-    if draw_number(generator) % 2:
-        return draw(OTHER_NOUNS, generator)
-    return draw_empty_word(generator)
-
-
-def draw_empty_word(generator: torch.Generator) -> str:
     """One or two syllables that English could have: ``plound``, ``stoober``."""
     word = draw(ONSETS, generator) + draw(VOWELS, generator) + draw(ENDINGS, generator)
     return word + draw(SECOND_ENDINGS, generator) if draw_number(generator) % 2 else word
@@ -39,7 +31,7 @@ def draw_empty_word(generator: torch.Generator) -> str:
 def with_unknown_words(sentence: str, generator: torch.Generator) -> str:
     """A sentence after, or before, one to four words that mean nothing."""
     count = 1 + draw_number(generator) % 4
-    words = " ".join(draw_empty_word(generator) for _ in range(count))
+    words = " ".join(draw_unknown_noun(generator) for _ in range(count))
     return f"{words} {sentence}" if draw_number(generator) % 2 else f"{sentence} {words}"
 
 
