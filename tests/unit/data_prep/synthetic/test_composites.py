@@ -70,6 +70,10 @@ def test_composites_move_in_worlds_with_captions_that_parse() -> None:
     assert UNNAMED in moving
 
 
+def test_static_objects_of_worlds_are_composites_too() -> None:
+    assert any(UNNAMED in _names(index, still_share=1.0) for index in range(4))
+
+
 def test_arrangements_of_composites_have_no_other_objects() -> None:
     names = set().union(*(_names(index, arrangements=True) for index in range(6)))
     assert UNNAMED in names and not names & set(NOUNS)

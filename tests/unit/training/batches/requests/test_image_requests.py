@@ -1,5 +1,6 @@
 """Prompts for one image: captions and masks agree, and every kind occurs."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -202,17 +203,26 @@ def test_an_unknown_noun_is_said_of_random_shapes_before_named_objects(
     assert balls and all(torch.equal(request.mask, SHAPES[1].mask) for request in balls)
 
 
-def test_random_shapes_are_asked_for_by_a_noun_that_is_unknown(
+def test_random_shapes_are_asked_for_without_a_colour_by_an_unknown_noun_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(image_requests, "KIND_SHARES", {"named": 1.0})
-    single = drawn(SHAPES[1:])
-    asked = [r.caption for r in single if torch.equal(r.mask, SHAPES[2].mask)]
-    generic = [text for text in asked if {"object", "thing"} & _words(text)]
+    asked = [r.caption for r in drawn(SHAPES[1:]) if torch.equal(r.mask, SHAPES[2].mask)]
     without_color = [text for text in asked if not {"blue", "red"} & _words(text)]
-    assert 0.05 < len(generic) / len(asked) < 0.6
     assert without_color and not {"object", "thing"} & set().union(*map(_words, without_color))
-    assert not any("ball moves" in text for text in without_color)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_random_shapes_of_an_image_share_a_noun_or_are_objects(
+    share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(image_requests, "KIND_SHARES", {"two": 1.0})
+    monkeypatch.setattr(image_requests, "GENERIC_SHARE", share)
+    monkeypatch.setattr(image_requests, "GRAMMAR_SHARE", 1.0)
+    said = [r.caption for r in drawn([SHAPES[0], SHAPES[2]]) if bool(r.mask.any())]
+    nouns = [re.findall(r"(?:red|blue) (\w+)", text) for text in said]
+    assert nouns and all(len(set(pair)) == 1 for pair in nouns)
+    assert all((pair[0] == UNNAMED) == (share == 1.0) for pair in nouns)
 
 
 def test_no_random_shape_is_called_object_beside_another_object_of_its_colour() -> None:
