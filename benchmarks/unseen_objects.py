@@ -5,6 +5,7 @@ Usage: python -m benchmarks.unseen_objects CLIPS OUT
 CLIPS are worlds with random shapes (``prepare synth --composite-share``). OUT gets the same clips,
 in which those are called by one of the twelve nouns that training leaves out, and a protocol:
 ``diff4splat eval --model small --protocol OUT/protocol.json --task text --out RESULT``.
+To weights that were trained with random shapes only the nouns are new.
 """
 
 import argparse
