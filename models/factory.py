@@ -108,7 +108,9 @@ def _dit(config: ModelConfig) -> nn.Module:
 def _monocular_depth(config: ModelConfig) -> nn.Module:
     """On features of the image backbone, or on its own."""
     depth = config.monocular_depth
-    return (BackboneDepthNet if depth.image_backbone else MonocularDepthNet)(depth.channels)
+    if not depth.image_backbone:
+        return MonocularDepthNet(depth.channels)
+    return BackboneDepthNet(depth.channels, uncertainty=depth.uncertainty)
 
 
 def _object_mask(config: ModelConfig) -> nn.Module:

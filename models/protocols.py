@@ -37,6 +37,9 @@ class DepthPrior(Protocol):
     def __call__(self, image: Tensor) -> Tensor:
         """Raw ray distance of every pixel."""
 
+    def predict_distance_and_uncertainty(self, image: Tensor) -> tuple[Tensor, Tensor | None]:
+        """The same by every encoder, and the log uncertainty of log depth, if it has one."""
+
 
 @runtime_checkable
 class MotionPrior(Protocol):

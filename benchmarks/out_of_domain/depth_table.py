@@ -44,7 +44,7 @@ def _predictor(model, side: int) -> Predict:
     @torch.no_grad()
     def predict(rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w"]:
         small = _resized(rgb.movedim(-1, 0), (side, side)).movedim(0, -1)
-        return _resized(predict_depth(network, small, config)[None], rgb.shape[:2])[0]
+        return _resized(predict_depth(network, small, config).depth[None], rgb.shape[:2])[0]
 
     return predict
 

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_prediction import SCALES, predict_depth
+from diff4splat.generation.depth_prediction import SCALES, PredictedDepth, predict_depth
 from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
@@ -88,11 +88,15 @@ def _depths(
     """Depth of the copy; where the prior sees a larger one, its own and that one reduced."""
     if images.depth is not None:
         return _given_depths(images, log)
-    log.depth["source"] = "plane" if model.networks.monocular_depth is None else "model"
-    larger = larger_copy(images, model.config.monocular_depth.photo_scale)
-    if model.networks.monocular_depth is None or larger is images.small:
+    if model.networks.monocular_depth is None:
+        log.depth["source"] = "plane"
         return image_depth(model, images.small), None
-    fine = FineMaps(rgb=larger.rgb, depth=image_depth(model, larger, is_larger=True))
+    larger = larger_copy(images, model.config.monocular_depth.photo_scale)
+    found = predicted_depth(model, larger, is_larger=larger is not images.small)
+    log.depth.update(found.record())
+    if larger is images.small:
+        return found.depth, None
+    fine = FineMaps(rgb=larger.rgb, depth=found.depth)
     return reduced_depth(fine.depth, images.small.camera.size_px), fine
 
 
@@ -105,16 +109,19 @@ def _given_depths(images: Copies, log: RunLog) -> tuple[Float[Tensor, "h w"], Fi
     return reduced_depth(depth, images.small.camera.size_px), fine
 
 
-def image_depth(
-    model: Model, image: InputImage, *, is_larger: bool = False
-) -> Float[Tensor, "h w"]:
-    """Z of every pixel in scene units; ``is_larger`` of the copy that photographs have for it.
+def image_depth(model: Model, image: InputImage) -> Float[Tensor, "h w"]:
+    """Z of every pixel in scene units, by the depth prior or on a plane."""
+    if model.networks.monocular_depth is None:
+        return torch.full_like(image.rgb[..., 0], PLANE_DEPTH)
+    return predicted_depth(model, image).depth
+
+
+def predicted_depth(model: Model, image: InputImage, *, is_larger: bool = False) -> PredictedDepth:
+    """By the depth prior; ``is_larger`` of the copy that photographs have for it.
 
     An image backbone sees a small copy enlarged: it was trained on larger images.
     """
     network, config = model.networks.monocular_depth, model.config.monocular_depth
-    if network is None:
-        return torch.full_like(image.rgb[..., 0], PLANE_DEPTH)
     factor = ENLARGEMENT if config.image_backbone and not is_larger else 1
     scales = [factor * scale for scale in (SCALES if image.reduction > 1 else SCALES[:1])]
     return predict_depth(network, image.rgb, model.config.activation, scales)

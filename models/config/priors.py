@@ -18,11 +18,16 @@ class MonocularDepthConfig:
     """Sides of the copy of a photograph that it sees, against the copy of the other networks."""
     image_backbone: bool = False
     """Whether it also decodes features of the image backbone (ADR 32)."""
+    uncertainty: bool = False
+    """Whether it also says how far off it may be; needs the image backbone (ADR 39)."""
 
     def __post_init__(self) -> None:
         require_optional_width(self, "channels")
         require_counts(self, "photo_scale")
         _require_backbone_fits(self)
+        fits = self.image_backbone or not self.uncertainty
+        where = "MonocularDepthConfig.uncertainty"
+        require(fits, where, "false without the image backbone", self.uncertainty)
 
     @property
     def used(self) -> bool:

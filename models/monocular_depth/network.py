@@ -33,3 +33,9 @@ class MonocularDepthNet(ImageUNet):
     def forward(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 1 h w"]:
         """``image`` is RGB in [0, 1], its sides multiples of 16."""
         return torch.nn.functional.pixel_shuffle(self.head(self.features(image)), FOLDED_PX)
+
+    def predict_distance_and_uncertainty(
+        self, image: Float[Tensor, "b 3 h w"]
+    ) -> tuple[Float[Tensor, "b 1 h w"], None]:
+        """The same: it has one encoder, and does not know how far off it is."""
+        return self(image), None

@@ -67,6 +67,11 @@ class OnnxDepth(OnnxPart):
         """Raw ray distance of every pixel."""
         return run_graph(self.model["monocular_depth"], {"image": image})["raw_distance"]
 
+    def predict_distance_and_uncertainty(self, image: Tensor) -> tuple[Tensor, Tensor | None]:
+        """By every encoder, or by all together where the graph does not part them."""
+        found = run_graph(self.model["monocular_depth"], {"image": image})
+        return found.get("per_encoder", found["raw_distance"]), found.get("log_uncertainty")
+
 
 class OnnxMotion(OnnxPart):
     """As ``MotionUNet``."""

@@ -36,16 +36,24 @@ def text_encoder_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSo
 
 
 def monocular_depth_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
-    """An image to the raw ray distance of its pixels."""
+    """An image to the raw ray distance of its pixels.
+
+    With two encoders also by each of them; ``log_uncertainty`` where the model has it.
+    """
     on_backbone = config.monocular_depth.image_backbone
     size = _image_size(BACKBONE_MULTIPLE_PX if on_backbone else IMAGE_MULTIPLE_PX)
+    outputs = [output("raw_distance", "batch", 1, *size)]
+    if on_backbone:
+        outputs.append(output("per_encoder", "batch", 2, *size))
+    if config.monocular_depth.uncertainty:
+        outputs.append(output("log_uncertainty", "batch", 1, *size))
     return [
         GraphSource(
             name="monocular_depth",
             part="monocular_depth",
-            module=TensorFunction(network, lambda depth, image: (depth(image),)),
+            module=TensorFunction(network, _distances),
             inputs=(unit("image", "batch", 3, *size),),
-            outputs=(output("raw_distance", "batch", 1, *size),),
+            outputs=tuple(outputs),
         )
     ]
 
@@ -100,6 +108,14 @@ def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
 def _image_size(multiple_px: int) -> tuple[str, str]:
     """Symbols of the sides that a network takes."""
     return f"{multiple_px}*rows", f"{multiple_px}*columns"
+
+
+def _distances(network: nn.Module, image: Tensor) -> tuple[Tensor, ...]:
+    per_encoder, uncertainty = network.predict_distance_and_uncertainty(image)
+    if per_encoder.shape[1] == 1:
+        return (per_encoder,)
+    found = (per_encoder.mean(1, keepdim=True), per_encoder, uncertainty)
+    return tuple(one for one in found if one is not None)
 
 
 def _mask_and_instances(network: nn.Module, *inputs: Tensor) -> tuple[Tensor, ...]:

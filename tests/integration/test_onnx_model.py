@@ -54,7 +54,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     """
     config = test_size()
     config = replace(config, dit=replace(config.dit, blocks=1), ldrm=replace(config.ldrm, blocks=1))
-    depth = MonocularDepthConfig(channels=4, image_backbone=True)
+    depth = MonocularDepthConfig(channels=4, image_backbone=True, uncertainty=True)
     config = replace(config, monocular_depth=depth)
     noisy = Model(config=config, networks=create_networks(config))
     generator = torch.Generator().manual_seed(1)

@@ -5,7 +5,11 @@ Axes: ``n`` images, ``h w`` pixels. With the difference R = log D̂ − log D an
     gradient = Σ_k mean_V (|R_{x + 2^k} − R_x| + |R_{y + 2^k} − R_y|),   k = 0 … SCALES − 1
 
 (the gradient term of MiDaS, arXiv 1907.01341, equation 11, at strides instead of resolutions): an
-edge of depth costs where it is, however far everything else is off.
+edge of depth costs where it is, however far everything else is off. With a predicted scale s
+
+    uncertainty = mean_V (|R − median_V R| / s + log s)
+
+(a Laplace likelihood, Kendall and Gal 2017).
 """
 
 import torch
@@ -53,6 +57,18 @@ def inverse_depth_error(
     """Mean |unit / depth − unit / truth| over known pixels."""
     error = unit * (-log_depth).exp() - unit / truth
     return masked_mean(error.abs().flatten(1), known.flatten(1))
+
+
+def laplace_error(
+    difference: Float[Tensor, "n h w"],
+    log_scale: Float[Tensor, "n h w"],
+    known: Bool[Tensor, "n h w"],
+) -> Float[Tensor, " n"]:
+    """Negative log likelihood of ``difference``, which gets no gradient, but for a constant."""
+    middle = torch.where(known, difference, torch.nan).flatten(1).nanmedian(1).values
+    error = (difference - middle[:, None, None]).abs().detach().where(known, 0.0)
+    value = error * (-log_scale).exp() + log_scale
+    return masked_mean(value.flatten(1), known.flatten(1))
 
 
 def _steps(difference: Tensor, known: Tensor, axis: int, stride: int) -> Float[Tensor, " n"]:

@@ -90,6 +90,7 @@ _MODEL_ADDED = (
     "tile_px",
     "expert_boundary",
     "instance_channels",
+    "uncertainty",
 )
 """Settings of networks that are off where they are empty or 0."""
 _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}
@@ -97,7 +98,7 @@ _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}
 _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
 _SOURCE_ADDED = {"depth_loss": "true", "motion_loss": "true", "views": 0, "unit": ""}
 _NOT_DECISIVE = ("workers", "in_memory", "photographs")
-_LOSS_ADDED = {"window_consistency": 0.0, "instances": 0.0}
+_LOSS_ADDED = {"window_consistency": 0.0, "instances": 0.0, "uncertainty": 0.0}
 _ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False, "cutouts": ""}
 """Settings of later releases, with the value that changes nothing."""
 

@@ -80,6 +80,9 @@ class DepthLosses:
     window_consistency: float = 0.0
     """A window of a photograph gets the depth that the whole gives it (ours); needs
     ``data.photographs``."""
+    uncertainty: float = 0.0
+    """Likelihood of the error of log depth (Kendall and Gal 2017); the depth learns nothing from
+    it. Needs ``model.monocular_depth.uncertainty``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

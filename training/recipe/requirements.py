@@ -40,6 +40,9 @@ def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
     require(fits, f"{what}: model.object_mask.instance_channels", "2 or more for its loss", 0)
     fits = stage.kind != "monocular_depth" or model.monocular_depth.used
     require(fits, f"{what}: model.monocular_depth.channels", "a depth network for its kind", 0)
+    needs = stage.kind == "monocular_depth" and stage.losses.uncertainty
+    fits = not needs or model.monocular_depth.uncertainty
+    require(fits, f"{what}: model.monocular_depth.uncertainty", "true for its loss", "false")
 
 
 def _require_data(stage: StageRecipe, model: ModelConfig) -> None:

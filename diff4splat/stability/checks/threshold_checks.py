@@ -133,7 +133,7 @@ def _motion(model: str, noise: float) -> MotionSample:
 def _depth(model: str, noise: float) -> Float[Tensor, "h w"]:
     config = model_of(model).config.activation
     network = model_of(model).networks.monocular_depth
-    return predict_depth(network, _noisy(noise).rgb, config, SCALES[:1])
+    return predict_depth(network, _noisy(noise).rgb, config, SCALES[:1]).depth
 
 
 def _noisy(noise: float) -> InputImage:

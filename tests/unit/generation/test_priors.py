@@ -74,7 +74,7 @@ def test_the_depth_prior_decides_about_depth() -> None:
     for parameter in network.parameters():
         parameter.add_(0.1 * torch.randn_like(parameter))
     for reduction, scales in ((1, SCALES[:1]), (4, SCALES)):
-        wanted = predict_depth(network, image().rgb, model.config.activation, scales)
+        wanted = predict_depth(network, image().rgb, model.config.activation, scales).depth
         actual = image_depth(model, replace(image(), reduction=reduction))
         assert torch.equal(actual, wanted)
         assert float(wanted.std()) > 0
@@ -113,7 +113,7 @@ def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels
     maps = image_maps(model, copies, 2, request, RunLog())
     scales = [ENLARGEMENT * scale for scale in (SCALES if reduction > 1 else SCALES[:1])]
     network, activation = model.networks.monocular_depth, config.activation
-    wanted = predict_depth(network, copies.small.rgb, activation, scales)
+    wanted = predict_depth(network, copies.small.rgb, activation, scales).depth
     assert torch.equal(maps.depth, wanted) and float(wanted.std()) > 0 and maps.fine is None
     if reduction > 1:
         return
@@ -122,7 +122,7 @@ def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels
         model, Copies(image=large, small=downsample(large, 2)), 2, request, RunLog()
     ).fine
     # A copy with its own pixels is large enough already.
-    assert torch.equal(fine.depth, predict_depth(network, large.rgb, activation, SCALES[:1]))
+    assert torch.equal(fine.depth, predict_depth(network, large.rgb, activation, SCALES[:1]).depth)
 
 
 @torch.no_grad()

@@ -34,7 +34,11 @@ from diff4splat.training.batches.random_images.random_views import (
     random_photo,
     random_views,
 )
-from diff4splat.training.losses.log_depth import gradient_error, inverse_depth_error
+from diff4splat.training.losses.log_depth import (
+    gradient_error,
+    inverse_depth_error,
+    laplace_error,
+)
 from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.photo_windows import window_difference
@@ -68,12 +72,21 @@ class MonocularDepthStage(ModelStage):
         return (self.monocular_depth,)
 
     def forward(self, batch: ClipBatch) -> Terms:
-        """The terms ``depth_log``, ``depth_gradient``, ``inverse_depth`` and ``sky_margin``."""
+        """The terms ``depth_log``, ``depth_gradient``, ``inverse_depth`` and ``sky_margin``.
+
+        With a weight also ``uncertainty`` and ``window_consistency``.
+        """
         images, weights = self._views(batch), self.plan.recipe.losses
-        predicted = self.log_depth(self._random_colors(images.rgb, batch))
+        rgb, values = self._random_colors(images.rgb, batch), {}
+        if weights.uncertainty:
+            predicted, log_scale = self.depth_and_uncertainty(rgb)
+            difference = predicted - images.depth.log()
+            values["uncertainty"] = laplace_error(difference, log_scale, images.known)
+        else:
+            predicted = self.log_depth(rgb)
+        values |= depth_terms(predicted, images)
         terms = {
-            name: lambda value=value: _per_sample(value, batch)
-            for name, value in depth_terms(predicted, images).items()
+            name: lambda value=value: _per_sample(value, batch) for name, value in values.items()
         }
         if self.photographs is not None:
             terms["window_consistency"] = lambda: self._window_consistency(batch, images)
@@ -102,6 +115,16 @@ class MonocularDepthStage(ModelStage):
         raw = self.monocular_depth(rgb.contiguous(memory_format=torch.channels_last))
         with torch.autocast(rgb.device.type, enabled=False):
             return log_depth(raw, self.plan.model)
+
+    def depth_and_uncertainty(
+        self, rgb: Float[Tensor, "n 3 h w"]
+    ) -> tuple[Float[Tensor, "n h w"], Float[Tensor, "n h w"]]:
+        """The same, and the logarithm of how far off it may be."""
+        rgb = rgb.contiguous(memory_format=torch.channels_last)
+        raw, log_scale = self.monocular_depth.predict_distance_and_uncertainty(rgb)
+        with torch.autocast(rgb.device.type, enabled=False):
+            depth = log_depth(raw.float().mean(1, keepdim=True), self.plan.model)
+            return depth, log_scale[:, 0].float()
 
     def _views(self, batch: ClipBatch) -> DepthImages:
         """Every image whole, or a random view of it where the recipe names sides of views."""

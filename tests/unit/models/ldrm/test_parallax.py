@@ -1,9 +1,11 @@
 """Depth from parallax: exact on a textured plane, nothing without parallax, finite always."""
 
+import math
 from dataclasses import replace
 
 import pytest
 import torch
+from depth_priors import DistanceOf
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera, pinhole
@@ -139,9 +141,7 @@ def test_what_covers_another_frame_hardly_counts(monkeypatch: pytest.MonkeyPatch
 def test_the_start_distance_has_the_depth_that_the_frames_agree_with() -> None:
     video, config = plane_video(0.05), small_size()
 
-    def prior(image: Tensor) -> Tensor:
-        return torch.full_like(image[:, :1], torch.tensor(1.2 * DEPTH / 4).log())
-
+    prior = DistanceOf(lambda image: torch.full_like(image[:, :1], math.log(1.2 * DEPTH / 4)))
     start = with_start_distance(video, prior, config).start
     near = key_depth(start.prior, config.activation)
     assert float((near / DEPTH - 1.2).abs().max()) < 0.02

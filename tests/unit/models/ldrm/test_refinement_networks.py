@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from depth_priors import DistanceOf
 from oracles_models import randomised
 from torch import Tensor
 
@@ -97,11 +98,7 @@ def test_no_depth_prior_is_a_plane() -> None:
 def test_the_depth_prior_sees_every_key_frame_enlarged() -> None:
     *_, video = inputs(5, (32, 48), 2)
     seen = []
-
-    def prior(image: Tensor) -> Tensor:
-        seen.append(image)
-        return image.mean(1, keepdim=True)
-
+    prior = DistanceOf(lambda image: seen.append(image) or image.mean(1, keepdim=True))
     found = with_start_distance(video, prior, ON_PRIOR)
     (image,) = seen
     assert image.shape == (4, 3, 64, 64)  # multiples of 32

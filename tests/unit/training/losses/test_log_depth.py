@@ -12,6 +12,7 @@ from diff4splat.training.losses.log_depth import (
     LEAST_PIXELS,
     SCALES,
     gradient_error,
+    laplace_error,
     rescale_median,
 )
 
@@ -49,6 +50,49 @@ def test_edges_do_not_ask_for_a_scale() -> None:
         gradient_error(difference + 3, known), gradient_error(difference, known)
     )
     assert float(gradient_error(torch.full_like(difference, 5.0), known)) == 0
+
+
+@given(st.integers(0, 20))
+def test_the_likelihood_of_an_error_agrees_with_the_formula(seed: int) -> None:
+    generator = torch.Generator().manual_seed(seed)
+    difference, log_scale = torch.randn(2, 2, 5, 6, generator=generator, dtype=torch.float64)
+    known = torch.rand(2, 5, 6, generator=generator) < 0.7
+    found = laplace_error(difference, log_scale, known)
+    for place, value in enumerate(found):
+        pairs = zip(difference[place][known[place]], log_scale[place][known[place]], strict=True)
+        errors, logs = zip(*((float(d), float(s)) for d, s in pairs), strict=True)
+        middle = sorted(errors)[(len(errors) - 1) // 2]
+        each = [
+            abs(error - middle) / math.exp(log) + log
+            for error, log in zip(errors, logs, strict=True)
+        ]
+        assert float(value) == pytest.approx(math.fsum(each) / len(each))
+
+
+def test_the_likelihood_teaches_the_scale_alone_and_is_best_at_the_mean_error() -> None:
+    generator = torch.Generator().manual_seed(2)
+    difference = torch.randn(1, 9, 9, generator=generator, dtype=torch.float64)
+    known = torch.ones(1, 9, 9, dtype=torch.bool)
+    error = (difference - difference.median()).abs().mean()
+    log_scale = error.log().expand(1, 9, 9).clone().requires_grad_()
+    given = difference.clone().requires_grad_()
+    laplace_error(given, log_scale, known).sum().backward()
+    assert given.grad is None and abs(float(log_scale.grad.sum())) < 1e-12
+    start = torch.randn(1, 9, 9, generator=generator, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda s: laplace_error(difference, s, known), start)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-30, 30.0])
+def test_the_likelihood_of_extreme_errors_is_finite(size: float) -> None:
+    difference = size * torch.randn(2, 8, 8)
+    known = torch.ones(2, 8, 8, dtype=torch.bool)
+    known[1], difference[0, 0, 0] = False, torch.nan
+    known[0, 0, 0] = False
+    for log in (-6.0, 2.0):
+        log_scale = torch.full((2, 8, 8), log, requires_grad=True)
+        found = laplace_error(difference, log_scale, known)
+        found.nansum().backward()
+        assert bool(found[0].isfinite()) and bool(log_scale.grad.isfinite().all())
 
 
 def test_gradients_are_right_and_nothing_comes_from_hidden_pixels() -> None:

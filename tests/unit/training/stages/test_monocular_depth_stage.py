@@ -11,7 +11,9 @@ from torch import Tensor
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import MonocularDepthConfig
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
+from diff4splat.training.recipe.fingerprint import decisive, fingerprint
 from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_to_dict
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.kinds import monocular_depth
 from diff4splat.training.stages.kinds.monocular_depth import SKY_DEPTH, batch_images
@@ -160,3 +162,41 @@ def test_sides_that_the_network_cannot_take_are_refused(sides: tuple[int, ...]) 
     data = depth_recipe().data
     with pytest.raises(ConfigError, match=r"view_sides_px: expected multiples of 16"):
         replace(data, view_sides_px=sides)
+
+
+UNSURE = replace(
+    MODEL,
+    monocular_depth=MonocularDepthConfig(channels=4, image_backbone=True, uncertainty=True),
+)
+
+
+def test_uncertainty_is_learnt_beside_depth_or_alone() -> None:
+    recipe = depth_recipe(uncertainty=0.5)
+    recipe = replace(recipe, data=replace(recipe.data, view_sides_px=(32,)))
+    stage, batch = make_stage(recipe, model=UNSURE), with_sky(make_batch(recipe, (0, 1)))
+    shake_heads(stage)
+    terms = stage(batch)
+    assert terms["uncertainty"].shape == (2,) and bool(terms["uncertainty"].isfinite().all())
+    assert terms["depth_log"].shape == (2,)
+    none = {"depth_log": 0.0, "depth_gradient": 0.0, "inverse_depth": 0.0, "sky_margin": 0.0}
+    alone = replace(recipe, losses=depth_recipe(uncertainty=1.0, **none).losses)
+    stage = make_stage(alone, model=UNSURE)
+    terms = stage(batch)
+    assert set(terms) == {"uncertainty", TOTAL}
+    terms[TOTAL].sum().backward()
+    learnt = {name for name, one in stage.named_parameters() if one.grad is not None}
+    assert learnt and all(name.startswith("monocular_depth.uncertainty.") for name in learnt)
+
+
+def test_its_weight_without_the_head_is_refused() -> None:
+    recipe = depth_recipe(uncertainty=1.0)
+    with pytest.raises(ConfigError, match=r"monocular_depth\.uncertainty: expected true for its"):
+        Recipe(name="r", seed=0, model=MODEL, stages=(recipe,))
+
+
+def test_runs_from_before_uncertainty_go_on() -> None:
+    recipe = Recipe(name="r", seed=0, model=MODEL, stages=(depth_recipe(),))
+    assert "uncertainty" not in decisive(recipe_to_dict(recipe)["stages"][0])["losses"]
+    unsure = Recipe(name="r", seed=0, model=UNSURE, stages=(depth_recipe(uncertainty=1.0),))
+    name = "monocular_depth"
+    assert fingerprint(recipe, name) != fingerprint(unsure, name)

@@ -1,0 +1,62 @@
+"""One depth map from those of several passes and encoders (ours, ADR 39).
+
+Axes: ``p`` passes, ``e`` encoders, ``h w`` pixels of log depth. On images like those of training
+both encoders say the same, and their plain mean is best. On foreign ones they differ. Then the
+image backbone is more often right, and the mean of maps that differ is flatter than each of them:
+it gets their spread back.
+"""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+ALIKE, FOREIGN = 0.8, 1.2
+"""Disagreement of the encoders on an image like those of training, and on a foreign one."""
+BACKBONE_SHARE = 0.65
+"""Of the first encoder in the mean on a foreign image; a half on one like those of training."""
+MOST_STRETCH = 2.0
+"""Maps that contradict each other have no spread to give back."""
+
+
+def fused(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, "h w"]:
+    """The mean of the maps with their own spread, and with median 0."""
+    maps = maps - _median(maps)
+    share = _encoder_shares(maps)[:, None, None]
+    mean = (share * maps).sum(1).mean(0)
+    spread = (share * _spread(maps)).sum(1).mean()
+    return (mean - _median(mean)) * _stretch(spread, _spread(mean))
+
+
+def foreignness(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, ""]:
+    """0 for an image like those of training, 1 for a foreign one; 0 with one encoder.
+
+    Two encoders disagree by their mean difference over the mean spread of their maps.
+    """
+    if maps.shape[1] != 2:
+        return maps.new_zeros(())
+    maps = maps - _median(maps)
+    difference = (maps[:, 0] - maps[:, 1]).abs().mean()
+    disagreement = difference / _spread(maps).mean().clamp_min(torch.finfo(maps.dtype).tiny)
+    return ((disagreement - ALIKE) / (FOREIGN - ALIKE)).clamp(0, 1)
+
+
+def _encoder_shares(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, " e"]:
+    """Weights of the encoders: alike, or more of the first where two of them disagree."""
+    shares = maps.new_full(maps.shape[1:2], 1 / maps.shape[1])
+    shift = (BACKBONE_SHARE - 0.5) * foreignness(maps)
+    return shares + torch.stack([shift, -shift]) if len(shares) == 2 else shares
+
+
+def _stretch(wanted: Float[Tensor, ""], spread: Float[Tensor, "*b"]) -> Float[Tensor, "*b"]:
+    """Factor that brings a ``spread`` to the ``wanted`` one, at most ``MOST_STRETCH``."""
+    ratio = wanted / spread.clamp_min(torch.finfo(spread.dtype).tiny)
+    return torch.where(spread > 0, ratio.clamp_max(MOST_STRETCH), 1.0)
+
+
+def _spread(maps: Float[Tensor, "*b h w"]) -> Float[Tensor, "*b 1 1"]:
+    """Mean absolute difference from the median."""
+    return (maps - _median(maps)).abs().mean((-2, -1), keepdim=True)
+
+
+def _median(maps: Float[Tensor, "*b h w"]) -> Float[Tensor, "*b 1 1"]:
+    return maps.flatten(-2).median(-1).values[..., None, None]
