@@ -152,7 +152,7 @@ def _monocular_depth(vae: StageRecipe, data: DataSettings) -> StageRecipe:
         global_batch=8,
         micro_batch=8,
         trained=("monocular_depth",),
-        losses=DepthLosses(),
+        losses=DepthLosses(uncertainty=1.0),
         optimizer=OptimizerSettings(
             learning_rate=1e-3, warmup_steps=100, part_rates=(("monocular_depth.backbone", 0.1),)
         ),

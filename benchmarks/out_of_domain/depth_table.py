@@ -1,11 +1,14 @@
 """Depth of path-traced images and of photographs: error, and agreement with itself.
 
-A ramp of the image row is the row to beat: it does not look at the image. Axes: ``h w`` pixels.
+A ramp of the image row is the row to beat: it does not look at the image. Of the uncertainty of a
+prior: its rank correlation with the error of log depth within an image, and the mean error of the
+surer half of the pixels as a share of the mean error. Axes: ``h w`` pixels.
 """
 
 import argparse
 import statistics
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +21,12 @@ from diff4splat.io.atomic import write_text
 from diff4splat.models.hub.model import load_model
 from diff4splat.training.batches.random_images.photographs import middle_square
 
-Predict = Callable[[Float[Tensor, "h w 3"]], Float[Tensor, "h w"]]
+Maps = tuple[Float[Tensor, "h w"], Float[Tensor, "h w"] | None]
+"""Depth, and its uncertainty."""
+Predict = Callable[[Float[Tensor, "h w 3"]], Maps]
 HEADER = (
-    "| depth | px | AbsRel | r of log depth | mirrored | middle 60 % | at 3/4 |\n"
-    "|---|---:|---:|---:|---:|---:|---:|\n"
+    "| depth | px | AbsRel | r of log depth | mirrored | middle 60 % | at 3/4 | "
+    "uncertainty: rank | surer half |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|\n"
 )
 
 
@@ -42,27 +47,35 @@ def _predictor(model, side: int) -> Predict:
     network, config = model.networks.monocular_depth, model.config.activation
 
     @torch.no_grad()
-    def predict(rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w"]:
+    def predict(rgb: Float[Tensor, "h w 3"]) -> Maps:
         small = _resized(rgb.movedim(-1, 0), (side, side)).movedim(0, -1)
-        return _resized(predict_depth(network, small, config).depth[None], rgb.shape[:2])[0]
+        found = predict_depth(network, small, config)
+        maps = [found.depth, found.uncertainty]
+        return tuple(m if m is None else _resized(m[None], rgb.shape[:2])[0] for m in maps)
 
     return predict
 
 
-def _ramp(rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w"]:
+def _ramp(rgb: Float[Tensor, "h w 3"]) -> Maps:
     height = rgb.shape[0]
     row = (torch.arange(height) + 0.5) / height
-    return (1 / (0.2 + row))[:, None].expand(rgb.shape[:2]).contiguous()
+    return (1 / (0.2 + row))[:, None].expand(rgb.shape[:2]).contiguous(), None
 
 
 def _row(name: str, side: str, predict: Predict, images, photos) -> str:
-    errors, correlations = zip(
-        *(_errors(predict(rgb), depth) for rgb, depth in images), strict=True
-    )
-    agree = [_agreement(predict, rgb) for rgb in photos]
-    cells = [statistics.mean(errors), statistics.mean(correlations)]
-    cells += [statistics.mean(column) for column in zip(*agree, strict=True)]
-    return f"| {name} | {side} | " + " | ".join(f"{cell:.3f}" for cell in cells) + " |"
+    found = [(*predict(rgb), depth) for rgb, depth in images]
+    columns = [*zip(*(_errors(depth, truth) for depth, _, truth in found), strict=True)]
+    depth_of = partial(_depth_of, predict)
+    columns += zip(*(_agreement(depth_of, rgb) for rgb in photos), strict=True)
+    if found[0][1] is not None:
+        columns += zip(*(_knowledge(*one) for one in found), strict=True)
+    cells = [f"{statistics.mean(column):.3f}" for column in columns]
+    cells += [""] * (7 - len(cells))
+    return f"| {name} | {side} | " + " | ".join(cells) + " |"
+
+
+def _depth_of(predict: Predict, rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w"]:
+    return predict(rgb)[0]
 
 
 def _errors(depth: Float[Tensor, "h w"], truth: Float[Tensor, "h w"]) -> tuple[float, float]:
@@ -73,7 +86,22 @@ def _errors(depth: Float[Tensor, "h w"], truth: Float[Tensor, "h w"]) -> tuple[f
     return float(((depth - truth).abs() / truth).mean()), _pearson(depth.log(), truth.log())
 
 
-def _agreement(predict: Predict, rgb: Float[Tensor, "h w 3"]) -> tuple[float, float, float]:
+def _knowledge(
+    depth: Float[Tensor, "h w"], uncertainty: Float[Tensor, "h w"], truth: Float[Tensor, "h w"]
+) -> tuple[float, float]:
+    """Rank correlation of uncertainty and error, and the error of the surer half over all."""
+    known = truth > 0
+    error = depth[known].log() - truth[known].log()
+    error = (error - error.median()).abs()
+    order = uncertainty[known].argsort()
+    surer = error[order[: len(order) // 2]].mean() / error.mean()
+    ranks = [values.argsort().argsort().float() for values in (uncertainty[known], error)]
+    return _pearson(*ranks), float(surer)
+
+
+def _agreement(
+    predict: Callable[[Float[Tensor, "h w 3"]], Float[Tensor, "h w"]], rgb: Float[Tensor, "h w 3"]
+) -> tuple[float, float, float]:
     """Correlation of log depth with that of the mirrored, the cropped and the reduced image."""
     whole = predict(rgb).log()
     mirrored = predict(rgb.flip(1)).flip(1).log()

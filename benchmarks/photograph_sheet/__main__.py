@@ -1,6 +1,7 @@
-"""Command line of the sheet."""
+"""Command line of the sheet: ``python -m benchmarks.photograph_sheet --out sheet.jpg``."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -11,8 +12,15 @@ from torch import Tensor
 
 from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load
 from diff4splat.generation.inputs.image_size import find_image_size
-from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
+from diff4splat.generation.inputs.input_image import (
+    InputImage,
+    choose_focal,
+    downsample,
+    prepare_image,
+)
 from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.priors import predicted_depth
+from diff4splat.models.hub.model import Model, load_model
 from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings
 from diff4splat.render.api import render
@@ -24,6 +32,8 @@ ORBITS = ("orbit:0.0417", "orbit:-0.0417")
 CELL_PX = (180, 240)
 """Height and width of a picture of the sheet."""
 COLUMNS = 2
+MOST_UNSURE = 0.5
+"""Uncertainty of log depth that is red: off by two thirds."""
 QUALITY = 90
 
 
@@ -32,11 +42,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="small")
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--uncertainty", action="store_true", help="depth and how unsure it is")
     arguments = parser.parse_args()
-    pipeline = Diff4SplatPipeline.from_pretrained(arguments.model)
+    if arguments.uncertainty:
+        row = partial(uncertainty_row, load_model(arguments.model, parts=("monocular_depth",)))
+    else:
+        row = partial(view_row, Diff4SplatPipeline.from_pretrained(arguments.model))
     rows = []
     for photograph in PHOTOGRAPHS:
-        rows.append(row(pipeline, prepared(photograph, arguments.model)))
+        rows.append(row(prepared(photograph, arguments.model)))
         print(photograph.name, flush=True)
     half = -(-len(rows) // COLUMNS)
     sheet = np.hstack(
@@ -54,7 +68,7 @@ def prepared(photograph: Photograph, model: str) -> InputImage:
 
 
 @torch.no_grad()
-def row(pipeline: Diff4SplatPipeline, picture: InputImage) -> UInt8[np.ndarray, "h w 3"]:
+def view_row(pipeline: Diff4SplatPipeline, picture: InputImage) -> UInt8[np.ndarray, "h w 3"]:
     """The photograph, 15 degrees to one side and to the other, depth."""
     scene = pipeline(picture, "static")
     view, images = scene_frame(scene, picture.camera), [picture.rgb]
@@ -66,11 +80,26 @@ def row(pipeline: Diff4SplatPipeline, picture: InputImage) -> UInt8[np.ndarray, 
     return np.hstack([in_cell(cell) for cell in (*cells, depth_colors(depth))])
 
 
+@torch.no_grad()
+def uncertainty_row(model: Model, picture: InputImage) -> UInt8[np.ndarray, "h w 3"]:
+    """The photograph, its depth, and the uncertainty of log depth: blue is sure."""
+    found = predicted_depth(model, downsample(picture, 2), is_larger=True)
+    share = (found.uncertainty / MOST_UNSURE).clamp(0, 1)
+    rgb = (255 * picture.rgb).round().byte().numpy()
+    unsure = turbo(share.numpy())
+    return np.hstack([in_cell(cell) for cell in (rgb, depth_colors(found.depth), unsure)])
+
+
 def depth_colors(depth: Float[Tensor, "h w"]) -> UInt8[np.ndarray, "h w 3"]:
     """Near is red; the range of a picture is at least a factor of e^0.3."""
     nearness = -depth.clamp_min(1e-3).log().numpy()
     low, high = np.percentile(nearness, [2, 98])
     share = ((nearness - low) / max(high - low, 0.3)).clip(0, 1)
+    return turbo(share)
+
+
+def turbo(share: Float[np.ndarray, "h w"]) -> UInt8[np.ndarray, "h w 3"]:
+    """0 is blue, 1 is red."""
     return cv2.applyColorMap((255 * share).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1]
 
 

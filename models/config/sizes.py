@@ -64,7 +64,9 @@ def small_size() -> ModelConfig:
         ),
         activation=ActivationConfig(),
         refinement=RefinementConfig(channels=48, depth_prior=True),
-        monocular_depth=MonocularDepthConfig(channels=32, photo_scale=2, image_backbone=True),
+        monocular_depth=MonocularDepthConfig(
+            channels=32, photo_scale=2, image_backbone=True, uncertainty=True
+        ),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
         object_mask=ObjectMaskConfig(width=24, image_backbone=True, instance_channels=12),
         default_fill="none",

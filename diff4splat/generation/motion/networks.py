@@ -13,7 +13,7 @@ from diff4splat.models.networks import Networks
 from diff4splat.models.object_mask.enlarged import enlarged, reduced
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
-LEAST_PROBABILITY = 0.35
+LEAST_PROBABILITY = 0.4
 """Of the most probable pixel; below it nothing moves: the object is not there."""
 LEAST_SHARE = 0.85
 """Of the highest probability; components below it are other objects, and stay (both chosen on

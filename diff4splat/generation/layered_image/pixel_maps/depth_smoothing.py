@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-SMOOTHNESS, COLOR_STEP = 100.0, 8.0
+SMOOTHNESS, COLOR_STEP = 30.0, 8.0
 """Weight of neighbours, and the difference of 8-bit colours at which it falls to 1/e."""
 
 

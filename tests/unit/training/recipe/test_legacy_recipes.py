@@ -67,9 +67,10 @@ STAGES_OF_SMALL = (
 def since(old: ModelConfig, new: ModelConfig) -> ModelConfig:
     """Sets what the first release did not know and this one sets for ``small``."""
     assert old.monocular_depth.photo_scale == old.motion_unet.input_scale == 1
+    prior = replace(old.monocular_depth, photo_scale=2, image_backbone=True, uncertainty=True)
     return replace(
         old,
-        monocular_depth=replace(old.monocular_depth, photo_scale=2, image_backbone=True),
+        monocular_depth=prior,
         motion_unet=replace(old.motion_unet, input_scale=2),
         object_mask=new.object_mask,
         refinement=replace(old.refinement, depth_prior=True),
@@ -91,8 +92,10 @@ def test_every_stage_of_the_small_recipe_loads_as_the_one_of_this_release() -> N
         names = {after: before for before, after in NAMES.items()}
         found = replace(old.stage(names.get(stage.name, stage.name)), name=stage.name)
         if stage.kind == "monocular_depth":
-            # Its network had no image backbone yet.
+            # Its network had no image backbone yet, and no uncertainty.
             assert not found.public_backbone and not found.optimizer.part_rates
+            assert found.losses.uncertainty == 0
+            found = replace(found, losses=replace(found.losses, uncertainty=1.0))
             found = replace(found, optimizer=stage.optimizer, public_backbone=True, **UNUSED)
         if stage.kind == "video_diffusion":
             # The first release weighed hidden cells like all others.
