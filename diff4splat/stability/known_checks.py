@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from diff4splat.stability.check import Check
 from diff4splat.stability.checks.camera_checks import camera_checks
+from diff4splat.stability.checks.depth_checks import depth_checks
 from diff4splat.stability.checks.fit_checks import fit_checks
 from diff4splat.stability.checks.gaussian_checks import gaussian_checks
 from diff4splat.stability.checks.image_checks import image_checks
@@ -31,6 +32,7 @@ OF_MODEL: dict[str, Callable[[str], Iterable[Check]]] = {
 OF_LIBRARY: dict[str, Callable[[], Iterable[Check]]] = {
     "samplers": sampler_checks,
     "cameras": camera_checks,
+    "depth": depth_checks,
     "motion": motion_checks,
     "gaussians": gaussian_checks,
     "losses": loss_checks,

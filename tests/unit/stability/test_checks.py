@@ -10,6 +10,7 @@ from diff4splat.geometry.camera import pinhole
 from diff4splat.render.raster import backend as raster
 from diff4splat.stability.check import Check
 from diff4splat.stability.checks.camera_checks import camera_checks
+from diff4splat.stability.checks.depth_checks import depth_checks
 from diff4splat.stability.checks.gaussian_checks import gaussian_checks
 from diff4splat.stability.checks.image_checks import image_checks
 from diff4splat.stability.checks.loss_checks import loss_checks
@@ -99,6 +100,11 @@ def test_the_quick_checks_of_cheap_groups_are_ok(checks) -> None:
     for check in checks():
         if check.quick:
             assert run_check(check).verdict in ("ok", "refused"), check.name
+
+
+def test_fused_depth_is_finite_and_exact_for_all_maps() -> None:
+    for check in depth_checks():
+        assert run_check(check).verdict == "ok", check.name
 
 
 def test_a_network_in_every_precision() -> None:
