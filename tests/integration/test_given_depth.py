@@ -54,8 +54,11 @@ def test_a_network_decides_it_too_and_fills_by_video(photo: Path, tmp_path: Path
     assert {"dit", "ldrm", "monocular_depth"} <= set(card["networks_run"])
 
 
-def test_without_it_the_card_says_so(photo: Path, tmp_path: Path) -> None:
-    assert generated(photo, tmp_path / "out")["depth"] == {"source": "model"}
+def test_without_it_the_card_says_so_and_how_sure_the_model_is(photo: Path, tmp_path: Path) -> None:
+    depth = generated(photo, tmp_path / "out")["depth"]
+    assert depth.pop("source") == "model"
+    assert set(depth) == {"foreign", "median_uncertainty"}
+    assert 0 <= depth["foreign"] <= 1 and 0 < depth["median_uncertainty"] < 7.4
 
 
 def refused(photo: Path, capsys: pytest.CaptureFixture, *more: str) -> str:
