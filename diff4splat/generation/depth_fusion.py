@@ -20,7 +20,6 @@ MOST_STRETCH = 2.0
 
 def fused(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, "h w"]:
     """The mean of the maps with their own spread, and with median 0."""
-    maps = maps - _median(maps)
     share = _encoder_shares(maps)[:, None, None]
     mean = (share * maps).sum(1).mean(0)
     spread = (share * _spread(maps)).sum(1).mean()

@@ -104,6 +104,13 @@ def test_units_do_not_matter(seed: int, shift: float, factor: float) -> None:
     torch.testing.assert_close(foreignness(factor * maps + shift), foreignness(maps))
 
 
+def test_every_map_may_have_a_unit_of_its_own() -> None:
+    maps = alike(1.0).repeat(3, 1, 1, 1)
+    shifted = maps + torch.randn(3, 2, 1, 1, dtype=torch.float64)
+    torch.testing.assert_close(foreignness(shifted), foreignness(maps))
+    torch.testing.assert_close(fused(shifted), fused(maps))
+
+
 def test_the_spread_is_never_lost() -> None:
     for seed in range(20):
         maps = random_maps(seed=seed)

@@ -1,5 +1,6 @@
 """The stage that trains the depth of single images."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -186,6 +187,19 @@ def test_uncertainty_is_learnt_beside_depth_or_alone() -> None:
     terms[TOTAL].sum().backward()
     learnt = {name for name, one in stage.named_parameters() if one.grad is not None}
     assert learnt and all(name.startswith("monocular_depth.uncertainty.") for name in learnt)
+
+
+def test_the_scale_divides_the_error() -> None:
+    recipe = depth_recipe(uncertainty=1.0)
+    recipe = replace(recipe, data=replace(recipe.data, view_sides_px=(32,)))
+    stage, batch = make_stage(recipe, model=UNSURE), with_sky(make_batch(recipe, (0, 1)))
+    bias, errors = stage.monocular_depth.uncertainty.head.bias, []
+    for log_scale in (1.0, -1.0):
+        torch.nn.init.constant_(bias, log_scale)
+        term = stage(batch)["uncertainty"].detach()
+        errors.append((term - log_scale) * math.exp(log_scale))
+    torch.testing.assert_close(*errors)
+    assert bool((errors[0] > 0.01).all())
 
 
 def test_its_weight_without_the_head_is_refused() -> None:
