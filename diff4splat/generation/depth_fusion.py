@@ -1,19 +1,20 @@
 """One depth map from those of several passes and encoders (ours, ADR 39).
 
-Axes: ``p`` passes, ``e`` encoders, ``h w`` pixels of log depth. On images like those of training
-both encoders say the same, and their plain mean is best. On foreign ones they differ. Then the
-image backbone is more often right, and the mean of maps that differ is flatter than each of them:
-it gets their spread back.
+Axes: ``p`` passes, ``e`` encoders, ``h w`` pixels of log depth. On images in the domain of training
+both encoders say the same, and their plain mean is best. On others they differ. Then the image
+backbone is more often right, and the mean of maps that differ is flatter than each of them: it gets
+their spread back.
 """
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-ALIKE, FOREIGN = 0.8, 1.2
-"""Disagreement of the encoders on an image like those of training, and on a foreign one."""
+IN_DOMAIN, OUT_OF_DOMAIN = 0.8, 1.2
+"""Disagreement of the encoders up to which an image is in the domain of training, and from which on
+it is out of it."""
 BACKBONE_SHARE = 0.65
-"""Of the first encoder in the mean on a foreign image; a half on one like those of training."""
+"""Of the first encoder in the mean on an image out of domain; a half on one in domain."""
 MOST_STRETCH = 2.0
 """Maps that contradict each other have no spread to give back."""
 
@@ -26,8 +27,8 @@ def fused(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, "h w"]:
     return (mean - _median(mean)) * _stretch(spread, _spread(mean))
 
 
-def foreignness(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, ""]:
-    """0 for an image like those of training, 1 for a foreign one; 0 with one encoder.
+def out_of_domain_score(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, ""]:
+    """0 for an image in the domain of training, 1 for one out of it; 0 with one encoder.
 
     Two encoders disagree by their mean difference over the mean spread of their maps.
     """
@@ -36,13 +37,13 @@ def foreignness(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, ""]:
     maps = maps - _median(maps)
     difference = (maps[:, 0] - maps[:, 1]).abs().mean()
     disagreement = difference / _spread(maps).mean().clamp_min(torch.finfo(maps.dtype).tiny)
-    return ((disagreement - ALIKE) / (FOREIGN - ALIKE)).clamp(0, 1)
+    return ((disagreement - IN_DOMAIN) / (OUT_OF_DOMAIN - IN_DOMAIN)).clamp(0, 1)
 
 
 def _encoder_shares(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, " e"]:
     """Weights of the encoders: alike, or more of the first where two of them disagree."""
     shares = maps.new_full(maps.shape[1:2], 1 / maps.shape[1])
-    shift = (BACKBONE_SHARE - 0.5) * foreignness(maps)
+    shift = (BACKBONE_SHARE - 0.5) * out_of_domain_score(maps)
     return shares + torch.stack([shift, -shift]) if len(shares) == 2 else shares
 
 

@@ -14,8 +14,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_calming import calmed
-from diff4splat.generation.depth_fusion import foreignness, fused
+from diff4splat.generation.depth_fusion import fused, out_of_domain_score
+from diff4splat.generation.depth_shrinkage import shrunk
 from diff4splat.models.blocks.resize import nearest_multiple
 from diff4splat.models.config.networks import ActivationConfig
 from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
@@ -34,12 +34,12 @@ class PredictedDepth:
     """Z in scene units."""
     uncertainty: Float[Tensor, "h w"] | None
     """Scale of the error of log depth, if the prior predicts it."""
-    foreign: Float[Tensor, ""]
-    """0 for an image like those of training, to 1."""
+    out_of_domain: Float[Tensor, ""]
+    """0 for an image in the domain of training, to 1."""
 
     def record(self) -> dict[str, object]:
         """For the log of a run: numbers over the image."""
-        record = {"source": "model", "foreign": round(float(self.foreign), 3)}
+        record = {"source": "model", "out_of_domain": round(float(self.out_of_domain), 3)}
         if self.uncertainty is None:
             return record
         return record | {"median_uncertainty": round(float(self.uncertainty.median()), 3)}
@@ -51,17 +51,17 @@ def predict_depth(
     config: ActivationConfig,
     scales: Sequence[float] = SCALES,
 ) -> PredictedDepth:
-    """The passes fused, and calmed where they are unsure."""
+    """The passes fused, and shrunk where they are unsure."""
     image = rgb.movedim(-1, 0)[None]
     passes = [_pass(network, one, config) for one in _scaled(image, scales)]
     maps = torch.cat([_resized(one, rgb.shape[:2]) for one, _ in passes])
-    unit, foreign, log_depth = maps[:2].mean((0, 1)).median(), foreignness(maps), fused(maps)
+    unit, score, log_depth = maps[:2].mean((0, 1)).median(), out_of_domain_score(maps), fused(maps)
     unsure = [_resized(one, rgb.shape[:2]) for _, one in passes if one is not None]
     uncertainty = torch.cat(unsure).exp().mean((0, 1)) if unsure else None
     if uncertainty is not None:
-        log_depth = calmed(log_depth, uncertainty, foreign)
+        log_depth = shrunk(log_depth, uncertainty, score)
     depth = (unit + log_depth).exp()
-    return PredictedDepth(depth=depth, uncertainty=uncertainty, foreign=foreign)
+    return PredictedDepth(depth=depth, uncertainty=uncertainty, out_of_domain=score)
 
 
 def _pass(

@@ -20,7 +20,7 @@ GROUPS = {
     "images": "Inputs that are no photographs. Thumbnails: input, first view, a view from the "
     "side.",
     "cameras": "Lenses and places of the camera that no photographer chooses.",
-    "depth": "Depth of two encoders, fused and calmed: maps that agree, contradict each other, are "
+    "depth": "Depth of two encoders, fused and shrunk: maps that agree, contradict each other, are "
     "flat or extreme.",
     "motion": "Nothing moves, everything moves, and rotations by half a turn.",
     "gaussians": "Degenerate Gaussians, rasterised and ray traced.",

@@ -2,7 +2,7 @@
 
 Axes: ``b`` batch, ``h w`` pixels. The U-Net knows where in the image a pixel lies and what drawn
 worlds look like, the backbone what photographs show. Their errors differ, so the mean of their raw
-distances is better than either. How far they differ says how foreign an image is.
+distances is better than either. How far they differ says how far an image is out of domain.
 """
 
 import torch

@@ -57,8 +57,8 @@ def test_a_network_decides_it_too_and_fills_by_video(photo: Path, tmp_path: Path
 def test_without_it_the_card_says_so_and_how_sure_the_model_is(photo: Path, tmp_path: Path) -> None:
     depth = generated(photo, tmp_path / "out")["depth"]
     assert depth.pop("source") == "model"
-    assert set(depth) == {"foreign", "median_uncertainty"}
-    assert 0 <= depth["foreign"] <= 1 and 0 < depth["median_uncertainty"] < 7.4
+    assert set(depth) == {"out_of_domain", "median_uncertainty"}
+    assert 0 <= depth["out_of_domain"] <= 1 and 0 < depth["median_uncertainty"] < 7.4
 
 
 def refused(photo: Path, capsys: pytest.CaptureFixture, *more: str) -> str:

@@ -1,4 +1,4 @@
-"""Fused and calmed depth of extreme maps, float32 against float64.
+"""Fused and shrunk depth of extreme maps, float32 against float64.
 
 Axes: ``p`` passes, ``e`` encoders, ``h w`` pixels of log depth.
 """
@@ -10,8 +10,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_calming import calmed
-from diff4splat.generation.depth_fusion import foreignness, fused
+from diff4splat.generation.depth_fusion import fused, out_of_domain_score
+from diff4splat.generation.depth_shrinkage import shrunk
 from diff4splat.models.monocular_depth.uncertainty import LOG_LIMITS
 from diff4splat.stability.check import Check, Outcome
 from diff4splat.stability.compare import all_finite, relative_error
@@ -42,14 +42,14 @@ def measure_depth(maps: Maps) -> Outcome:
     return Outcome(
         error=relative_error(got, exact),
         value_finite=all_finite([got]),
-        note=f"foreign {float(foreignness(maps)):.2g}",
+        note=f"out of domain {float(out_of_domain_score(maps)):.2g}",
     )
 
 
 def _log_depth(maps: Maps) -> Float[Tensor, "h w"]:
     log_scale = torch.full_like(maps[0, 0], LOG_LIMITS[0])
     log_scale[::2, ::2] = LOG_LIMITS[1]
-    return calmed(fused(maps), log_scale.exp(), foreignness(maps))
+    return shrunk(fused(maps), log_scale.exp(), out_of_domain_score(maps))
 
 
 def _kinds() -> dict[str, Maps]:

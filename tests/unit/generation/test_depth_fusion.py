@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from diff4splat.generation.depth_fusion import (
-    ALIKE,
     BACKBONE_SHARE,
-    FOREIGN,
+    IN_DOMAIN,
     MOST_STRETCH,
-    foreignness,
+    OUT_OF_DOMAIN,
     fused,
+    out_of_domain_score,
 )
 
 
@@ -37,8 +37,8 @@ def from_the_formula(maps: Tensor) -> Tensor:
     spreads = [[spread(one) for one in both] for both in passes]
     mean_spread = sum(map(sum, spreads)) / (2 * len(passes))
     difference = sum(float((a - b).abs().mean()) for a, b in passes) / len(passes)
-    foreign = min(1, max(0, (difference / mean_spread - ALIKE) / (FOREIGN - ALIKE)))
-    share = 0.5 + (BACKBONE_SHARE - 0.5) * foreign
+    score = (difference / mean_spread - IN_DOMAIN) / (OUT_OF_DOMAIN - IN_DOMAIN)
+    share = 0.5 + (BACKBONE_SHARE - 0.5) * min(1, max(0, score))
     mean = sum(share * a + (1 - share) * b for a, b in passes) / len(passes)
     wanted = sum(share * a + (1 - share) * b for a, b in spreads) / len(passes)
     return centred(mean) * min(MOST_STRETCH, wanted / spread(mean))
@@ -61,16 +61,18 @@ def test_the_fused_map_follows_from_the_formula(seed: int) -> None:
 def test_encoders_that_agree_are_left_as_they_are() -> None:
     one = random_maps(1, 1).expand(4, 2, 5, 7)
     torch.testing.assert_close(fused(one), centred(one[0, 0]))
-    assert float(foreignness(one)) == 0
+    assert float(out_of_domain_score(one)) == 0
 
 
-def test_an_image_is_the_more_foreign_the_more_its_encoders_disagree() -> None:
-    found = [float(foreignness(alike(difference))) for difference in (0.3, 0.9, 1.0, 1.1, 1.8)]
+def test_an_image_is_the_farther_out_of_domain_the_more_its_encoders_disagree() -> None:
+    found = [
+        float(out_of_domain_score(alike(difference))) for difference in (0.3, 0.9, 1.0, 1.1, 1.8)
+    ]
     assert found[0] == 0 and found[-1] == 1
     assert found == sorted(found) and 0 < found[2] < 1
 
 
-def test_a_foreign_image_trusts_the_backbone_more() -> None:
+def test_the_backbone_counts_more_out_of_domain() -> None:
     first, second = torch.eye(6), torch.eye(6).flip(0)
     found = fused(torch.stack([first, second])[None].double())
     assert float((found * first).sum()) > 1.5 * float((found * second).sum()) > 0
@@ -101,13 +103,15 @@ def test_flat_maps_stay_flat(encoders: int, value: float) -> None:
 def test_units_do_not_matter(seed: int, shift: float, factor: float) -> None:
     maps = random_maps(seed=seed)
     torch.testing.assert_close(fused(factor * maps + shift), factor * fused(maps))
-    torch.testing.assert_close(foreignness(factor * maps + shift), foreignness(maps))
+    torch.testing.assert_close(
+        out_of_domain_score(factor * maps + shift), out_of_domain_score(maps)
+    )
 
 
 def test_every_map_may_have_a_unit_of_its_own() -> None:
     maps = alike(1.0).repeat(3, 1, 1, 1)
     shifted = maps + torch.randn(3, 2, 1, 1, dtype=torch.float64)
-    torch.testing.assert_close(foreignness(shifted), foreignness(maps))
+    torch.testing.assert_close(out_of_domain_score(shifted), out_of_domain_score(maps))
     torch.testing.assert_close(fused(shifted), fused(maps))
 
 

@@ -92,14 +92,14 @@ def unsure() -> TwoEncoders:
     return TwoEncoders(ridge, other, lambda image: image[:, 1:2] * 8 - 6)
 
 
-def test_unsure_relief_is_calmed_and_the_log_says_how_unsure() -> None:
+def test_unsure_relief_is_shrunk_and_the_log_says_how_unsure() -> None:
     rgb = torch.zeros(32, 64, 3)
     rgb[:, 20:24, :2] = 1.0
     found = predict_depth(unsure(), rgb, CONFIG, SCALES[:1])
     sure = replace(unsure(), log_uncertainty=None)
     plain = predict_depth(sure, rgb, CONFIG, SCALES[:1])
-    assert plain.uncertainty is None and set(plain.record()) == {"source", "foreign"}
-    assert float(found.foreign) == float(plain.foreign) == 1
+    assert plain.uncertainty is None and set(plain.record()) == {"source", "out_of_domain"}
+    assert float(found.out_of_domain) == float(plain.out_of_domain) == 1
     height = [float(one.depth.log()[16, 22] - one.depth.log()[16, 8]) for one in (plain, found)]
     assert abs(height[1]) < 0.3 * abs(height[0])
     assert float(found.uncertainty[16, 22]) > 5 and float(found.uncertainty[16, 8]) < 0.01

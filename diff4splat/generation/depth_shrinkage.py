@@ -1,8 +1,8 @@
-"""Relief that the depth prior is unsure of, calmed: it tears where it is wrong (ours, ADR 39).
+"""Relief that the depth prior is unsure of shrinks: it would tear where it is wrong (ours, ADR 39).
 
 Axes: ``h w`` pixels of log depth. Where depth is unsure it comes nearer to the mean around it, in
-which sure pixels count most. On images like those of training nothing is calmed: there the prior is
-unsure at edges and thin objects, and still right on average.
+which sure pixels count most. On images in the domain of training nothing shrinks: there the prior
+is unsure at edges and thin objects, and still right on average.
 """
 
 import torch
@@ -18,14 +18,14 @@ AROUND = 1 / 8
 """Radius of the mean, as a share of the shorter side."""
 
 
-def calmed(
+def shrunk(
     log_depth: Float[Tensor, "h w"],
     uncertainty: Float[Tensor, "h w"],
-    foreign: Float[Tensor, ""],
+    out_of_domain: Float[Tensor, ""],
 ) -> Float[Tensor, "h w"]:
-    """The map with less relief where it is unsure; ``foreign`` is 0 (as it was) to 1."""
+    """The map with less relief where it is unsure; ``out_of_domain`` is 0 (as it was) to 1."""
     around = _mean_around(log_depth, 1 / (uncertainty.square() + LEAST**2))
-    kept = 1 / (1 + foreign * (uncertainty / UNSURE).square())
+    kept = 1 / (1 + out_of_domain * (uncertainty / UNSURE).square())
     return around + kept * (log_depth - around)
 
 
