@@ -45,7 +45,10 @@ def main() -> None:
     parser.add_argument("--uncertainty", action="store_true", help="depth and how unsure it is")
     arguments = parser.parse_args()
     if arguments.uncertainty:
-        row = partial(uncertainty_row, load_model(arguments.model, parts=("monocular_depth",)))
+        model = load_model(arguments.model, parts=("monocular_depth",))
+        if not model.config.monocular_depth.uncertainty:
+            parser.error(f"--uncertainty: {arguments.model} does not predict it; take small")
+        row = partial(uncertainty_row, model)
     else:
         row = partial(view_row, Diff4SplatPipeline.from_pretrained(arguments.model))
     rows = []

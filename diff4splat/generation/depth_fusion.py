@@ -19,9 +19,9 @@ MOST_STRETCH = 2.0
 """Maps that contradict each other have no spread to give back."""
 
 
-def fused(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, "h w"]:
+def fused(maps: Float[Tensor, "p e h w"], out_of_domain: Float[Tensor, ""]) -> Float[Tensor, "h w"]:
     """The mean of the maps with their own spread, and with median 0."""
-    share = _encoder_shares(maps)[:, None, None]
+    share = _encoder_shares(maps, out_of_domain)[:, None, None]
     mean = (share * maps).sum(1).mean(0)
     spread = (share * _spread(maps)).sum(1).mean()
     return (mean - _median(mean)) * _stretch(spread, _spread(mean))
@@ -40,10 +40,12 @@ def out_of_domain_score(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, ""]:
     return ((disagreement - IN_DOMAIN) / (OUT_OF_DOMAIN - IN_DOMAIN)).clamp(0, 1)
 
 
-def _encoder_shares(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, " e"]:
+def _encoder_shares(
+    maps: Float[Tensor, "p e h w"], out_of_domain: Float[Tensor, ""]
+) -> Float[Tensor, " e"]:
     """Weights of the encoders: alike, or more of the first where two of them disagree."""
     shares = maps.new_full(maps.shape[1:2], 1 / maps.shape[1])
-    shift = (BACKBONE_SHARE - 0.5) * out_of_domain_score(maps)
+    shift = (BACKBONE_SHARE - 0.5) * out_of_domain
     return shares + torch.stack([shift, -shift]) if len(shares) == 2 else shares
 
 

@@ -55,7 +55,8 @@ def predict_depth(
     image = rgb.movedim(-1, 0)[None]
     passes = [_pass(network, one, config) for one in _scaled(image, scales)]
     maps = torch.cat([_resized(one, rgb.shape[:2]) for one, _ in passes])
-    unit, score, log_depth = maps[:2].mean((0, 1)).median(), out_of_domain_score(maps), fused(maps)
+    unit, score = maps[:2].mean((0, 1)).median(), out_of_domain_score(maps)
+    log_depth = fused(maps, score)
     unsure = [_resized(one, rgb.shape[:2]) for _, one in passes if one is not None]
     uncertainty = torch.cat(unsure).exp().mean((0, 1)) if unsure else None
     if uncertainty is not None:

@@ -14,9 +14,10 @@ from diff4splat.models.object_mask.enlarged import enlarged, reduced
 from diff4splat.models.protocols import MotionPrior, ObjectMask
 
 LEAST_PROBABILITY = 0.4
-"""Of the most probable pixel; below it nothing moves: the object is not there."""
+"""Of the most probable pixel; below it nothing moves: the object is not there (chosen on validation
+worlds: docs/log/unknown-nouns.md)."""
 LEAST_SHARE = 0.85
-"""Of the highest probability; components below it are other objects, and stay (both chosen on
+"""Of the highest probability; components below it are other objects, and stay (chosen on
 validation worlds: docs/log/object-mask.md)."""
 
 

@@ -49,7 +49,8 @@ def measure_depth(maps: Maps) -> Outcome:
 def _log_depth(maps: Maps) -> Float[Tensor, "h w"]:
     log_scale = torch.full_like(maps[0, 0], LOG_LIMITS[0])
     log_scale[::2, ::2] = LOG_LIMITS[1]
-    return shrunk(fused(maps), log_scale.exp(), out_of_domain_score(maps))
+    score = out_of_domain_score(maps)
+    return shrunk(fused(maps, score), log_scale.exp(), score)
 
 
 def _kinds() -> dict[str, Maps]:

