@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
-from diff4splat.data_prep.synthetic.materials import MaterialSampler
+from diff4splat.data_prep.synthetic.materials import MaterialSampler, image_texture
 from diff4splat.data_prep.synthetic.motions.context import PartPositions
 from diff4splat.data_prep.synthetic.palettes import PALETTES
 from diff4splat.data_prep.synthetic.quantise import quantise
@@ -59,19 +59,24 @@ def assemble(content: WorldContent) -> tuple[tuple[WorldObject, ...], tuple[Asse
         textures = []
         for part, positions in zip(parts, item.parts, strict=True):
             want = not seen_new and bool(content.split.textures.new)
-            texture = sampler.texture(part.role, item.size_m, prefer_wanted=want)
+            texture = (
+                image_texture(part.image, item.shape.height)
+                if part.image is not None
+                else sampler.texture(part.role, item.size_m, prefer_wanted=want)
+            )
             seen_new = seen_new or texture.family in content.split.textures.new
             textures.append(texture)
-            objects.append(_object(len(objects) + 1, part, positions, texture))
+            objects.append(object_of(len(objects) + 1, part, positions, texture))
         first = len(objects) - len(parts) + 1
         numbers = tuple(range(first, len(objects) + 1))
         assembled.append(AssembledObject(placed=item, instances=numbers, textures=tuple(textures)))
     return tuple(objects), tuple(assembled)
 
 
-def _object(
+def object_of(
     instance: int, part: Part, positions: PartPositions | np.ndarray, texture: Texture
 ) -> WorldObject:
+    """A part as an instance, its numbers rounded."""
     rounded = quantise(np.ascontiguousarray(positions, np.float64))
     if len(rounded) > 1 and bool((rounded == rounded[:1]).all()):
         rounded = rounded[:1]

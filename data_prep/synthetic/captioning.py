@@ -73,7 +73,11 @@ def _is_visible(one: AssembledObject, camera: Camera) -> bool:
 
 
 def clip_metadata(
-    facts: CaptionFacts, assembled: tuple[AssembledObject, ...], identifier: str, variant: int
+    facts: CaptionFacts,
+    assembled: tuple[AssembledObject, ...],
+    identifier: str,
+    variant: int,
+    licenses: tuple[str, ...] = (LICENSE,),
 ) -> ClipMetadata:
     """Metadata of a clip: caption, and one note per instance."""
     events = iter(facts.events)
@@ -92,7 +96,7 @@ def clip_metadata(
     return ClipMetadata(
         identifier=identifier,
         source=SOURCE,
-        license=LICENSE,
+        license=" AND ".join(licenses),
         caption=describe(facts, variant),
         metric="exact",
         is_static=not facts.events,

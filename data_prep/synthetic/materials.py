@@ -12,9 +12,16 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float64
 
+from diff4splat.captions.srgb import linear_from_srgb
 from diff4splat.data_prep.synthetic.palettes import Palette
-from diff4splat.data_prep.synthetic.quantise import COLOR_BITS, quantise, quantise_number
+from diff4splat.data_prep.synthetic.quantise import (
+    COLOR_BITS,
+    POSE_BITS,
+    quantise,
+    quantise_number,
+)
 from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.shape import PartImage
 from diff4splat.data_prep.synthetic.world import Texture
 
 SOLID = frozenset({"marble", "noise", "rust"})
@@ -336,6 +343,19 @@ class MaterialSampler:
 
 def _weighed(options: list[Option]) -> tuple[list[Option], list[float]]:
     return options, [option.weight for option in options]
+
+
+def image_texture(image: PartImage, height_m: float) -> Texture:
+    """The image of a part, on an object of this height."""
+    mean = linear_from_srgb(image.pixels.reshape(-1, 3).astype(np.float64).mean(0) / 255)
+    return Texture(
+        family="image",
+        colors=quantise(np.stack([mean, 0.6 * mean]), COLOR_BITS),
+        scale=quantise_number(image.repeats / height_m, POSE_BITS),
+        seed=0,
+        gloss=image.gloss,
+        image=image.pixels,
+    )
 
 
 def dominant_color(texture: Texture) -> Float64[np.ndarray, "3"]:

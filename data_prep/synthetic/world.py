@@ -10,7 +10,7 @@ a grid when a world is made, hence equal on every machine even where a sine is n
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32
+from jaxtyping import Float64, Int32, UInt8
 
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.geometry.camera import Camera
@@ -18,7 +18,7 @@ from diff4splat.geometry.camera import Camera
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Texture:
-    """A procedural pattern; families in ``textures``."""
+    """A procedural pattern, or an image; families in ``textures``."""
 
     family: str
     colors: Float64[np.ndarray, "k 3"]
@@ -33,6 +33,8 @@ class Texture:
     """Height of the pattern in metres per unit of texture value: bends normals, not the shape."""
     gloss: float = 0.0
     """Strength of the highlight, 0 to 1."""
+    image: UInt8[np.ndarray, "s s 3"] | None = None
+    """sRGB, of family ``image`` alone; a feature is one repeat of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,6 +6,7 @@ unsuitable world (no visible motion, or a held-out world without new content) is
 """
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from diff4splat.data_prep.synthetic.free_cameras import free_views
 from diff4splat.data_prep.synthetic.layout.floor_plan import FloorPlan, PlacedObject
 from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
 from diff4splat.data_prep.synthetic.lights import sample_lighting
+from diff4splat.data_prep.synthetic.meshes.library import open_library
 from diff4splat.data_prep.synthetic.object_sampler import ObjectSampler
 from diff4splat.data_prep.synthetic.quantise import POSE_BITS, quantise
 from diff4splat.data_prep.synthetic.rng import Rng
@@ -30,6 +32,10 @@ from diff4splat.geometry.camera import Camera
 
 ATTEMPTS = 60
 FPS = 8.0
+SHARES = (
+    "still_share", "against_share", "frozen_share", "composite_share", "mesh_share",
+    "furnished_share",
+)  # fmt: skip
 Names = tuple[str, ...] | None
 
 
@@ -59,6 +65,12 @@ class WorldRecipe:
     """Static objects before a surface, a corner, a room or open ground, seen from any side."""
     composite_share: float = 0.0
     """Share of objects that are random shapes without a name."""
+    meshes: Path | None = None
+    """A mesh library (``meshes/library.py``), for arrangements."""
+    mesh_share: float = 0.0
+    """Share of objects that come from ``meshes``."""
+    furnished_share: float = 0.0
+    """Share of arrangements that are furnished with ``meshes`` at natural size."""
     families: Names = None
     textures: Names = None
     motions: Names = None
@@ -70,12 +82,19 @@ class WorldRecipe:
         _require_range("views", self.views, 4 if self.rig else 1, 64 if self.rig else 8)
         _require_range("size_px", min(self.size_px), 8, 4096)
         _require_range("size_px", max(self.size_px), 8, 4096)
-        for name in ("still_share", "against_share", "frozen_share", "composite_share"):
+        for name in SHARES:
             _require_range(name, getattr(self, name), 0.0, 1.0)
         _require_range("fps", self.fps, 0.1, 1000.0)
         if self.rig + self.free_cameras + self.arrangements > 1:
             raise ConfigError(
                 "cameras: expected one of rig, free_cameras and arrangements, got several; keep one"
+            )
+
+        shares = self.mesh_share + self.furnished_share
+        if (self.meshes is None) != (shares == 0.0) or (self.meshes and not self.arrangements):
+            raise ConfigError(
+                "meshes: expected arrangements with a mesh library and a share above 0, or "
+                "neither, got one without the others"
             )
 
     def allowed(self) -> Split:
@@ -92,6 +111,9 @@ class WorldRecipe:
             palettes=full.palettes.only(self.palettes, "palettes"),
             scenes=full.scenes.only(self.scenes, "scenes"),
             composite_share=self.composite_share,
+            meshes=None if self.meshes is None else open_library(self.meshes),
+            mesh_share=self.mesh_share,
+            furnished_share=self.furnished_share,
         )
 
 
@@ -223,6 +245,9 @@ def world_identifier(recipe: WorldRecipe, index: int) -> str:
     kind = f"-rig{recipe.views}" if recipe.rig else "-free" if recipe.free_cameras else ""
     kind = "-arranged" if recipe.arrangements else kind
     kind += f"-composite{round(100 * recipe.composite_share)}" if recipe.composite_share else ""
+    if recipe.meshes is not None:
+        shares = f"{round(100 * recipe.mesh_share)}-{round(100 * recipe.furnished_share)}"
+        kind += f"-mesh{shares}-{open_library(recipe.meshes).digest}"
     return f"worlds-v1-{recipe.split}-{recipe.seed}-{index:08d}{kind}"
 
 

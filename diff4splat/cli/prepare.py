@@ -46,6 +46,12 @@ class PrepareSynthetic:
     """Static objects before walls, in rooms or on open ground, from any side; for depth."""
     composite_share: Annotated[float, Number(least=0, most=1)] = 0.0
     """Fraction of objects that are random shapes without a name."""
+    meshes: Annotated[Path | None, InputPath(what="a mesh library", folder=False)] = None
+    """Mesh library (prepare meshes), for objects of --arrangements."""
+    mesh_share: Annotated[float, Number(least=0, most=1)] = 0.5
+    """With --meshes: fraction of objects that come from it."""
+    furnished_share: Annotated[float, Number(least=0, most=1)] = 0.5
+    """With --meshes: fraction of places that are furnished with objects of natural size."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
     tracks: Annotated[int, Number(least=0)] = 512
@@ -82,6 +88,9 @@ class PrepareSynthetic:
             free_cameras=self.free_cameras,
             arrangements=self.arrangements,
             composite_share=self.composite_share,
+            meshes=self.meshes,
+            mesh_share=self.mesh_share if self.meshes else 0.0,
+            furnished_share=self.furnished_share if self.meshes else 0.0,
             motions=self.motions or None,
         )
         job = WorldJob(

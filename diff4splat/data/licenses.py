@@ -25,5 +25,9 @@ _COMMERCIAL = frozenset(
 
 
 def commercial_ok(license_name: str) -> bool:
-    """Whether the licence is known to allow commercial use; spaces and case do not matter."""
-    return re.sub(r"[\s_-]+", "-", license_name.strip()).upper() in _COMMERCIAL
+    """Whether the licence is known to allow commercial use; spaces and case do not matter.
+
+    Of several, joined by ``AND`` as in SPDX expressions, all must.
+    """
+    names = re.split(r"\s+AND\s+", license_name.strip().upper())
+    return all(re.sub(r"[\s_-]+", "-", name) in _COMMERCIAL for name in names)

@@ -74,6 +74,8 @@ prepare align folder --out folder --reference megasam
 prepare curate nowhere --out folder
 prepare panoramas nowhere.exr --out folder
 prepare cutouts nowhere --photographs folder --out folder --license MIT
+prepare meshes nowhere --out meshes.safetensors --license MIT
+prepare mesh-cutouts nowhere.safetensors --out folder
 prepare poses nowhere.mp4 --out poses.json
 prepare captions folder --out folder
 prepare pipeline nowhere.toml

@@ -43,7 +43,7 @@ COMMANDS = (
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
     *("prepare import", "prepare doctor"),
     *("prepare align", "prepare captions", "prepare curate", "prepare poses"),
-    *("prepare panoramas", "prepare cutouts"),
+    *("prepare panoramas", "prepare cutouts", "prepare meshes", "prepare mesh-cutouts"),
     "prepare pipeline",
     *("report error-time", "report knobs", "report stability"),
     *("models list", "models get"),

@@ -5,6 +5,7 @@ the image row does well. Here every view is from another side, and nothing is be
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,12 @@ import numpy as np
 from diff4splat.captions.grammar import CaptionFacts
 from diff4splat.data_prep.synthetic.arrangements.backdrops import KINDS, Backdrop, make_backdrop
 from diff4splat.data_prep.synthetic.arrangements.cameras import any_view
+from diff4splat.data_prep.synthetic.arrangements.furnished import Furniture, furnish
 from diff4splat.data_prep.synthetic.arrangements.objects import Arranged, arrange
+from diff4splat.data_prep.synthetic.arrangements.handheld_cameras import handheld_view
 from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
 from diff4splat.data_prep.synthetic.cameras import LensSpec, ViewSpec, camera_batch
-from diff4splat.data_prep.synthetic.captioning import clip_metadata
+from diff4splat.data_prep.synthetic.captioning import LICENSE, clip_metadata
 from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
 from diff4splat.data_prep.synthetic.lights import sample_lighting
 from diff4splat.data_prep.synthetic.quantise import POSE_BITS, quantise
@@ -26,6 +29,8 @@ from diff4splat.data_prep.synthetic.world import Light, World
 PORTRAIT_SHARE = 0.4
 HIGH_SHARE = 0.6
 """Of arrangements without a room, which would be too low."""
+PLACES = {"room": 0.6, "corner": 0.15, "open": 0.25}
+"""Relative frequencies of furnished places."""
 LEAST_LIGHT_DEG = 15.0
 FOV_DEG = 50.0
 """Every view has its own."""
@@ -35,6 +40,8 @@ def try_arrangement(
     split: Split, lens: LensSpec, views: int, rng: Rng, identifier: str
 ) -> World | None:
     """A world with ``views`` static cameras; None where a camera found no free place."""
+    if rng.child("furnished").bernoulli(split.furnished_share):
+        return _try_furnished(split, lens, views, rng, identifier)
     kind = rng.weighted_choice(list(KINDS), list(KINDS.values()))
     is_portrait = rng.bernoulli(PORTRAIT_SHARE)
     backdrop = make_backdrop(kind, rng.child("backdrop"))
@@ -50,7 +57,30 @@ def try_arrangement(
     return _world(_content(objects, backdrop, split, rng), found, lens, rng, identifier)
 
 
-def _content(objects: list[Arranged], backdrop: Backdrop, split: Split, rng: Rng) -> WorldContent:
+def _try_furnished(
+    split: Split, lens: LensSpec, views: int, rng: Rng, identifier: str
+) -> World | None:
+    """A room or open ground with meshes of natural size; None where a camera found no place."""
+    assert split.meshes is not None
+    kind = rng.weighted_choice(list(PLACES), list(PLACES.values()))
+    backdrop = make_backdrop(kind, rng.child("backdrop"))
+    objects = furnish(split.meshes, backdrop, rng.child("furniture"))
+    if not objects:
+        return None
+    specs = [handheld_view(objects, backdrop, rng.child("view", n)) for n in range(views)]
+    found = [spec for spec in specs if spec is not None]
+    if len(found) < views:
+        return None
+    made = _world(_content(objects, backdrop, split, rng), found, lens, rng, identifier)
+    if kind != "room":
+        return made
+    # Without haze and clouds, walls hand on the light of a lamp: see ``lighting_of``.
+    return replace(made, sky=replace(made.sky, haze_per_m=0.0, clouds=0.0))
+
+
+def _content(
+    objects: Sequence[Arranged | Furniture], backdrop: Backdrop, split: Split, rng: Rng
+) -> WorldContent:
     static = (*backdrop.objects, *(item.placed for item in objects))
     return WorldContent(moving=(), static=static, split=split, rng=rng.child("looks"))
 
@@ -63,13 +93,18 @@ def _world(
     light, sky = sample_lighting(SCENE_KINDS[scene], 1.0, rng.child("light"))
     facts = CaptionFacts(place="", events=(), static_objects=(), camera=())
     return World(
-        note=clip_metadata(facts, assembled, identifier, 0),
+        note=clip_metadata(facts, assembled, identifier, 0, _licenses(content.split)),
         times_s=quantise(np.arange(lens.frames) / lens.fps, POSE_BITS),
         objects=objects,
         light=_from_anywhere(light, rng.child("sun")),
         sky=sky,
         views=tuple(camera_batch(spec, lens, 0.0) for spec in specs),
     )
+
+
+def _licenses(split: Split) -> tuple[str, ...]:
+    """Of worlds, and of the meshes in them."""
+    return (LICENSE,) if split.meshes is None else split.meshes.licenses
 
 
 def _from_anywhere(light: Light, rng: Rng) -> Light:

@@ -27,7 +27,7 @@ def any_view(
     """A view from a free place; None where none was found."""
     for attempt in range(ATTEMPTS):
         view = _candidate(objects, backdrop, rng.child("view", attempt), is_portrait)
-        if _is_free(_eye(view), objects, backdrop):
+        if _is_free(eye_of(view), objects, backdrop):
             return view
     return None
 
@@ -64,7 +64,8 @@ def _roll_rad(backdrop: Backdrop, rng: Rng) -> float:
     return math.radians(rng.uniform(-most_deg, most_deg))
 
 
-def _eye(view: ViewSpec) -> np.ndarray:
+def eye_of(view: ViewSpec) -> np.ndarray:
+    """Where the camera of a view is, in metres."""
     level = view.distance_m * math.cos(view.tilt_rad)
     offset = np.array(
         [

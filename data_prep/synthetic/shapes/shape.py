@@ -7,9 +7,20 @@ through a pivot and carry along whatever hangs on them.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, UInt8
 
 from diff4splat.data_prep.synthetic.shapes.surfaces.surface import Surface
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartImage:
+    """An image on a part, in place of a texture of its role."""
+
+    pixels: UInt8[np.ndarray, "s s 3"]
+    """sRGB; it repeats."""
+    repeats: float
+    """Per height of the object."""
+    gloss: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +31,7 @@ class Part:
     """What it is made of: a key of ``materials.ROLES``."""
     surface: Surface
     smooth: bool = True
+    image: PartImage | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,10 +13,12 @@ from typing import Any, Literal
 
 from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
 from diff4splat.data_prep.synthetic.materials import ROLES
+from diff4splat.data_prep.synthetic.meshes.library import MeshLibrary
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
 from diff4splat.data_prep.synthetic.palettes import PALETTES
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import COMPOSITE, FAMILIES
+from diff4splat.data_prep.synthetic.shapes.shape import Shape
 from diff4splat.errors import ConfigError
 
 SplitName = Literal["training", "held_out"]
@@ -58,12 +60,25 @@ class Split:
     scenes: Allowed
     composite_share: float = 0.0
     """Share of objects that are random shapes without a name."""
+    meshes: MeshLibrary | None = None
+    mesh_share: float = 0.0
+    """Share of objects of arrangements that come from ``meshes``."""
+    furnished_share: float = 0.0
+    """Share of arrangements that are furnished with ``meshes``."""
 
     def draw_family(self, families: Sequence[str], rng: Rng) -> str:
         """One of ``families``, or composites with their share."""
         if rng.child("composite").bernoulli(self.composite_share):
             return COMPOSITE
         return rng.choice(families)
+
+    def draw_shape(self, rng: Rng) -> tuple[str, Shape]:
+        """A family and a shape of it, or a noun and a mesh with its share."""
+        if self.meshes is not None and rng.child("mesh").bernoulli(self.mesh_share):
+            number = self.meshes.draw_number(rng.child("shape"))
+            return self.meshes.noun(number), self.meshes.shape(number)
+        family = self.draw_family(self.families.names, rng)
+        return family, FAMILIES[family].make(rng.child("shape"))
 
 
 def known_names() -> dict[str, frozenset[str]]:

@@ -18,6 +18,7 @@ from diff4splat.cli.datasets.prepare_datasets import (
     PrepareImport,
 )
 from diff4splat.cli.datasets.prepare_images import PrepareCutouts, PreparePanoramas
+from diff4splat.cli.datasets.prepare_meshes import PrepareMeshCutouts, PrepareMeshes
 from diff4splat.cli.datasets.prepare_pipeline import PreparePipeline
 from diff4splat.cli.doctor import Doctor
 from diff4splat.cli.evaluate import Evaluate
@@ -54,6 +55,8 @@ Prepare = (
     | Annotated[PrepareDoctor, subcommand("doctor")]
     | Annotated[PreparePanoramas, subcommand("panoramas")]
     | Annotated[PrepareCutouts, subcommand("cutouts")]
+    | Annotated[PrepareMeshes, subcommand("meshes")]
+    | Annotated[PrepareMeshCutouts, subcommand("mesh-cutouts")]
     | Annotated[PreparePoses, subcommand("poses")]
     | Annotated[PrepareAlign, subcommand("align")]
     | Annotated[PrepareCaptions, subcommand("captions")]

@@ -78,7 +78,7 @@ def read_metadata(file: Path) -> dict[str, str]:
     Raises:
         FileFormatError: the file is damaged, cut off or of another kind.
     """
-    with _opened(file) as opened:
+    with opened_tensors(file) as opened:
         return opened.metadata() or {}
 
 
@@ -89,7 +89,7 @@ def read_tensors(file: Path, dtypes: Collection[str] = STORED_DTYPES) -> dict[st
         FileFormatError: the file is damaged, cut off or of another kind, or holds a tensor of a
             dtype that is not among ``dtypes`` (names of the format).
     """
-    with _opened(file) as opened:
+    with opened_tensors(file) as opened:
         names = sorted(opened.keys())
         for name in names:
             entry = opened.get_slice(name)
@@ -107,7 +107,12 @@ def read_tensors(file: Path, dtypes: Collection[str] = STORED_DTYPES) -> dict[st
 
 
 @contextmanager
-def _opened(file: Path) -> Iterator[safe_open]:
+def opened_tensors(file: Path) -> Iterator[safe_open]:
+    """The file, open for reading one tensor at a time.
+
+    Raises:
+        FileFormatError: the file is damaged, cut off or of another kind.
+    """
     require_file(file, "a .safetensors file")
     try:
         with safe_open(file, "pt") as opened:

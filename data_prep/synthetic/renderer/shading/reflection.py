@@ -90,7 +90,7 @@ def reflected(point, light, texel, owner, materials, lighting):
     ry = ray[1] - 2.0 * dot(normal[0], normal[1], normal[2], ray[0], ray[1], ray[2]) * normal[1]
     red = green = blue = 0.0
     for at in range(3):
-        albedo = _albedo(materials.colors, owner, texel, at)
+        albedo = _albedo(materials, owner, texel, at)
         around = blend(lighting.below[at], lighting.above[at], up)
         # What is hidden from the sky is lit by its neighbours, which share its colour.
         around *= reached / (1.0 - 0.5 * albedo * (1.0 - reached))
@@ -102,7 +102,10 @@ def reflected(point, light, texel, owner, materials, lighting):
 
 
 @inlined
-def _albedo(colors, owner, texel, channel):
+def _albedo(materials, owner, texel, channel):
+    if materials.image[owner] >= 0:
+        return clamp(texel.image[channel], 0.0, 0.95)
+    colors = materials.colors
     value = blend(colors[owner, 0, channel], colors[owner, 1, channel], texel.second)
     value = blend(value, colors[owner, 2, channel], texel.third)
     return clamp(value * texel.brightness, 0.0, 0.95)

@@ -8,6 +8,7 @@ from diff4splat.data_prep.synthetic.renderer.shading.surface_point import (
     hit_at,
     texture_coordinates,
 )
+from diff4splat.data_prep.synthetic.renderer.textures.images import image_color
 from diff4splat.data_prep.synthetic.renderer.textures.materials import pattern
 from diff4splat.kernels.jit import inlined, shared
 
@@ -27,6 +28,8 @@ class Texel(NamedTuple):
     """Shares of the second and the third colour."""
     brightness: float
     height: float
+    image: tuple[float, float, float]
+    """Colour of an image; black without one."""
 
 
 @inlined
@@ -34,10 +37,13 @@ def texel_at(hit, footprint, surfaces, materials):
     """The texture of the point, averaged over ``footprint``."""
     owner = hit.owner
     u, v, w = texture_coordinates(hit, surfaces, materials)
+    if materials.image[owner] >= 0:
+        color = image_color(materials.images, materials.image[owner], u, v, footprint)
+        return Texel(footprint, 0.0, 0.0, 1.0, 0.5, color)
     second, third, brightness, height = pattern(
         materials.family[owner], u, v, w, footprint, materials.seed[owner]
     )
-    return Texel(footprint, second, third, brightness, height)
+    return Texel(footprint, second, third, brightness, height, (0.0, 0.0, 0.0))
 
 
 @inlined

@@ -30,12 +30,12 @@ def encoded(value, thresholds):
 @cache
 def byte_thresholds() -> Float64[np.ndarray, " 4353"]:
     """Where each byte ends, then for each of 4097 steps of light a byte to begin at."""
-    ends = np.array([_decoded((level + 0.5) / 255) for level in range(255)] + [2.0])
+    ends = np.array([decoded((level + 0.5) / 255) for level in range(255)] + [2.0])
     starts = np.searchsorted(ends, np.arange(_STEPS + 1) / _STEPS, side="right")
     return np.concatenate([ends, starts.astype(np.float64)])
 
 
-def _decoded(value: float) -> float:
+def decoded(value: float) -> float:
     """Linear light of an sRGB value; x to 2.4 is x² times the fifth root of x² (Newton)."""
     if value <= 0.04045:
         return value / 12.92

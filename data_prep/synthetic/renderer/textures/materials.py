@@ -6,6 +6,7 @@ import numpy as np
 
 from diff4splat.data_prep.synthetic.renderer.textures import natural_noise as natural
 from diff4splat.data_prep.synthetic.renderer.textures import regular as made
+from diff4splat.data_prep.synthetic.renderer.textures.images import IMAGE, image_stacks
 from diff4splat.data_prep.synthetic.renderer.textures.lettering import lettering
 from diff4splat.data_prep.synthetic.renderer.triangle_buffer import TriangleBuffer
 from diff4splat.data_prep.synthetic.world import Texture
@@ -37,17 +38,21 @@ class Materials(NamedTuple):
     relief: np.ndarray
     gloss: np.ndarray
     smooth: np.ndarray
+    images: np.ndarray
+    image: np.ndarray
+    """Which of the images an object has; -1 is none."""
 
 
 def materials_of(buffer: TriangleBuffer) -> Materials:
     """Textures of all objects.
 
     Raises:
-        ConfigError: a family is unknown, or there are no two to four colours.
+        ConfigError: a family is unknown, there are no two to four colours, or an image does not
+            fit.
     """
     textures = [item.texture for item in buffer.objects]
     for texture in textures:
-        if texture.family not in FAMILIES:
+        if texture.family not in (*FAMILIES, IMAGE):
             raise ConfigError(
                 f"texture: expected one of {', '.join(FAMILIES)}, got {texture.family}"
             )
@@ -56,7 +61,7 @@ def materials_of(buffer: TriangleBuffer) -> Materials:
                 f"{texture.family}: expected 2 to 4 colours, got {len(texture.colors)}"
             )
     return Materials(
-        np.array([FAMILIES.index(texture.family) for texture in textures], np.int64),
+        np.array([_number(texture.family) for texture in textures], np.int64),
         np.array([_three(texture) for texture in textures], np.float64).reshape(-1, 3, 3),
         np.array([texture.scale for texture in textures], np.float64),
         np.array([texture.seed for texture in textures], np.int64),
@@ -64,7 +69,13 @@ def materials_of(buffer: TriangleBuffer) -> Materials:
         np.array([texture.relief for texture in textures], np.float64),
         np.array([texture.gloss for texture in textures], np.float64),
         np.array([item.mesh.smooth for item in buffer.objects], np.bool_),
+        *image_stacks(buffer),
     )
+
+
+def _number(family: str) -> int:
+    """What `pattern` counts by; an image has no pattern."""
+    return 0 if family == IMAGE else FAMILIES.index(family)
 
 
 def _three(texture: Texture) -> np.ndarray:
