@@ -13,7 +13,7 @@ from diff4splat.captions.grammar import (
 from diff4splat.data.clip import ClipMetadata, ObjectNote
 from diff4splat.data_prep.synthetic.actors import camera_direction
 from diff4splat.data_prep.synthetic.assembly import AssembledObject
-from diff4splat.data_prep.synthetic.materials import dominant_color
+from diff4splat.data_prep.synthetic.materials import dominant_color, named_color
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.registry import FAMILIES
@@ -87,7 +87,7 @@ def clip_metadata(
         family = one.placed.family
         name = FAMILIES[family].noun if family in FAMILIES else family
         for instance, texture in zip(one.instances, one.textures, strict=True):
-            color = color_name(dominant_color(texture))
+            color = named_color(texture)
             objects.append(
                 ObjectNote(
                     instance=instance, name=name, color=color, motion=words, object_number=number

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float64
 
+from diff4splat.captions.colors import color_name
 from diff4splat.captions.srgb import linear_from_srgb
 from diff4splat.data_prep.synthetic.palettes import Palette
 from diff4splat.data_prep.synthetic.quantise import (
@@ -355,7 +356,13 @@ def image_texture(image: PartImage, height_m: float) -> Texture:
         seed=0,
         gloss=image.gloss,
         image=image.pixels,
+        main_color=image.color,
     )
+
+
+def named_color(texture: Texture) -> str:
+    """What captions call the texture; empty for an image of several colours."""
+    return texture.main_color if texture.image is not None else color_name(dominant_color(texture))
 
 
 def dominant_color(texture: Texture) -> Float64[np.ndarray, "3"]:

@@ -35,6 +35,8 @@ class Texture:
     """Strength of the highlight, 0 to 1."""
     image: UInt8[np.ndarray, "s s 3"] | None = None
     """sRGB, of family ``image`` alone; a feature is one repeat of it."""
+    main_color: str = ""
+    """Of an object with images: the name of its main colour; empty for several."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,8 +14,8 @@ from diff4splat.captions.grammar import CaptionFacts
 from diff4splat.data_prep.synthetic.arrangements.backdrops import KINDS, Backdrop, make_backdrop
 from diff4splat.data_prep.synthetic.arrangements.cameras import any_view
 from diff4splat.data_prep.synthetic.arrangements.furnished import Furniture, furnish
-from diff4splat.data_prep.synthetic.arrangements.objects import Arranged, arrange
 from diff4splat.data_prep.synthetic.arrangements.handheld_cameras import handheld_view
+from diff4splat.data_prep.synthetic.arrangements.objects import Arranged, arrange
 from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
 from diff4splat.data_prep.synthetic.cameras import LensSpec, ViewSpec, camera_batch
 from diff4splat.data_prep.synthetic.captioning import LICENSE, clip_metadata

@@ -46,7 +46,9 @@ class MeshNote:
     creator: str
     license: str
     height_m: float
-    """Natural height; 1 where the source does not say."""
+    """Natural height."""
+    color: str
+    """Name of its main colour; empty for several."""
     parts: tuple[PartPlace, ...]
 
 
@@ -117,15 +119,17 @@ class MeshLibrary:
         keys = ("vertices", "triangles", "uv", "images")
         found = read_some(self.file, [f"{number}.{key}" for key in keys])
         vertices, triangles, uv, images = (value.numpy() for value in found)
-        parts, first_vertex, first_triangle = [], 0, 0
-        for place, image in zip(self.notes[number].parts, images, strict=True):
+        note, parts, first_vertex, first_triangle = self.notes[number], [], 0, 0
+        for place, image in zip(note.parts, images, strict=True):
             here = slice(first_vertex, place.vertices_end)
             piece = surface(
                 vertices[here].astype(np.float64),
                 triangles[first_triangle : place.triangles_end].astype(np.int32),
                 uv[here].astype(np.float64) / place.repeats,
             )
-            look = PartImage(pixels=image, repeats=place.repeats, gloss=place.gloss)
+            look = PartImage(
+                pixels=image, repeats=place.repeats, gloss=place.gloss, color=note.color
+            )
             parts.append(Part(role="painted", surface=piece, image=look))
             first_vertex, first_triangle = place.vertices_end, place.triangles_end
         return Shape(parts=tuple(parts))

@@ -44,10 +44,17 @@ def textured_parts(parts: list[ObjPart]) -> list[TexturedPart]:
 
 def area(vertices: Float32[np.ndarray, "v d"], triangles: Int64[np.ndarray, "f 3"]) -> float:
     """Of all triangles, in two or three dimensions."""
+    return float(triangle_areas(vertices, triangles).sum())
+
+
+def triangle_areas(
+    vertices: Float32[np.ndarray, "v d"], triangles: Int64[np.ndarray, "f 3"]
+) -> Float64[np.ndarray, " f"]:
+    """Of each triangle, in two or three dimensions."""
     a, b, c = (vertices[triangles[:, k]].astype(np.float64) for k in range(3))
     first, second = b - a, c - a
     squared = (first**2).sum(-1) * (second**2).sum(-1) - (first * second).sum(-1) ** 2
-    return 0.5 * float(np.sqrt(squared.clip(0)).sum())
+    return 0.5 * np.sqrt(squared.clip(0))
 
 
 def _pictured(part: ObjPart) -> TexturedPart:

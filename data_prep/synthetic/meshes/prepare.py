@@ -16,6 +16,7 @@ from diff4splat.data_prep.synthetic.meshes.library import (
     PartPlace,
     write_library,
 )
+from diff4splat.data_prep.synthetic.meshes.main_color import main_color
 from diff4splat.data_prep.synthetic.meshes.obj_parts import read_obj
 from diff4splat.data_prep.synthetic.meshes.obj_sources import ObjEntry, count_entries, obj_entries
 from diff4splat.data_prep.synthetic.meshes.palette import TexturedPart, textured_parts
@@ -110,6 +111,7 @@ def _mesh(entry: ObjEntry, job: MeshJob) -> LibraryMesh | str:
         creator=entry.creator,
         license=job.license,
         height_m=entry.height_m or height,
+        color=main_color(parts),
         parts=_places(parts),
     )
     return LibraryMesh(note=note, parts=tuple(parts))

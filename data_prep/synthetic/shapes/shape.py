@@ -21,6 +21,8 @@ class PartImage:
     repeats: float
     """Per height of the object."""
     gloss: float
+    color: str = ""
+    """Name of the object's main colour; empty for several."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,15 @@ from obj_meshes import CUBE, MATERIALS, cube_files, write_cube, write_library
 from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.data_prep.synthetic.meshes import obj_parts, obj_sources
 from diff4splat.data_prep.synthetic.meshes.library import NOUNS_FILE, MeshLibrary, open_library
+from diff4splat.data_prep.synthetic.meshes.main_color import main_color
 from diff4splat.data_prep.synthetic.meshes.obj_parts import ObjPart, read_obj
-from diff4splat.data_prep.synthetic.meshes.palette import CELLS, MOST_IMAGES, area, textured_parts
+from diff4splat.data_prep.synthetic.meshes.palette import (
+    CELLS,
+    MOST_IMAGES,
+    TexturedPart,
+    area,
+    textured_parts,
+)
 from diff4splat.data_prep.synthetic.meshes.prepare import TEST_WORDS, MeshJob, prepare_meshes
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.errors import FileFormatError, InputError, MissingExtraError
@@ -81,6 +89,20 @@ def test_materials_without_image_share_a_palette(library: MeshLibrary) -> None:
     right = palette.surface.vertices[:, 2] > 0.2
     assert {tuple(color) for color in colors} == {(255, 0, 0), (0, 0, 255)}
     assert right.any() and palette.image.gloss > 0.1
+
+
+def test_the_main_colour_is_that_of_most_of_the_surface(library: MeshLibrary) -> None:
+    # Of 40 square units 16 are red, 16 blue, 8 pictured.
+    assert library.notes[0].color == ""
+    red, blue, green = (_plain(color) for color in ((200, 30, 30), (20, 40, 170), (40, 110, 50)))
+    assert main_color([blue]) == "blue"
+    assert main_color([blue, red, green]) == ""
+    assert main_color([blue, red, blue]) == "blue"
+
+
+def _plain(color: tuple[int, int, int]) -> TexturedPart:
+    (part,) = textured_parts([_part(0, pictured=True)])
+    return replace(part, image=np.full((128, 128, 3), color, np.uint8))
 
 
 def _part(number: int, pictured: bool) -> ObjPart:
@@ -206,7 +228,9 @@ def test_damaged_indices_are_refused(tmp_path: Path, index: str) -> None:
 
 def test_missing_tensors_are_said(library: MeshLibrary, tmp_path: Path) -> None:
     file = tmp_path / "meshes.safetensors"
-    index = json.dumps([{"name": "a", "creator": "", "license": "", "height_m": 1.0, "parts": []}])
+    index = json.dumps(
+        [{"name": "a", "creator": "", "license": "", "color": "", "height_m": 1.0, "parts": []}]
+    )
     metadata = {"format": "diff4splat-meshes-1", "index": index}
     write_tensors(TensorFile(tensors={}, metadata=metadata), file)
     with pytest.raises(FileFormatError, match=r"expected tensor 0\.images"):
