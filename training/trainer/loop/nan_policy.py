@@ -75,11 +75,15 @@ def write_snapshot(file: Path, rows: list[dict]) -> None:
 
 
 def is_spike(progress: Progress, loss: float, factor: float) -> bool:
-    """Whether a loss is ``factor`` times the median of those before it; 0 switches it off."""
+    """Whether a loss is ``factor`` times the median of those before it; 0 switches it off.
+
+    Likelihoods may be negative, so what counts is the distance from the median, in medians of the
+    losses' size: the same for losses above 0.
+    """
     if factor <= 0 or len(progress.recent_losses) < LEAST_HISTORY:
         return False
-    median = statistics.median(progress.recent_losses)
-    return median > 0 and loss > factor * median
+    size = statistics.median(abs(loss) for loss in progress.recent_losses)
+    return size > 0 and loss - statistics.median(progress.recent_losses) > (factor - 1) * size
 
 
 def record_loss(progress: Progress, loss: float, factor: float) -> bool:

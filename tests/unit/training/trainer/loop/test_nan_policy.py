@@ -80,8 +80,18 @@ def test_a_new_level_of_loss_stops_being_a_spike() -> None:
     assert len(progress.recent_losses) == MEDIAN_WINDOW
 
 
-def test_losses_below_zero_have_no_spikes() -> None:
-    assert not is_spike(Progress(recent_losses=[-1.0] * 50), 3.0, factor=5.0)
+@pytest.mark.parametrize(("center", "usual", "spike"), [(-1.0, 2.9, 3.1), (0.0, 3.9, 4.1)])
+def test_losses_around_and_below_zero_have_spikes_by_their_size(
+    center: float, usual: float, spike: float
+) -> None:
+    # Sizes are 1 in both cases; a median near 0 must not make every loss a spike.
+    losses = [center] * 50 if center else [-1.0, 1.0] * 25
+    assert not is_spike(Progress(recent_losses=losses), usual, factor=5.0)
+    assert is_spike(Progress(recent_losses=losses), spike, factor=5.0)
+
+
+def test_losses_of_zero_have_no_size_to_compare_with() -> None:
+    assert not is_spike(Progress(recent_losses=[0.0] * 50), 3.0, factor=5.0)
 
 
 def test_a_rollback_leaves_out_the_data_of_the_detour() -> None:
