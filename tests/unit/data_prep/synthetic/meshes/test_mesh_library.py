@@ -1,5 +1,6 @@
 """OBJ files become meshes of height 1 with images, or are skipped with a reason."""
 
+import io
 import json
 import zipfile
 from dataclasses import replace
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from obj_meshes import CUBE, MATERIALS, cube_files, write_cube, write_library
+from PIL import Image
 
 from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.data_prep.synthetic.meshes import obj_parts, obj_sources
@@ -23,6 +25,7 @@ from diff4splat.data_prep.synthetic.meshes.palette import (
 )
 from diff4splat.data_prep.synthetic.meshes.prepare import TEST_WORDS, MeshJob, prepare_meshes
 from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.surfaces.surface import merged, signed_volume
 from diff4splat.errors import FileFormatError, InputError, MissingExtraError
 from diff4splat.io.scene_files.tensor_file import TensorFile, write_tensors
 from diff4splat.progress.phases import Phases
@@ -30,6 +33,8 @@ from diff4splat.progress.phases import Phases
 pytest.importorskip("trimesh")
 
 
+WIRE = CUBE.replace("v 1", "v 0.01").replace("v -1", "v -0.01").replace(" -1\n", " -0.99\n")
+WIRE = WIRE.replace(" 1\nv", " -0.98\nv").replace(" 4 1\nvt", " 4 -0.98\nvt")
 FLAT = CUBE.replace("1 4 1", "1 0 1").replace("1 4 -1", "1 0 -1")
 
 
@@ -76,6 +81,11 @@ def test_the_front_faces_x_with_its_image_upright(library: MeshLibrary) -> None:
     assert tuple(front.image.pixels[-1, -1]) == (255, 255, 255)
 
 
+def test_triangles_face_outward(library: MeshLibrary) -> None:
+    parts = [part.surface for part in library.shape(0).parts]
+    assert signed_volume(merged(*parts)) == pytest.approx(0.25, rel=1e-5)
+
+
 def test_repeats_follow_from_areas(library: MeshLibrary) -> None:
     # One repeat on 0.5 x 1: as if the image were a square of the same area.
     assert library.shape(0).parts[0].image.repeats == pytest.approx(1 / np.sqrt(0.5), rel=1e-5)
@@ -86,9 +96,10 @@ def test_materials_without_image_share_a_palette(library: MeshLibrary) -> None:
     uv = palette.surface.uv * palette.image.repeats
     cells = (uv * palette.image.pixels.shape[0]).astype(int)
     colors = palette.image.pixels[cells[:, 1], cells[:, 0]]
-    right = palette.surface.vertices[:, 2] > 0.2
+    # In the middle of a cell, so that no neighbour is mixed in.
+    np.testing.assert_allclose(uv * CELLS % 1, 0.5, atol=1e-3)
     assert {tuple(color) for color in colors} == {(255, 0, 0), (0, 0, 255)}
-    assert right.any() and palette.image.gloss > 0.1
+    assert palette.image.gloss > 0.1
 
 
 def test_the_main_colour_is_that_of_most_of_the_surface(library: MeshLibrary) -> None:
@@ -98,6 +109,14 @@ def test_the_main_colour_is_that_of_most_of_the_surface(library: MeshLibrary) ->
     assert main_color([blue]) == "blue"
     assert main_color([blue, red, green]) == ""
     assert main_color([blue, red, blue]) == "blue"
+
+
+def test_colours_are_looked_up_by_column_and_row() -> None:
+    (part,) = textured_parts([_part(0, pictured=True)])
+    image = np.full((128, 128, 3), (200, 30, 30), np.uint8)
+    image[:, 64:] = (20, 40, 170)
+    uv = np.array([[0.0, 0.5], [0.3, 0.5], [0.2, 1.0]], np.float32)
+    assert main_color([replace(part, image=image, uv=uv)]) == "red"
 
 
 def _plain(color: tuple[int, int, int]) -> TexturedPart:
@@ -142,11 +161,34 @@ def test_transparent_materials_and_outlines_are_left_out() -> None:
     assert len(read_obj(cube_files()["cube.obj"], cube_files())) == 3
 
 
+def _with_image(pixels: np.ndarray) -> dict[str, bytes]:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return cube_files() | {"front.png": stream.getvalue()}
+
+
+def test_images_that_cut_an_outline_are_left_out() -> None:
+    pixels = np.full((16, 16, 4), 255, np.uint8)
+    pixels[:2, :2, 3] = 0
+    files = _with_image(pixels)
+    assert [part.image is None for part in read_obj(files["cube.obj"], files)].count(False) == 1
+    pixels[:4, :4, 3] = 0
+    files = _with_image(pixels)
+    assert len(read_obj(files["cube.obj"], files)) == 2
+
+
+def test_huge_images_are_refused(monkeypatch) -> None:
+    monkeypatch.setattr(obj_parts, "MOST_IMAGE_PX", 255)
+    with pytest.raises(FileFormatError, match="at most 255 pixels"):
+        read_obj(cube_files()["cube.obj"], cube_files())
+
+
 @pytest.mark.parametrize(
     ("name", "changed", "settings", "reason"),
     [
         ("mug of tea", {}, {}, "with a name of test worlds"),
         ("cube", {"obj": FLAT}, {}, "without a volume"),
+        ("cube", {"obj": WIRE}, {}, "without a volume"),
         ("cube", {"obj": CUBE.replace("v 1 4 1", "v 1 nan 1")}, {}, "without a volume"),
         ("cube", {"obj": CUBE.replace("v 1 4 1", "v 1 1e38 1")}, {}, "without a volume"),
         ("cube", {"obj": CUBE.replace("f 1", "f 1000")}, {}, "damaged"),

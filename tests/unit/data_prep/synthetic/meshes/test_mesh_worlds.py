@@ -1,6 +1,7 @@
 """Worlds with meshes: arrangements, furnished places, cutouts."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -10,12 +11,15 @@ from obj_meshes import write_library
 
 from diff4splat.data_prep.synthetic.arrangements.backdrops import Backdrop
 from diff4splat.data_prep.synthetic.arrangements.furnished import HEIGHTS_M, Furniture, furnish
+from diff4splat.data_prep.synthetic.materials import image_texture, named_color
 from diff4splat.data_prep.synthetic.meshes.cutouts import MeshCutoutJob, cutout, draw_cutouts
 from diff4splat.data_prep.synthetic.meshes.library import MeshLibrary, open_library
 from diff4splat.data_prep.synthetic.meshes.prepare import MeshJob, prepare_meshes
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.shape import PartImage
+from diff4splat.data_prep.synthetic.world import Texture
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
 from diff4splat.errors import ConfigError
 from diff4splat.progress.phases import Phases
@@ -51,6 +55,18 @@ def test_arrangements_have_meshes_and_say_their_licences(file: Path, library: Me
     assert any(item.texture.image is not None for item in made.objects)
     assert made.note.license == "CC-BY-3.0"
     assert made.note.identifier.endswith(f"-mesh100-0-{library.digest}")
+
+
+def test_images_repeat_by_the_height_of_the_object_and_name_its_colour() -> None:
+    image = PartImage(
+        pixels=np.full((128, 128, 3), 90, np.uint8), repeats=2.0, gloss=0.1, color="blue"
+    )
+    texture = image_texture(image, 0.5)
+    assert texture.scale == pytest.approx(4.0)
+    assert named_color(texture) == "blue"
+    assert named_color(image_texture(replace(image, color=""), 0.5)) == ""
+    plain = Texture(family="plain", colors=np.full((2, 3), 0.9), scale=1.0, seed=0)
+    assert named_color(plain) == "white"
 
 
 def test_equal_recipes_give_equal_bits(file: Path) -> None:
