@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.cutout_nouns import ALL_NOUNS
+from diff4splat.captions.cutout_nouns import KNOWN_NOUNS
 from diff4splat.captions.synonyms import (
     ANY_OBJECT,
     COLOR_SYNONYMS,
@@ -49,7 +49,7 @@ def known_words() -> dict[str, tuple[str, ...]]:
     """Every phrase, by kind."""
     travel = tuple(form for forms in TRAVEL_VERBS for form in forms)
     return {
-        "objects": (*_with_synonyms(ALL_NOUNS, NOUN_SYNONYMS), *ANY_OBJECT),
+        "objects": (*_with_synonyms(KNOWN_NOUNS, NOUN_SYNONYMS), *ANY_OBJECT),
         "colours": _with_synonyms(COLOR_NAMES, COLOR_SYNONYMS),
         "motions": (*(phrase for phrases in VERBS.values() for phrase in phrases), *travel),
         "directions": tuple(phrase for phrases in SIDES.values() for phrase in phrases),

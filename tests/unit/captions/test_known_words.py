@@ -94,6 +94,12 @@ def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     assert notes("an ostrich sings", model="test") == []
 
 
+def test_nouns_that_no_bundled_weights_know_count_as_unknown() -> None:
+    found = read_prompt("the stroller moves to the left")
+    assert found.objects == () and found.unknown == ("stroller",)
+    assert read_prompt("the red stroller moves to the left").objects == ("red",)
+
+
 def test_the_words_are_listed(capsys: pytest.CaptureFixture) -> None:
     assert run(["inspect", "words"]) == 0
     text = " ".join(capsys.readouterr().out.split())

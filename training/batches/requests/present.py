@@ -10,7 +10,7 @@ from jaxtyping import Bool, UInt8
 from torch import Tensor
 
 from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.cutout_nouns import ALL_NOUNS, CUTOUT_NOUNS
+from diff4splat.captions.cutout_nouns import ALL_NOUNS, CUTOUT_NOUNS, MESH_NOUNS
 from diff4splat.captions.grammar import NamedObject
 from diff4splat.captions.random_draws import draw_share
 from diff4splat.captions.vocabulary import NOUNS, UNNAMED, UNSEEN_NOUNS
@@ -27,8 +27,11 @@ to be never there."""
 
 def absent_nouns(objects: list[NamedObject], generator: torch.Generator) -> tuple[str, ...]:
     """Nouns to ask for where they are absent: those of cutouts half of the time beside cutouts."""
-    has_cutouts = any(one.noun in CUTOUT_NOUNS for one in objects)
-    return CUTOUT_NOUNS if has_cutouts and draw_share(generator) < 0.5 else TRAINING_NOUNS
+    shown = {one.noun for one in objects}
+    has_meshes = not shown.isdisjoint(MESH_NOUNS)
+    if (has_meshes or not shown.isdisjoint(CUTOUT_NOUNS)) and draw_share(generator) < 0.5:
+        return (*CUTOUT_NOUNS, *MESH_NOUNS) if has_meshes else CUTOUT_NOUNS
+    return TRAINING_NOUNS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

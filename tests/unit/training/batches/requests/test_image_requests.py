@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from diff4splat.captions.colors import COLOR_NAMES
-from diff4splat.captions.cutout_nouns import CUTOUT_NOUNS
+from diff4splat.captions.cutout_nouns import CUTOUT_NOUNS, MESH_NOUNS
 from diff4splat.captions.grammar import NamedObject, parse_caption
 from diff4splat.captions.synonyms import names
 from diff4splat.captions.vocabulary import UNNAMED
@@ -18,6 +18,7 @@ from diff4splat.training.batches.requests.image_requests import ImageRequest, dr
 from diff4splat.training.batches.requests.present import (
     TRAINING_NOUNS,
     PresentObject,
+    absent_nouns,
     name_maps,
 )
 from diff4splat.training.losses.object_mask import UNKNOWN_NAME
@@ -163,6 +164,17 @@ def test_absent_nouns_are_those_of_cutouts_too_beside_cutouts() -> None:
     assert sum(any(f" {noun} " in f" {text} " for noun in nouns) for text in absent) > 8
     worlds = " ".join(request.caption for request in drawn(OBJECTS, 600))
     assert not {"astronaut", "zebra", "accordion"} & set(worlds.split())
+
+
+def test_absent_nouns_are_those_of_meshes_too_beside_meshes() -> None:
+    generator = torch.Generator().manual_seed(0)
+    objects = {noun: [NamedObject("", noun)] for noun in ("stroller", "cat", "ball")}
+    drawn_from = {
+        noun: {absent_nouns(shown, generator) for _ in range(30)} for noun, shown in objects.items()
+    }
+    assert drawn_from["ball"] == {TRAINING_NOUNS}
+    assert drawn_from["cat"] == {TRAINING_NOUNS, CUTOUT_NOUNS}
+    assert drawn_from["stroller"] == {TRAINING_NOUNS, (*CUTOUT_NOUNS, *MESH_NOUNS)}
 
 
 def test_names_without_a_number_are_marked() -> None:
