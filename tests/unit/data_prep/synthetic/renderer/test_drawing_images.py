@@ -86,32 +86,34 @@ def test_texels_are_exact_at_their_middles() -> None:
     np.testing.assert_allclose(colors_at(image, places, 0.0), expected, atol=1e-6)
 
 
-def test_between_texels_it_is_bilinear_and_wraps_around() -> None:
-    image, random = random_image(1), np.random.default_rng(2)
-    places = random.uniform(-3, 3, (500, 2))
-    x, y = (places * SIDE - 0.5).T
+def bilinear(light: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """By the formula, between the four texels around each place; the image repeats."""
+    side = len(light)
+    x, y = (places * side - 0.5).T
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
     a, b = (x - left)[:, None], (y - top)[:, None]
-    light = linear(image)
 
     def at(row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        return light[row % SIDE, column % SIDE]
+        return light[row % side, column % side]
 
     above = at(top, left) * (1 - a) + at(top, left + 1) * a
     below = at(top + 1, left) * (1 - a) + at(top + 1, left + 1) * a
-    expected = above * (1 - b) + below * b
+    return above * (1 - b) + below * b
+
+
+def test_between_texels_it_is_bilinear_and_wraps_around() -> None:
+    image, places = random_image(1), np.random.default_rng(2).uniform(-3, 3, (500, 2))
+    expected = bilinear(linear(image), places)
     np.testing.assert_allclose(colors_at(image, places, 0.0), expected, atol=1e-5)
 
 
 @pytest.mark.parametrize(("footprint", "block"), [(0.9 / SIDE, 1), (2 / SIDE, 2), (0.25, 32)])
-def test_large_pixels_see_the_mean_of_a_block(footprint: float, block: int) -> None:
-    image = random_image(3)
+def test_large_pixels_see_means_of_blocks_as_large(footprint: float, block: int) -> None:
+    image, places = random_image(3), np.random.default_rng(4).uniform(-3, 3, (500, 2))
     count = SIDE // block
     means = linear(image).reshape(count, block, count, block, 3).mean((1, 3))
-    rows, columns = np.indices((count, count)).reshape(2, -1)
-    places = (np.stack([columns, rows], -1) + 0.5) / count
     found = colors_at(image, places, footprint)
-    np.testing.assert_allclose(found, means.reshape(-1, 3), atol=1e-5)
+    np.testing.assert_allclose(found, bilinear(means, places), atol=1e-5)
 
 
 def test_far_away_and_huge_coordinates_are_the_mean_and_finite() -> None:
