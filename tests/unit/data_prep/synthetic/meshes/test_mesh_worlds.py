@@ -10,7 +10,15 @@ import pytest
 from obj_meshes import write_library
 
 from diff4splat.data_prep.synthetic.arrangements.backdrops import Backdrop
-from diff4splat.data_prep.synthetic.arrangements.furnished import HEIGHTS_M, Furniture, furnish
+from diff4splat.data_prep.synthetic.arrangements.cameras import eye_of
+from diff4splat.data_prep.synthetic.arrangements.furnished import (
+    GAP_M,
+    HEIGHTS_M,
+    Furniture,
+    furnish,
+)
+from diff4splat.data_prep.synthetic.arrangements.handheld_cameras import EYE_M, handheld_view
+from diff4splat.data_prep.synthetic.arrangements.objects import arrange
 from diff4splat.data_prep.synthetic.materials import image_texture, named_color
 from diff4splat.data_prep.synthetic.meshes.cutouts import MeshCutoutJob, cutout, draw_cutouts
 from diff4splat.data_prep.synthetic.meshes.library import MeshLibrary, open_library
@@ -110,13 +118,61 @@ def test_furniture_does_not_overlap(furniture) -> None:
                 assert gap.max() > -1e-5
 
 
-def test_some_furniture_has_its_back_to_a_wall(library: MeshLibrary) -> None:
+def test_some_furniture_has_its_back_to_a_wall_and_faces_the_room(library: MeshLibrary) -> None:
     backs = 0
     for number in range(COUNT):
         for item in furnish(library, ROOM, Rng("wall", number)):
-            reach = np.abs([item.low_m, item.high_m])[:, [0, 2]].max(0)
-            backs += bool((np.abs(reach - ROOM.half_m) < 0.04).any())
+            for axis, half in zip((0, 2), ROOM.half_m, strict=True):
+                for side, face in ((-1, item.low_m), (1, item.high_m)):
+                    if abs(side * face[axis] - half + GAP_M) < 1e-6:
+                        backs += 1
+                        assert _front(item)[axis] == pytest.approx(-side, abs=1e-6)
     assert backs >= COUNT
+
+
+def _front(item: Furniture) -> np.ndarray:
+    """Unit vector from the middle to the pictured side."""
+    way = item.placed.parts[0][0].mean(0) - item.center_m
+    return way / np.linalg.norm(way)
+
+
+def test_what_is_higher_than_the_room_does_not_stand_in_it(library: MeshLibrary) -> None:
+    low = replace(ROOM, height_m=0.4)
+    assert not any(furnish(library, low, Rng("low", number)) for number in range(3))
+
+
+@pytest.mark.parametrize("backdrop", [ROOM, OPEN], ids=["room", "open"])
+def test_cameras_are_at_the_height_of_people_and_in_no_object(
+    library: MeshLibrary, backdrop: Backdrop
+) -> None:
+    objects = furnish(library, backdrop, Rng("cameras", 0))
+    views = [handheld_view(objects, backdrop, Rng("view", number)) for number in range(60)]
+    eyes = np.array([eye_of(view) for view in views if view is not None])
+    assert len(eyes) > 40
+    assert (-eyes[:, 1] > EYE_M[0]).all() and (-eyes[:, 1] < EYE_M[1]).all()
+    for item in objects:
+        away = np.maximum(item.low_m - eyes, eyes - item.high_m).max(1)
+        assert away.min() >= 0.06 - 1e-9
+    if not backdrop.is_open:
+        assert (np.abs(eyes[:, [0, 2]]) < backdrop.half_m).all()
+
+
+def test_rooms_are_lit_as_rooms(file: Path) -> None:
+    rooms, others = [], []
+    for index in range(2 * COUNT):
+        made = make_world(recipe(file, mesh_share=0.0, furnished_share=1.0), index)
+        walls = sum(note.name == "panel" for note in made.note.objects)
+        (rooms if walls >= 5 else others).append(made.sky.haze_per_m == made.sky.clouds == 0)
+    assert rooms and others and all(rooms) and not all(others)
+
+
+def test_most_meshes_of_arrangements_are_upright(file: Path) -> None:
+    split, upright = recipe(file).allowed(), []
+    for number in range(30):
+        for item in arrange(split, Rng("up", number), is_portrait=False, is_high=False):
+            points = np.concatenate([part[0] for part in item.placed.parts])
+            upright.append(np.ptp(points[:, 1]) == pytest.approx(item.placed.shape.height))
+    assert 0.7 < np.mean(upright) < 0.9
 
 
 def test_small_objects_lie_on_others(library: MeshLibrary) -> None:
@@ -161,6 +217,9 @@ def test_a_cutout_is_opaque_inside_and_transparent_around(library: MeshLibrary) 
     solid = rgba[rgba[..., 3] == 255][:, :3].astype(int)
     assert solid.std(0).max() > 20 and solid.mean() > 15
     assert (rgba[0][:, 3] > 0).any() and (rgba[:, 0, 3] > 0).any()
+    # Colours at the edge are those of the object, not mixed with what is around it.
+    edge = rgba[(rgba[..., 3] > 60) & (rgba[..., 3] < 200)][:, :3]
+    assert edge.max(1).mean() > 0.75 * solid.max(1).mean()
 
 
 def test_cutouts_of_known_names_are_written_with_their_nouns(file: Path, tmp_path: Path) -> None:
