@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from diff4splat.captions.colors import COLOR_NAMES, color_numbers
+from diff4splat.captions.colors import main_color_name
 from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.captions.srgb import linear_from_srgb
 from diff4splat.errors import FileFormatError, InputError
@@ -26,8 +26,6 @@ PUBLIC_NAMES = {
 OPAQUE = 0.5
 MOST_SIDE_PX = 256
 """Larger images are reduced: an object is shown with fewer pixels."""
-MAIN_COLOR_SHARE = 0.5
-"""Share of an object's pixels from which it has the name of their colour."""
 _SUFFIXES = (".png", ".webp")
 _COLOR_SIDE_PX = 32
 _LEAST_OPACITY = 1e-6
@@ -131,8 +129,4 @@ def main_color(cutout: Cutout) -> str:
     """Name of the colour of most pixels; empty for an object of several."""
     small = cv2.resize(cutout.rgba, (_COLOR_SIDE_PX, _COLOR_SIDE_PX), interpolation=cv2.INTER_AREA)
     pixels = small[small[..., 3] > OPAQUE][:, :3]
-    if not len(pixels):
-        return ""
-    counts = np.bincount(color_numbers(linear_from_srgb(pixels.astype(np.float64))))
-    most = int(counts.argmax())
-    return COLOR_NAMES[most] if counts[most] >= MAIN_COLOR_SHARE * len(pixels) else ""
+    return main_color_name(linear_from_srgb(pixels.astype(np.float64)), np.ones(len(pixels)))

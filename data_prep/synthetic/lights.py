@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.data_prep.synthetic.layout.kinds import SceneKind
+from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS, SceneKind
 from diff4splat.data_prep.synthetic.palettes import linear_from_hex
 from diff4splat.data_prep.synthetic.quantise import COLOR_BITS, POSE_BITS, quantise, quantise_number
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.world import Light, Sky
+
+LOW_HILLS_M = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,6 +161,12 @@ UNDER_WATER: dict[str, LightingPreset] = {
         softness=(0.1, 0.25),
     ),
 }
+
+
+def sample_any_lighting(rng: Rng) -> tuple[Light, Sky]:
+    """Light and sky of a random kind of scene without high hills, for places of no kind."""
+    kinds = sorted(name for name, kind in SCENE_KINDS.items() if kind.hills_m[1] < LOW_HILLS_M)
+    return sample_lighting(SCENE_KINDS[rng.choice(kinds)], 1.0, rng.child("light"))
 
 
 def sample_lighting(kind: SceneKind, area_radius_m: float, rng: Rng) -> tuple[Light, Sky]:

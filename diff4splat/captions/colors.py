@@ -31,11 +31,20 @@ _XYZ_FROM_RGB = np.array(
 )
 _WHITE = np.array([0.9505, 1.0, 1.089])
 COLOR_NAMES = tuple(_ANCHORS)
+MAIN_COLOR_SHARE = 0.5
+"""Share of an object from which it has the name of a colour."""
 
 
 def color_name(linear: Float64[np.ndarray, "3"]) -> str:
     """The name of a linear RGB colour."""
     return COLOR_NAMES[int(color_numbers(linear[None])[0])]
+
+
+def main_color_name(linear: Float64[np.ndarray, "n 3"], weights: Float64[np.ndarray, " n"]) -> str:
+    """The name of the colour of most of the weight; empty if none has half of it."""
+    found = np.bincount(color_numbers(linear), weights, len(COLOR_NAMES))
+    most = int(found.argmax())
+    return COLOR_NAMES[most] if found[most] >= MAIN_COLOR_SHARE * weights.sum() > 0 else ""
 
 
 def color_numbers(linear: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:

@@ -19,8 +19,7 @@ from diff4splat.data_prep.synthetic.arrangements.objects import Arranged, arrang
 from diff4splat.data_prep.synthetic.assembly import WorldContent, assemble
 from diff4splat.data_prep.synthetic.cameras import LensSpec, ViewSpec, camera_batch
 from diff4splat.data_prep.synthetic.captioning import LICENSE, clip_metadata
-from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
-from diff4splat.data_prep.synthetic.lights import sample_lighting
+from diff4splat.data_prep.synthetic.lights import sample_any_lighting
 from diff4splat.data_prep.synthetic.quantise import POSE_BITS, quantise
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.splits import Split
@@ -51,10 +50,7 @@ def try_arrangement(
         any_view(objects, backdrop, rng.child("view", number), is_portrait=is_portrait)
         for number in range(views)
     ]
-    found = [spec for spec in specs if spec is not None]
-    if len(found) < views:
-        return None
-    return _world(_content(objects, backdrop, split, rng), found, lens, rng, identifier)
+    return _world(_content(objects, backdrop, split, rng), specs, lens, rng, identifier)
 
 
 def _try_furnished(
@@ -68,11 +64,8 @@ def _try_furnished(
     if not objects:
         return None
     specs = [handheld_view(objects, backdrop, rng.child("view", n)) for n in range(views)]
-    found = [spec for spec in specs if spec is not None]
-    if len(found) < views:
-        return None
-    made = _world(_content(objects, backdrop, split, rng), found, lens, rng, identifier)
-    if kind != "room":
+    made = _world(_content(objects, backdrop, split, rng), specs, lens, rng, identifier)
+    if made is None or kind != "room":
         return made
     # Without haze and clouds, walls hand on the light of a lamp: see ``lighting_of``.
     return replace(made, sky=replace(made.sky, haze_per_m=0.0, clouds=0.0))
@@ -86,11 +79,14 @@ def _content(
 
 
 def _world(
-    content: WorldContent, specs: list[ViewSpec], lens: LensSpec, rng: Rng, identifier: str
-) -> World:
+    content: WorldContent, specs: list[ViewSpec | None], lens: LensSpec, rng: Rng, identifier: str
+) -> World | None:
+    """None where a view is missing."""
+    views = [camera_batch(spec, lens, 0.0) for spec in specs if spec is not None]
+    if len(views) < len(specs):
+        return None
     objects, assembled = assemble(content)
-    scene = rng.choice(sorted(name for name, kind in SCENE_KINDS.items() if kind.hills_m[1] < 5))
-    light, sky = sample_lighting(SCENE_KINDS[scene], 1.0, rng.child("light"))
+    light, sky = sample_any_lighting(rng)
     facts = CaptionFacts(place="", events=(), static_objects=(), camera=())
     return World(
         note=clip_metadata(facts, assembled, identifier, 0, _licenses(content.split)),
@@ -98,7 +94,7 @@ def _world(
         objects=objects,
         light=_from_anywhere(light, rng.child("sun")),
         sky=sky,
-        views=tuple(camera_batch(spec, lens, 0.0) for spec in specs),
+        views=tuple(views),
     )
 
 

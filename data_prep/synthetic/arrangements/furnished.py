@@ -10,11 +10,10 @@ from jaxtyping import Float64
 
 from diff4splat.data_prep.synthetic.arrangements.backdrops import Backdrop
 from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
+from diff4splat.data_prep.synthetic.layout.props import place_static
 from diff4splat.data_prep.synthetic.meshes.library import MeshLibrary
-from diff4splat.data_prep.synthetic.motions.context import rest_positions
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
-from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
 
 LEAST, MOST = 5, 18
 ATTEMPTS = 8
@@ -82,7 +81,7 @@ def _try_place(
     else:
         y = 0.0
         x, z, yaw = _on_floor(shape, backdrop, rng)
-    item = _turned(name, shape, np.array([x, y, z]), yaw)
+    item = _boxed(place_static(name, shape, x, z, yaw=yaw, y=y))
     inside = backdrop.is_open or all(
         max(-item.low_m[axis], item.high_m[axis]) < half
         for axis, half in zip((0, 2), backdrop.half_m, strict=True)
@@ -106,11 +105,8 @@ def _on_floor(shape: Shape, backdrop: Backdrop, rng: Rng) -> tuple[float, float,
     return x, z, turn * np.pi / 2
 
 
-def _turned(name: str, shape: Shape, at: Float64[np.ndarray, "3"], yaw: float) -> Furniture:
-    turn = about_y(yaw).T
-    parts = tuple(part @ turn + at for part in rest_positions(shape))
-    points = np.concatenate([part[0] for part in parts])
-    placed = PlacedObject(family=name, shape=shape, parts=parts, size_m=shape.height)
+def _boxed(placed: PlacedObject) -> Furniture:
+    points = np.concatenate([part[0] for part in placed.parts])
     return Furniture(placed=placed, low_m=points.min(0), high_m=points.max(0))
 
 

@@ -16,8 +16,7 @@ from diff4splat.captions.vocabulary import UNNAMED
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.data_prep.synthetic.assembly import object_of
 from diff4splat.data_prep.synthetic.cameras import LensSpec, ViewSpec, camera_batch
-from diff4splat.data_prep.synthetic.layout.kinds import SCENE_KINDS
-from diff4splat.data_prep.synthetic.lights import sample_lighting
+from diff4splat.data_prep.synthetic.lights import sample_any_lighting
 from diff4splat.data_prep.synthetic.materials import image_texture
 from diff4splat.data_prep.synthetic.meshes.library import open_library
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
@@ -25,6 +24,7 @@ from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
 from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
 from diff4splat.data_prep.synthetic.world import World
+from diff4splat.errors import InputError
 from diff4splat.io.atomic import atomic_folder
 from diff4splat.progress.phases import Phases
 
@@ -49,11 +49,17 @@ def draw_cutouts(job: MeshCutoutJob, phases: Phases) -> int:
 
     Raises:
         FileFormatError: no mesh library.
+        InputError: no mesh has a name that captions know.
         OutputError: the folder cannot be written.
     """
     library = open_library(job.meshes)
     named = [(n, library.noun(n)) for n in range(len(library.notes))]
     named = [(number, noun) for number, noun in named if noun != UNNAMED]
+    if not named:
+        raise InputError(
+            f"{job.meshes}: expected a mesh with a noun of captions, got none; add its noun to "
+            "captions/cutout_nouns.py"
+        )
     names: dict[str, str] = {}
     with (
         phases.phase("draw cutouts", len(named)) as advance,
@@ -109,8 +115,7 @@ def _world(shape: Shape, side_px: int, rng: Rng) -> World:
         path="static",
         focus_m=(float(center[0]), float(center[1]), float(center[2])),
     )
-    kinds = sorted(name for name, kind in SCENE_KINDS.items() if kind.hills_m[1] < 5)
-    light, sky = sample_lighting(SCENE_KINDS[rng.choice(kinds)], 1.0, rng.child("light"))
+    light, sky = sample_any_lighting(rng)
     objects = tuple(
         object_of(number, part, part.surface.vertices[None], image_texture(part.image, 1.0))
         for number, part in enumerate(shape.parts, 1)

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from diff4splat.captions.cutout_nouns import ALL_NOUNS
 from diff4splat.captions.vocabulary import UNNAMED
 from diff4splat.data_prep.synthetic.meshes.palette import TexturedPart
 from diff4splat.data_prep.synthetic.rng import Rng
@@ -101,14 +102,21 @@ class MeshLibrary:
 
     def draw_number(self, rng: Rng) -> int:
         """Number of any mesh, all names equally likely."""
-        names = sorted({note.name for note in self.notes})
-        name = rng.child("name").choice(names)
-        numbers = [number for number, note in enumerate(self.notes) if note.name == name]
-        return rng.child("number").choice(numbers)
+        name = rng.child("name").choice(tuple(self._numbers))
+        return rng.child("number").choice(self._numbers[name])
+
+    @cached_property
+    def _numbers(self) -> dict[str, list[int]]:
+        """Of all meshes, by name, sorted."""
+        found: dict[str, list[int]] = {}
+        for number, note in enumerate(self.notes):
+            found.setdefault(note.name, []).append(number)
+        return dict(sorted(found.items()))
 
     def noun(self, number: int) -> str:
-        """What captions call mesh ``number``; "object" if they have no noun for its name."""
-        return _nouns().get(self.notes[number].name, UNNAMED)
+        """What captions call mesh ``number``: its name, or a noun for it; "object" without one."""
+        name = self.notes[number].name
+        return _nouns().get(name, name if name in ALL_NOUNS else UNNAMED)
 
     def shape(self, number: int) -> Shape:
         """Mesh ``number``, of height 1.

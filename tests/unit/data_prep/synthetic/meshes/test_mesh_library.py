@@ -221,6 +221,12 @@ def test_a_folder_is_searched_with_its_subfolders(tmp_path: Path) -> None:
     assert note.name == "lamp shade" and note.height_m == pytest.approx(4.0)
 
 
+def test_names_that_are_nouns_need_no_table(tmp_path: Path) -> None:
+    write_cube(tmp_path / "source", "giraffe")
+    made(tmp_path / "source", tmp_path / "meshes.safetensors")
+    assert open_library(tmp_path / "meshes.safetensors").noun(0) == "giraffe"
+
+
 def test_draws_are_even_over_names(library: MeshLibrary) -> None:
     drawn = [library.draw_number(Rng("draw", n)) for n in range(200)]
     assert 60 < drawn.count(0) < 140 and set(drawn) == {0, 1}

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from obj_meshes import write_library
 
+from diff4splat.data_prep.synthetic.arrangements import arrangement
 from diff4splat.data_prep.synthetic.arrangements.backdrops import Backdrop
 from diff4splat.data_prep.synthetic.arrangements.cameras import eye_of
 from diff4splat.data_prep.synthetic.arrangements.furnished import (
@@ -19,6 +20,7 @@ from diff4splat.data_prep.synthetic.arrangements.furnished import (
 )
 from diff4splat.data_prep.synthetic.arrangements.handheld_cameras import EYE_M, handheld_view
 from diff4splat.data_prep.synthetic.arrangements.objects import arrange
+from diff4splat.data_prep.synthetic.cameras import LensSpec
 from diff4splat.data_prep.synthetic.materials import image_texture, named_color
 from diff4splat.data_prep.synthetic.meshes.cutouts import MeshCutoutJob, cutout, draw_cutouts
 from diff4splat.data_prep.synthetic.meshes.library import MeshLibrary, open_library
@@ -29,7 +31,7 @@ from diff4splat.data_prep.synthetic.rng import Rng
 from diff4splat.data_prep.synthetic.shapes.shape import PartImage
 from diff4splat.data_prep.synthetic.world import Texture
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world
-from diff4splat.errors import ConfigError
+from diff4splat.errors import ConfigError, InputError
 from diff4splat.progress.phases import Phases
 
 pytest.importorskip("trimesh")
@@ -230,3 +232,26 @@ def test_cutouts_of_known_names_are_written_with_their_nouns(file: Path, tmp_pat
     for name in names:
         image = cv2.imread(str(tmp_path / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
         assert image.shape[2] == 4
+
+
+def test_a_library_without_known_names_gives_no_cutouts(tmp_path: Path) -> None:
+    source = write_library(tmp_path / "things.sh3f", ("Unknown",))
+    file = tmp_path / "meshes.safetensors"
+    prepare_meshes(MeshJob(sources=[source], file=file, license="MIT"), Phases())
+    with pytest.raises(InputError, match="noun of captions"):
+        draw_cutouts(MeshCutoutJob(meshes=file, folder=tmp_path / "out"), Phases())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_place_without_room_for_every_camera_is_given_up(file: Path, monkeypatch) -> None:
+    views = iter([None, *range(99)])
+    seen = arrangement.handheld_view
+
+    def sometimes(*arguments):
+        return None if next(views) is None else seen(*arguments)
+
+    monkeypatch.setattr(arrangement, "handheld_view", sometimes)
+    split = recipe(file, mesh_share=0.0, furnished_share=1.0).allowed()
+    lens = LensSpec(size_px=(32, 32), fov_deg=50.0, frames=1, fps=1.0)
+    assert arrangement.try_arrangement(split, lens, 3, Rng("given up", 0), "a") is None
+    assert arrangement.try_arrangement(split, lens, 3, Rng("given up", 0), "a") is not None
