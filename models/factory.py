@@ -84,7 +84,11 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
         "deformation": lambda: _deformation(config),
         "monocular_depth": lambda: _monocular_depth(config),
         "motion_unet": lambda: MotionUNet(
-            motion.width, motion.heads, config.text, mask_refiner_width=motion.mask_refiner_width
+            motion.width,
+            motion.heads,
+            config.text,
+            mask_refiner_width=motion.mask_refiner_width,
+            object_mask=motion.object_mask,
         ),
         "object_mask": lambda: _object_mask(config),
         "image_encoder": lambda: ClipImageEncoder(config.image_encoder),

@@ -52,6 +52,7 @@ class MotionPrior(Protocol):
         level: Tensor,
         text: Tensor | None = None,
         text_mask: Tensor | None = None,
+        object_mask: Tensor | None = None,
     ) -> Tensor:
         """The clean motion."""
 
@@ -62,6 +63,7 @@ class MotionPrior(Protocol):
         level: Tensor,
         text: Tensor | None = None,
         text_mask: Tensor | None = None,
+        object_mask: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """The clean motion, and for every pixel the logit that it moves."""
 

@@ -23,8 +23,9 @@ from torch import Tensor
 from benchmarks.named_objects.requests import OBJECTS, AskedImage, asked_image
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
+from diff4splat.generation.motion.motion_mask import MotionProbability, motion_probability
 from diff4splat.generation.motion.networks import motion_prior
-from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.plan import MOTION_PARTS
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import pinhole
@@ -34,13 +35,13 @@ THRESHOLD = GenerationSettings().motion.threshold
 COLUMNS = ("overlap", "found", "whole", "still", "auc")
 
 
-def motion_of(model: Model, rgb: Tensor, sentence: str) -> MotionSample:
+def motion_of(model: Model, rgb: Tensor, sentence: str) -> MotionProbability:
     """What the model's motion prior says of one sentence."""
     camera = pinhole(float(rgb.shape[1]), tuple(rgb.shape[:2]))
     image = InputImage(rgb=rgb, camera=camera, focal_source="")
     text = model.networks.text_encoder.encode_prompt(sentence)
     request = MotionRequest(text=text, seed=0, settings=GenerationSettings())
-    return sample_motion(motion_prior(model.networks), image, 2, request)
+    return motion_probability(motion_prior(model.networks), image, 2, request)
 
 
 def soft(rgb: Tensor) -> Tensor:
@@ -50,7 +51,7 @@ def soft(rgb: Tensor) -> Tensor:
     return enlarged(downsample(image, 2), 2).rgb
 
 
-def measure(sample: MotionSample, truth: Tensor) -> dict[str, float]:
+def measure(sample: MotionProbability, truth: Tensor) -> dict[str, float]:
     """Columns that apply."""
     mask = sample.mask(THRESHOLD)
     if not bool(truth.any()):
@@ -75,7 +76,7 @@ def rows(model: Model, images: list[AskedImage]) -> dict[str, dict[str, float]]:
     return table
 
 
-def collect(values: dict[str, list[float]], sample: MotionSample, truth: Tensor) -> None:
+def collect(values: dict[str, list[float]], sample: MotionProbability, truth: Tensor) -> None:
     """Add what ``measure`` says, and the highest probability."""
     kind = "present" if bool(truth.any()) else "absent"
     values[kind].append(float(sample.probability.max()))

@@ -18,6 +18,7 @@ import torch
 from diff4splat import __version__
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
+from diff4splat.generation.inputs.copies import Copies
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.inputs.request import (
     Request,
@@ -32,7 +33,7 @@ from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
-from diff4splat.generation.priors import Copies, image_maps
+from diff4splat.generation.priors import image_maps
 from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks

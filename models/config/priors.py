@@ -73,6 +73,8 @@ class MotionUNetConfig:
     input_scale: int = 1
     """Sides of the copy that it sees, against that of the other networks: with the photograph's own
     pixels, or enlarged."""
+    object_mask: bool = False
+    """Whether it is shown the mask of the object whose motion it predicts (ADR 41)."""
 
     def __post_init__(self) -> None:
         require_counts(self, "heads", "input_scale")
@@ -81,9 +83,10 @@ class MotionUNetConfig:
         fits = self.width % (2 * self.heads) == 0
         expected = f"0 or a multiple of {2 * self.heads}, twice the heads"
         require(fits, "MotionUNetConfig.width", expected, self.width)
-        fits = self.used or not self.mask_refiner_width
-        expected = "0 without the network that it belongs to"
-        require(fits, "MotionUNetConfig.mask_refiner_width", expected, self.mask_refiner_width)
+        for name, off in (("mask_refiner_width", "0"), ("object_mask", "false")):
+            fits = self.used or not getattr(self, name)
+            expected = f"{off} without the network that it belongs to"
+            require(fits, f"MotionUNetConfig.{name}", expected, getattr(self, name))
 
     @property
     def used(self) -> bool:

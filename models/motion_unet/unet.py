@@ -5,13 +5,15 @@ image, ``hc wc`` its cells of 4 pixels, ``s e`` text tokens and their width, ``d
 condition. Motion in the units of ``motion_field``. Noise level 0 is data and 1 is noise.
 
     image, coordinates ─ conv ─┐
+    object mask ─ conv (zero) ─┤
     noisy motion ─────── conv ─┴ + ─ 1/4 ─ 1/8 ─ 1/16 ─ 1/8 ─ 1/4 ─┬ conv (zero) ─ clean motion
     level, time, mean of the text ─ scale and shift of every block ┤
     text ─ text adapter ─ cross-attention in the encoder ──────────┤
                                                                    └ mean over time ─ mask logits
 
 The latent frames of a sample interact through the mean of their features. The mask of cells is
-refined at pixels (``mask_refiner``).
+refined at pixels (``mask_refiner``). With an object mask the motion is that of the object; a mask
+of zeros is none.
 """
 
 from dataclasses import replace
@@ -51,6 +53,7 @@ class MotionUNet(nn.Module):
         text: TextConfig,
         frequency_width: int = 128,
         mask_refiner_width: int = 0,
+        object_mask: bool = False,
     ) -> None:
         super().__init__()
         fine, middle, coarse = widths(width, heads)
@@ -62,6 +65,8 @@ class MotionUNet(nn.Module):
         self.null_text_embedding = nn.Parameter(torch.zeros(text.width))
         self.input_image = nn.Conv2d(IMAGE_CHANNELS, fine, 3, padding=1)
         self.input_motion = nn.Conv2d(CHANNELS, fine, 3, padding=1, bias=False)
+        mask_conv = nn.Conv2d(CELL_PX**2, fine, 3, padding=1, bias=False) if object_mask else None
+        self.input_mask = None if mask_conv is None else zero_(mask_conv)
         self.fine, self.middle, self.coarse = (
             UNetLevel(channels, width, heads, text.width) for channels in (fine, middle, coarse)
         )
@@ -84,6 +89,7 @@ class MotionUNet(nn.Module):
         level: Float[Tensor, " b"],
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
+        object_mask: Float[Tensor, "b hh ww"] | None = None,
     ) -> Float[Tensor, "b 3 t hc wc"]:
         """The clean motion (not a velocity); ``image`` is RGB in [0, 1].
 
@@ -92,7 +98,7 @@ class MotionUNet(nn.Module):
         Raises:
             ShapeError: the image sides are no multiples of 16, or the motion is not on its cells.
         """
-        return self._motion(self.features(image, noisy, level, text, text_mask), noisy)
+        return self._motion(self.features(image, noisy, level, text, text_mask, object_mask), noisy)
 
     def predict_motion_and_mask(
         self,
@@ -101,13 +107,14 @@ class MotionUNet(nn.Module):
         level: Float[Tensor, " b"],
         text: Float[Tensor, "b s e"] | None = None,
         text_mask: Bool[Tensor, "b s"] | None = None,
+        object_mask: Float[Tensor, "b hh ww"] | None = None,
     ) -> tuple[Float[Tensor, "b 3 t hc wc"], Float[Tensor, "b hh ww"]]:
         """The clean motion, and for every pixel the logit of the probability that it moves.
 
         Raises:
             ShapeError: as ``forward``.
         """
-        features = self.features(image, noisy, level, text, text_mask)
+        features = self.features(image, noisy, level, text, text_mask, object_mask)
         pooled = features.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)
         mask = torch.nn.functional.pixel_shuffle(self.mask_head(pooled), CELL_PX)[:, 0]
         if self.mask_refiner is not None:
@@ -121,13 +128,15 @@ class MotionUNet(nn.Module):
         level: Float[Tensor, " b"],
         text: Float[Tensor, "b s e"] | None,
         text_mask: Bool[Tensor, "b s"] | None,
+        object_mask: Float[Tensor, "b hh ww"] | None = None,
     ) -> Float[Tensor, "n c hc wc"]:
         """Input of both heads."""
         _require_sizes(image, noisy)
         samples, frames = len(noisy), noisy.shape[2]
         tokens = None if text is None else self._adapt(text_tokens(text, text_mask))
         condition = self._condition(level, frames, tokens)
-        fine = self.fine(self._input_features(image, noisy), condition, samples, tokens)
+        features = self._input_features(image, noisy, object_mask)
+        fine = self.fine(features, condition, samples, tokens)
         middle = self.middle(self.down_1(fine), condition, samples, tokens)
         coarse = self.coarse(self.down_2(middle), condition, samples, tokens)
         coarse = self.mid(coarse, condition)
@@ -173,10 +182,15 @@ class MotionUNet(nn.Module):
         return (by_sample[:, None] + by_frame).flatten(0, 1)
 
     def _input_features(
-        self, image: Float[Tensor, "b 3 hh ww"], noisy: Float[Tensor, "b 3 t hc wc"]
+        self,
+        image: Float[Tensor, "b 3 hh ww"],
+        noisy: Float[Tensor, "b 3 t hc wc"],
+        object_mask: Float[Tensor, "b hh ww"] | None,
     ) -> Float[Tensor, "n c hc wc"]:
-        """The image's features are computed once for all frames."""
+        """Features of image and mask are computed once for all frames."""
         features = self.input_image(torch.cat([cells(image) * 2 - 1, cell_coordinates(noisy)], 1))
+        if self.input_mask is not None and object_mask is not None:
+            features = features + self.input_mask(cells(object_mask[:, None]))
         motion = self.input_motion(noisy.transpose(1, 2).flatten(0, 1))
         return (motion.unflatten(0, (len(noisy), -1)) + features[:, None]).flatten(0, 1)
 

@@ -83,9 +83,10 @@ class OnnxMotion(OnnxPart):
         level: Tensor,
         text: Tensor | None = None,
         text_mask: Tensor | None = None,
+        object_mask: Tensor | None = None,
     ) -> Tensor:
         """The clean motion."""
-        return self.predict_motion_and_mask(image, noisy, level, text, text_mask)[0]
+        return self.predict_motion_and_mask(image, noisy, level, text, text_mask, object_mask)[0]
 
     def predict_motion_and_mask(
         self,
@@ -94,13 +95,16 @@ class OnnxMotion(OnnxPart):
         level: Tensor,
         text: Tensor | None = None,
         text_mask: Tensor | None = None,
+        object_mask: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """The clean motion, and for every pixel the logit that it moves."""
         text, text_mask = text_or_none(text, text_mask, len(image), self.config.text.width)
         inputs = {"image": image, "noisy": noisy, "level": level}
-        found = run_graph(
-            self.model["motion_unet"], inputs | {"text": text, "text_mask": text_mask}
-        )
+        inputs |= {"text": text, "text_mask": text_mask}
+        if self.config.motion_unet.object_mask:
+            absent = image.new_zeros(len(image), *image.shape[2:])
+            inputs["object_mask"] = absent if object_mask is None else object_mask
+        found = run_graph(self.model["motion_unet"], inputs)
         return found["motion"], found["mask_logits"]
 
 

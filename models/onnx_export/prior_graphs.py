@@ -59,10 +59,14 @@ def monocular_depth_graphs(network: nn.Module, config: ModelConfig) -> list[Grap
 
 
 def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
-    """An image, noisy motion and text to clean motion and to the logits of the motion mask."""
+    """An image, noisy motion and text to clean motion and to the logits of the motion mask.
+
+    Where the model is shown the mask of an object, it is an input, and zeros are none.
+    """
     size = (f"{MOTION_MULTIPLE_PX}*rows", f"{MOTION_MULTIPLE_PX}*columns")
     side = MOTION_MULTIPLE_PX // MOTION_CELL_PX
     motion = ("batch", 3, "frames", f"{side}*rows", f"{side}*columns")
+    shown = (unit("object_mask", "batch", *size),) if config.motion_unet.object_mask else ()
     return [
         GraphSource(
             name="motion_unet",
@@ -74,6 +78,7 @@ def motion_unet_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
                 unit("level", "batch"),
                 normal("text", "batch", "tokens", config.text.width),
                 mask("text_mask", "batch", "tokens"),
+                *shown,
             ),
             outputs=(output("motion", *motion), output("mask_logits", "batch", *size)),
         )

@@ -67,12 +67,19 @@ def extend_to_all_cells(
     """
     share = torch.nn.functional.avg_pool2d(moving.float()[None], MOTION_CELL_PX)[0]
     cells = cell_means(motion * moving) / share.clamp_min(0.5 / MOTION_CELL_PX**2)
-    filled = share.nonzero()
+    return extended_from(cells, share > 0)
+
+
+def extended_from(
+    cells: Float[Tensor, "3 t hc wc"], known: Bool[Tensor, "hc wc"]
+) -> Float[Tensor, "3 t hc wc"]:
+    """Every cell with the motion of the nearest ``known`` one; unchanged without any."""
+    filled = known.nonzero()
     if len(filled) == 0:
         return cells
-    every = torch.ones_like(share).nonzero()
+    every = torch.ones_like(known).nonzero()
     nearest = filled[torch.cdist(every.float(), filled.float()).argmin(1)]
-    return cells[:, :, nearest[:, 0], nearest[:, 1]].unflatten(2, tuple(share.shape))
+    return cells[:, :, nearest[:, 0], nearest[:, 1]].unflatten(2, tuple(known.shape))
 
 
 def cell_means(motion: Float[Tensor, "3 t h w"]) -> Float[Tensor, "3 t hc wc"]:

@@ -10,9 +10,9 @@ from torch import Tensor
 
 from diff4splat.error_time.subjects.inputs import Inputs
 from diff4splat.error_time.subjects.model import request, shipped_model
+from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.motion.networks import motion_prior
 from diff4splat.generation.motion.sampling import MotionRequest, sample_motion
-from diff4splat.generation.priors import Copies, motion_copy
 from diff4splat.generation.settings import GenerationSettings
 
 

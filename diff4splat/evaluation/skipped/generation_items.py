@@ -15,6 +15,7 @@ from diff4splat.evaluation.skipped.scene_items import (
     zero_motion,
 )
 from diff4splat.flow.guidance import Guidance
+from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.image_size import (
     downsampling_factor,
     find_image_size,
@@ -22,11 +23,11 @@ from diff4splat.generation.inputs.image_size import (
 )
 from diff4splat.generation.inputs.input_cameras import path_frame
 from diff4splat.generation.inputs.input_image import InputImage, downsample, load_image
+from diff4splat.generation.motion.motion_mask import motion_probability
 from diff4splat.generation.motion.networks import motion_prior
 from diff4splat.generation.motion.sampling import MotionRequest, sample_motion
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import FILL_PARTS, MOTION_PARTS
-from diff4splat.generation.priors import Copies, motion_copy
 from diff4splat.generation.settings import GenerationSettings, MotionSettings
 from diff4splat.models.hub.model import load_model
 from diff4splat.paths.build import build_path
@@ -158,6 +159,7 @@ def run_motion_prior(source: Source) -> None:
     request = MotionRequest(text=text, seed=0, settings=settings)
     copies = Copies(image=source.image, small=small)
     image = motion_copy(copies, model.config.motion_unet.input_scale)
+    motion_probability(motion_prior(model.networks), image, frames, request)
     sample_motion(motion_prior(model.networks), image, frames, request)
 
 

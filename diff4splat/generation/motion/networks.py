@@ -1,7 +1,7 @@
 """The networks that decide about motion, as one prior.
 
 image, text ─ object mask ─ what moves
-image, noise, text ─ motion U-Net ─ how
+image, noise, text, mask ─ motion U-Net ─ how
 """
 
 from dataclasses import dataclass
@@ -45,9 +45,10 @@ class MaskedMotion:
         level: Tensor,
         text: Tensor | None = None,
         text_mask: Tensor | None = None,
+        object_mask: Tensor | None = None,
     ) -> Tensor:
         """The clean motion."""
-        return self.motion_unet(image, noisy, level, text, text_mask)
+        return self.motion_unet(image, noisy, level, text, text_mask, object_mask)
 
     def predict_motion_and_mask(
         self,
@@ -56,9 +57,11 @@ class MaskedMotion:
         level: Tensor,
         text: Tensor | None = None,
         text_mask: Tensor | None = None,
+        object_mask: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """The clean motion, and for every pixel the logit that it moves."""
-        return self.motion_unet.predict_motion_and_mask(image, noisy, level, text, text_mask)
+        given = (image, noisy, level, text, text_mask, object_mask)
+        return self.motion_unet.predict_motion_and_mask(*given)
 
     def object_maps(self, image: Tensor, text: Tensor) -> ObjectMaps:
         """What the text asks to move, as a mean with the mirror image, and vectors of instances.

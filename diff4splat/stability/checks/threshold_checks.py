@@ -13,8 +13,9 @@ from torch import Tensor
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.motion.motion_mask import MotionProbability, motion_probability
 from diff4splat.generation.motion.networks import motion_prior
-from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import largest_displacement_px
 from diff4splat.render.api import render
@@ -122,12 +123,12 @@ def measure_cutoff() -> Outcome:
 
 
 @cache
-def _motion(model: str, noise: float) -> MotionSample:
+def _motion(model: str, noise: float) -> MotionProbability:
     networks = model_of(model).networks
     request = MotionRequest(
         text=networks.text_encoder.encode_prompt(PROMPT), seed=0, settings=GenerationSettings()
     )
-    return sample_motion(motion_prior(networks), _noisy(noise), 3, request)
+    return motion_probability(motion_prior(networks), _noisy(noise), 3, request)
 
 
 def _depth(model: str, noise: float) -> Float[Tensor, "h w"]:

@@ -11,14 +11,12 @@ from oracles_clips import make_clip
 from benchmarks.named_objects.__main__ import auc, collect, means, measure
 from benchmarks.named_objects.requests import asked_image
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
-from diff4splat.flow.guidance import CallCount
-from diff4splat.generation.motion.sampling import MotionSample
+from diff4splat.generation.motion.motion_mask import MotionProbability
 from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
 
-def sample(probability: torch.Tensor) -> MotionSample:
-    still = torch.zeros(3, 2, 1, 1)
-    return MotionSample(field=still, mean_field=still, probability=probability, calls=CallCount())
+def sample(probability: torch.Tensor) -> MotionProbability:
+    return MotionProbability(probability=probability)
 
 
 def test_a_mask_is_compared_with_the_object_or_with_nothing() -> None:

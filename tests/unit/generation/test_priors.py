@@ -8,16 +8,15 @@ import torch
 from image_layers import input_image, random_rgb
 
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
+from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.priors import (
     ENLARGEMENT,
-    Copies,
     image_depth,
     image_maps,
-    motion_copy,
 )
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig

@@ -1,6 +1,6 @@
 """The motion network: flow matching on the true motion of a first image.
 
-    first image ───────────────────────────────────┐
+    first image, mask of one object ───────────────┐
     captions ─ text encoder (frozen) ──────────────┤
     motion ─ (1 − level) clean + level noise ─ motion network ─ clean motion ─ velocity ─ loss
 
@@ -10,14 +10,16 @@ No other network of the video model runs or learns.
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.flow.path import add_noise, velocity_from_clean
 from diff4splat.io.pixels import unit_rgb
+from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.networks import Networks
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.coarse_images import enlarged, with_coarse_images
+from diff4splat.training.batches.mask_condition import with_object_masks
 from diff4splat.training.batches.random_flip import flip_samples
 from diff4splat.training.losses.flow_matching import flow_matching
 from diff4splat.training.losses.object_mask import cross_entropy
@@ -48,12 +50,16 @@ class NoisyMotion:
         return add_noise(self.clean, self.noise, self.level)
 
     def error(
-        self, clean: Float[Tensor, "b 3 t1 hc wc"], weights: Float[Tensor, " b"] | None = None
+        self,
+        clean: Float[Tensor, "b 3 t1 hc wc"],
+        weights: Float[Tensor, " b"] | None = None,
+        cells: Float[Tensor, "b hc wc"] | None = None,
     ) -> Float[Tensor, " b"]:
         """Mean squared error of the velocity that a predicted clean motion implies."""
         level = self.level[:, None, None, None, None]
         velocity = velocity_from_clean(self.motion, clean, level)
-        return flow_matching(velocity, self.clean, self.noise, weights=weights)
+        shares = None if cells is None else cells[:, None].expand_as(self.clean[:, 0])
+        return flow_matching(velocity, self.clean, self.noise, weights=weights, cells=shares)
 
 
 class MotionDiffusionStage(ModelStage):
@@ -68,23 +74,26 @@ class MotionDiffusionStage(ModelStage):
     def forward(self, batch: ClipBatch) -> Terms:
         """The terms ``flow``, ``motion_mask`` and ``paraphrase``."""
         batch, losses = self._augmented(self._enlarged(batch)), self.plan.recipe.losses
+        batch, masks = self._object_masks(batch)
         uniform = self.random.uniform(batch, "level")
         level = sample_levels(uniform, LevelDistribution(shift=self.plan.recipe.timestep_shift))
         noisy = self._noisy(batch, level.to(batch.field), "noise")
-        clean, logits = self.motion_unet.predict_motion_and_mask(*self._inputs(batch, noisy))
+        clean, logits = self._predicted(self._inputs(batch, noisy, masks))
         known = batch.motion_known.to(clean)
+        unmasked = known if masks is None else known * ~masks.flatten(1).any(1)
+        cells = None if masks is None else _cell_weights(batch.moving)
         weights = min_level_weights(noisy.level, losses.min_level_weighting)
         return weighted_sum(
             [
                 LossTerm(
                     name="flow",
                     weight=losses.flow,
-                    compute=lambda: known * noisy.error(clean, weights),
+                    compute=lambda: known * noisy.error(clean, weights, cells),
                 ),
                 LossTerm(
                     name="motion_mask",
                     weight=losses.motion_mask,
-                    compute=lambda: known * cross_entropy(logits, batch.moving),
+                    compute=lambda: unmasked * cross_entropy(logits, batch.moving),
                 ),
                 LossTerm(
                     name="paraphrase",
@@ -93,6 +102,14 @@ class MotionDiffusionStage(ModelStage):
                 ),
             ]
         )
+
+    def _predicted(
+        self, inputs: tuple[Tensor | None, ...]
+    ) -> tuple[Float[Tensor, "b 3 t1 hc wc"], Float[Tensor, "b h w"] | None]:
+        """Clean motion, and the logits of the mask where a loss asks for them."""
+        if self.plan.recipe.losses.motion_mask == 0:
+            return self.motion_unet(*inputs), None
+        return self.motion_unet.predict_motion_and_mask(*inputs)
 
     def _paraphrase_error(self, batch: ClipBatch) -> Float[Tensor, " b"]:
         return paraphrase_error(
@@ -117,6 +134,12 @@ class MotionDiffusionStage(ModelStage):
         return with_coarse_images(
             batch, sides[int(torch.randint(len(sides), (), generator=generator))]
         )
+
+    def _object_masks(self, batch: ClipBatch) -> tuple[ClipBatch, Float[Tensor, "b h w"] | None]:
+        """One object of every sample with about its mask, if the network is shown masks."""
+        if not self.plan.model.motion_unet.object_mask:
+            return batch, None
+        return with_object_masks(batch, self.random.per_sample(batch, "object mask"))
 
     def randomly_flipped(self, batch: ClipBatch) -> ClipBatch:
         """Half of the samples mirrored."""
@@ -153,14 +176,24 @@ class MotionDiffusionStage(ModelStage):
         noise = self.random.normal(batch, clean, purpose)
         return NoisyMotion(clean=clean, noise=noise, level=level)
 
-    def _inputs(self, batch: ClipBatch, noisy: NoisyMotion) -> tuple[Tensor | None, ...]:
+    def _inputs(
+        self, batch: ClipBatch, noisy: NoisyMotion, masks: Float[Tensor, "b h w"] | None
+    ) -> tuple[Tensor | None, ...]:
         text, mask = self._text.encode_or_drop(batch, self.training)
         rgb = unit_rgb(batch.video[:, 0]).movedim(-1, 1)
-        return rgb, noisy.motion, noisy.level, text, mask
+        return rgb, noisy.motion, noisy.level, text, mask, masks
 
     def _clean(self, batch: ClipBatch, noisy: NoisyMotion) -> Float[Tensor, "b 3 t1 hc wc"]:
-        return self.motion_unet(*self._inputs(batch, noisy))
+        shown = self.plan.model.motion_unet.object_mask
+        masks = batch.moving.to(noisy.clean) if shown else None
+        return self.motion_unet(*self._inputs(batch, noisy, masks))
 
     def _from_noise(self, batch: ClipBatch) -> Float[Tensor, "b 3 t1 hc wc"]:
         """Clean motion in one step from noise."""
         return self._clean(batch, self._noisy(batch, batch.field.new_ones(len(batch)), EVAL_NOISE))
+
+
+def _cell_weights(moving: Bool[Tensor, "b h w"]) -> Float[Tensor, "b hc wc"]:
+    """Half of the weight on the cells of the object, half on all: outside is only its extension."""
+    inside = torch.nn.functional.max_pool2d(moving.float(), MOTION_CELL_PX)
+    return 1 + inside * inside[0].numel() / inside.flatten(1).sum(1).clamp_min(1)[:, None, None]
