@@ -16,6 +16,7 @@ from typing import Literal
 import torch
 
 from diff4splat import __version__
+from diff4splat.captions.events import split_events
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.copies import Copies
@@ -141,8 +142,11 @@ class Diff4SplatPipeline:
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread(), self._autocast():
             text = self._text_states(request, log)
-            motion = MotionRequest(text=text.prompt, seed=request.seed, settings=request.settings)
-            maps = image_maps(model, copies, frames, motion, log)
+            motions = [
+                MotionRequest(text=event, seed=request.seed, settings=request.settings)
+                for event in text.events or (text.prompt,)
+            ]
+            maps = image_maps(model, copies, frames, motions, log)
         request = sized_to_depth(request, maps.depth)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(
@@ -226,9 +230,12 @@ class Diff4SplatPipeline:
         encode = self.model.networks.text_encoder.encode_prompt
         negative = negative_prompt(request, self.model.config)
         with log.phases.phase("encode text"):
+            prompt = None if request.prompt is None else encode(request.prompt)
+            events = () if request.prompt is None else split_events(request.prompt)
             return TextStates(
-                prompt=None if request.prompt is None else encode(request.prompt),
+                prompt=prompt,
                 negative=None if negative is None else encode(negative),
+                events=tuple(map(encode, events)) if len(events) > 1 else (),
             )
 
     def _provenance(self, request: Request) -> Provenance:

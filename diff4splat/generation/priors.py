@@ -4,6 +4,8 @@ Axes: ``h w`` pixels of the copy that the networks see. Without a depth prior th
 plane; without a motion prior it is static.
 """
 
+from collections.abc import Sequence
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -24,15 +26,18 @@ ENLARGEMENT = 1.5
 
 
 def image_maps(
-    model: Model, images: Copies, frames: int, request: MotionRequest, log: RunLog
+    model: Model, images: Copies, frames: int, requests: Sequence[MotionRequest], log: RunLog
 ) -> ImageMaps:
-    """Depth, and displacement over ``frames`` latent frames, by the priors that are loaded."""
+    """Depth, and displacement over ``frames`` latent frames, by the priors that are loaded.
+
+    ``requests`` has one for each event of the prompt.
+    """
     with log.phases.phase("predict depth"):
         depth, fine = _depths(model, images, log)
     maps = ImageMaps(depth=depth, displacement=None, fine=fine)
     if model.networks.motion_unet is None or frames < 2:
         return maps
-    motion = ObjectMotion(model=model, frames=frames, request=request, log=log)
+    motion = ObjectMotion(model=model, frames=frames, requests=tuple(requests), log=log)
     return motion.added_to(maps, images)
 
 

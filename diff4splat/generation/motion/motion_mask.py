@@ -7,10 +7,11 @@ Axes: ``hh ww`` pixels of the copy that the networks see.
 Models without an object mask take the probability from the motion U-Net.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
@@ -83,6 +84,22 @@ def motion_probability(
     noise = initial_noise(image, frames, request.seed)
     _, logits = network.predict_motion_and_mask(rgb, noise, noise.new_ones(1), request.text)
     return MotionProbability(probability=_shared(ObjectMaps(logits=logits), rgb))
+
+
+def event_of_pixels(found: Sequence[MotionProbability], threshold: float) -> Int[Tensor, "hh ww"]:
+    """Number of the event whose mask has the pixel, from 1; 0 where none has.
+
+    Where several have it, it belongs to the one that is surest of it, against its own highest.
+    """
+    sure = torch.stack([_relative(one, threshold) for one in found])
+    highest, number = sure.max(0)
+    return torch.where(highest > 0, number + 1, 0)
+
+
+def _relative(found: MotionProbability, threshold: float) -> Float[Tensor, "hh ww"]:
+    """Of the highest probability, 0 outside the mask."""
+    highest = found.probability.max()
+    return torch.where(found.mask(threshold), found.probability / highest, 0.0)
 
 
 def _shared(maps: ObjectMaps, rgb: Float[Tensor, "1 3 hh ww"]) -> Float[Tensor, "hh ww"]:

@@ -1,19 +1,20 @@
 """Displacement of an image by the motion prior: what moves, and how far each object does.
 
-Axes: ``y x`` pixels of the copy that the motion prior sees, ``n`` objects.
+Axes: ``y x`` pixels of the copy that the motion prior sees, ``n`` components.
 
-    copy, text ─ mask ─ rim ─ components ─ motion U-Net ─ displacement of every component
+    copy, text of every event ─ mask ─ rim ─ components ─ motion U-Net ─ displacement of each
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.input_image import InputImage
-from diff4splat.generation.layered_image.mask_rim import with_rim
+from diff4splat.generation.layered_image.mask_rim import nearest_inside, with_rim
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import (
     connected_components,
@@ -24,10 +25,10 @@ from diff4splat.generation.motion.displacement_maps import (
     with_displacement,
     with_majority_displacement,
 )
-from diff4splat.generation.motion.motion_mask import motion_probability
+from diff4splat.generation.motion.motion_mask import event_of_pixels, motion_probability
 from diff4splat.generation.motion.networks import motion_prior
 from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
-from diff4splat.generation.settings import why_unguided
+from diff4splat.generation.settings import GenerationSettings, why_unguided
 from diff4splat.models.hub.model import Model
 from diff4splat.progress.run_log import RunLog
 
@@ -39,49 +40,77 @@ class ObjectMotion:
     model: Model
     frames: int
     """Latent frames."""
-    request: MotionRequest
+    requests: tuple[MotionRequest, ...]
+    """One for each event."""
     log: RunLog
 
     def added_to(self, maps: ImageMaps, images: Copies) -> ImageMaps:
         """``maps`` with the displacement of what moves; as they are where nothing does."""
         image = motion_copy(images, self.model.config.motion_unet.input_scale)
-        mask = self._mask(image)
-        if not mask.any():
+        event = self._events(image)
+        if not event.any():
             self.log.record_skipped("motion U-Net", "nothing is to move", "its network calls")
             return maps
         depth = depth_at(maps, images.small, image)
         shows_photograph = image.reduction < images.small.reduction or image is images.small
         if shows_photograph:
-            mask, depth = with_rim(mask, depth, image.rgb)
-        displacement = self._displacement(image, mask, depth)
+            mask, depth = with_rim(event > 0, depth, image.rgb)
+            event = torch.where(mask, event.flatten()[nearest_inside(event > 0)], event)
+        displacement = self._displacement(image, event, depth)
         if not displacement.any():
             return maps
         if shows_photograph:
             return with_displacement(maps, image, depth, displacement)
         return with_majority_displacement(maps, depth, displacement)
 
-    def _mask(self, image: InputImage) -> Bool[Tensor, "y x"]:
-        prior, request = motion_prior(self.model.networks), self.request
-        with self.log.phases.phase("find what moves"):
-            found = motion_probability(prior, image, self.frames, request)
-            return found.mask(request.settings.motion.threshold)
+    def _events(self, image: InputImage) -> Int[Tensor, "y x"]:
+        """Number of the event that moves a pixel, from 1; 0 where none does."""
+        prior, threshold = motion_prior(self.model.networks), self._settings.motion.threshold
+        with self.log.phases.phase("find what moves", len(self.requests)) as advance:
+            found = []
+            for request in self.requests:
+                found.append(motion_probability(prior, image, self.frames, request))
+                advance()
+            return event_of_pixels(found, threshold)
 
     def _displacement(
-        self, image: InputImage, mask: Bool[Tensor, "y x"], depth: Float[Tensor, "y x"]
+        self, image: InputImage, event: Int[Tensor, "y x"], depth: Float[Tensor, "y x"]
     ) -> Float[Tensor, "t y x 3"]:
-        component = connected_components(mask)
-        motion = self._sample(image, component)
-        return rigid_component_offsets(motion.field, component, depth, motion.mean_field)
+        """Each component moves as the event that it belongs to says."""
+        offsets = depth.new_zeros(self.frames, *depth.shape, 3)
+        motion = self._settings.motion
+        with self.log.phases.phase("sample motion", motion.steps * int(event.max())) as advance:
+            for number, request in enumerate(self.requests, 1):
+                component = connected_components(event == number)
+                if not component.any():
+                    continue
+                sample = self._sample(image, component, request, advance)
+                field, mean = sample.field, sample.mean_field
+                offsets = offsets + rigid_component_offsets(field, component, depth, mean)
+        return offsets
 
-    def _sample(self, image: InputImage, component: Int[Tensor, "y x"]) -> MotionSample:
+    def _sample(
+        self,
+        image: InputImage,
+        component: Int[Tensor, "y x"],
+        request: MotionRequest,
+        advance: Callable[[], None],
+    ) -> MotionSample:
         """Of every component, if the network is shown masks, else of all together."""
-        prior, motion, masks = motion_prior(self.model.networks), self.request.settings.motion, None
+        prior, masks = motion_prior(self.model.networks), None
         if self.model.config.motion_unet.object_mask:
             numbers = range(1, int(component.max()) + 1)
             masks = torch.stack([component == number for number in numbers])
-        with self.log.phases.phase("sample motion", motion.steps) as advance:
-            sample = sample_motion(prior, image, self.frames, self.request, masks, advance)
+        sample = sample_motion(prior, image, self.frames, request, masks, advance)
         if sample.calls.saved:
-            why = "no prompt" if self.request.text is None else why_unguided(motion.guidance)
+            why = (
+                "no prompt"
+                if request.text is None
+                else why_unguided(self._settings.motion.guidance)
+            )
             self.log.record_skipped("guidance pass", why, f"{sample.calls.saved} network calls")
         return sample
+
+    @property
+    def _settings(self) -> GenerationSettings:
+        return self.requests[0].settings

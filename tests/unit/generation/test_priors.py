@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import NoReturn
 
 import pytest
 import torch
@@ -47,7 +48,9 @@ def image() -> InputImage:
 def maps_of(model: Model, frames: int = 2, log: RunLog | None = None) -> ImageMaps:
     text = torch.randn(1, 4, model.config.text.width)
     request = MotionRequest(text=text, seed=0, settings=GenerationSettings())
-    return image_maps(model, Copies(image=image(), small=image()), frames, request, log or RunLog())
+    return image_maps(
+        model, Copies(image=image(), small=image()), frames, [request], log or RunLog()
+    )
 
 
 def moves_right(model: Model, share: float, probability: float = 0.99) -> Model:
@@ -88,13 +91,13 @@ def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     photo = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
     copies = Copies(image=photo, small=downsample(photo, 4))
     request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
-    maps = image_maps(replace(model, config=config), copies, 2, request, RunLog())
+    maps = image_maps(replace(model, config=config), copies, 2, [request], RunLog())
     assert maps.depth.shape == (SIDE_PX, SIDE_PX)
     assert torch.equal(maps.fine.depth, image_depth(model, downsample(photo, 2)))
     inverse = (1 / maps.fine.depth).unflatten(0, (-1, 2)).unflatten(2, (-1, 2))
     torch.testing.assert_close(1 / maps.depth, inverse.mean((1, 3)))
     whole = Copies(image=copies.small, small=replace(copies.small, reduction=1))
-    assert image_maps(replace(model, config=config), whole, 2, request, RunLog()).fine is None
+    assert image_maps(replace(model, config=config), whole, 2, [request], RunLog()).fine is None
 
 
 @torch.no_grad()
@@ -109,7 +112,7 @@ def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels
     photo = input_image(random_rgb(reduction * SIDE_PX, reduction * SIDE_PX))
     copies = Copies(image=photo, small=downsample(photo, reduction))
     request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
-    maps = image_maps(model, copies, 2, request, RunLog())
+    maps = image_maps(model, copies, 2, [request], RunLog())
     scales = [ENLARGEMENT * scale for scale in (SCALES if reduction > 1 else SCALES[:1])]
     network, activation = model.networks.monocular_depth, config.activation
     wanted = predict_depth(network, copies.small.rgb, activation, scales).depth
@@ -118,7 +121,7 @@ def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels
         return
     large = input_image(random_rgb(2 * SIDE_PX, 2 * SIDE_PX))
     fine = image_maps(
-        model, Copies(image=large, small=downsample(large, 2)), 2, request, RunLog()
+        model, Copies(image=large, small=downsample(large, 2)), 2, [request], RunLog()
     ).fine
     # A copy with its own pixels is large enough already.
     assert torch.equal(fine.depth, predict_depth(network, large.rgb, activation, SCALES[:1]).depth)
@@ -132,7 +135,7 @@ def test_the_motion_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     photo = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
     request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
     copies = Copies(image=photo, small=downsample(photo, 4))
-    maps = image_maps(model, copies, 2, request, RunLog())
+    maps = image_maps(model, copies, 2, [request], RunLog())
     assert maps.fine.displacement.shape == (2, 2 * SIDE_PX, 2 * SIDE_PX, 3)
     assert maps.displacement.shape == (2, SIDE_PX, SIDE_PX, 3)
     for found in (maps.displacement, maps.fine.displacement):
@@ -152,7 +155,7 @@ def test_the_motion_prior_sees_an_enlarged_copy_of_an_image_without_more_pixels(
     copies = Copies(image=photo, small=downsample(photo, reduction))
     assert motion_copy(copies, 2).rgb.shape == (2 * SIDE_PX, 2 * SIDE_PX, 3)
     request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
-    maps = image_maps(model, copies, 2, request, RunLog())
+    maps = image_maps(model, copies, 2, [request], RunLog())
     assert maps.fine is None and maps.displacement.shape == (2, SIDE_PX, SIDE_PX, 3)
     expected = torch.full((SIDE_PX, SIDE_PX), 0.25 * PLANE_DEPTH)
     torch.testing.assert_close(maps.displacement[1, ..., 0], expected)
@@ -193,3 +196,81 @@ def test_saved_guidance_passes_are_noted() -> None:
     maps_of(model_of("motion_unet"), log=log)
     (omission,) = log.skipped
     assert omission.what == "guidance pass" and "weight of 1" in omission.why
+
+
+class Halves:
+    """Finds the left part for a text of zeros, and the right part for others."""
+
+    def __call__(self, image: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
+        """Of the mirror image, as a mean with it asks."""
+        return self.predict_mask_and_instances(image, text)[0].flip(-1)
+
+    def predict_mask_and_instances(
+        self, image: torch.Tensor, text: torch.Tensor, text_mask: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, None]:
+        """Sure logits, and no vectors."""
+        del text_mask
+        logits, third = torch.full((1, *image.shape[2:]), -9.0), image.shape[-1] // 3
+        logits[..., slice(-third, None) if text.any() else slice(third)] = 9.0
+        return logits, None
+
+
+class ByText:
+    """To the right for a text of zeros, to the left for others; it keeps the masks it is shown."""
+
+    def __init__(self) -> None:
+        self.masks: list[torch.Tensor | None] = []
+
+    def __call__(
+        self,
+        image: torch.Tensor,
+        noisy: torch.Tensor,
+        level: torch.Tensor,
+        text: torch.Tensor | None = None,
+        text_mask: torch.Tensor | None = None,
+        object_mask: torch.Tensor | None = None,
+    ) -> torch.Tensor:
+        """Far enough to count as motion."""
+        del image, level, text_mask
+        self.masks.append(object_mask)
+        motion = torch.zeros_like(noisy)
+        motion[:, 0] = (-2 if text.any() else 2) * MIN_RELATIVE_DISPLACEMENT / UNIT
+        return motion
+
+    def predict_motion_and_mask(self, *inputs: torch.Tensor | None) -> NoReturn:
+        """The object mask says what moves."""
+        raise AssertionError(f"{len(inputs)} inputs")
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("shown", [False, True])
+def test_each_event_moves_its_own_object_by_its_own_text(shown: bool) -> None:
+    model, prior = model_of("motion_unet"), ByText()
+    config = replace(
+        model.config, motion_unet=MotionUNetConfig(width=8, heads=1, object_mask=shown)
+    )
+    networks = replace(model.networks, motion_unet=prior, object_mask=Halves())
+    model = replace(model, config=config, networks=networks)
+    gray = input_image(torch.full((SIDE_PX, SIDE_PX, 3), 0.5))
+    states = torch.zeros(1, 4, model.config.text.width)
+    requests = [
+        MotionRequest(text=text, seed=0, settings=GenerationSettings())
+        for text in (states, states + 1)
+    ]
+    log = RunLog()
+    maps = image_maps(model, Copies(image=gray, small=gray), 2, requests, log)
+    x = maps.displacement[1, SIDE_PX // 2, :, 0]
+    assert bool((x[:8] > 0).all()) and bool((x[-8:] < 0).all())
+    if shown:
+        first, second = prior.masks
+        assert bool(first[0, :, :8].all()) and not first[0, :, 16:].any()
+        assert bool(second[0, :, -8:].all()) and not second[0, :, :16].any()
+    else:
+        assert prior.masks == [None, None]
+
+
+@torch.no_grad()
+def test_the_motion_network_does_not_run_where_nothing_is_to_move() -> None:
+    model, log = model_of("motion_unet"), RunLog()
+    model = moves_right(model, 2 * MIN_RELATIVE_DISPLACEMENT, probability=1e-9)
+    assert maps_of(model, log=log).displacement is None

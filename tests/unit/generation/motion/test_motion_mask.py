@@ -11,6 +11,7 @@ from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.motion.motion_mask import (
     MotionProbability,
     bilateral_smooth,
+    event_of_pixels,
     motion_probability,
 )
 from diff4splat.generation.motion.networks import LEAST_PROBABILITY, LEAST_SHARE, MaskedMotion
@@ -174,3 +175,13 @@ def test_probabilities_are_averaged_within_a_colour_and_not_across() -> None:
     assert float(smooth[0, :, 16:].max()) < 1e-3
     flat = torch.full((1, SIDE_PX, SIDE_PX), 0.4)
     torch.testing.assert_close(bilateral_smooth(flat, torch.rand(1, 3, SIDE_PX, SIDE_PX)), flat)
+
+
+def test_a_pixel_belongs_to_the_event_that_is_surest_of_it() -> None:
+    first = sample_of(torch.tensor([[0.9, 0.9, 0.5, 0.0, 0.0]]))
+    second = sample_of(torch.tensor([[0.0, 0.35, 0.5, 0.5, 0.0]]))
+    assert event_of_pixels([first, second], 0.3).tolist() == [[1, 1, 2, 2, 0]]
+    assert event_of_pixels([second, first], 0.3).tolist() == [[2, 2, 1, 1, 0]]
+    nothing = replace(second, least_probability=0.9)
+    assert event_of_pixels([nothing, first], 0.3).tolist() == [[2, 2, 2, 0, 0]]
+    assert not event_of_pixels([nothing, sample_of(0 * first.probability)], 0.3).any()

@@ -298,3 +298,23 @@ def test_readings_of_padded_and_empty_texts() -> None:
     for one, other in zip(padded, short, strict=True):
         torch.testing.assert_close(one[:1], other)
     assert not any(bool(added[1].any()) for added in padded[1:])
+
+
+def test_a_fresh_mask_input_changes_nothing_and_zeros_are_no_mask() -> None:
+    torch.manual_seed(0)
+    network = randomised(MotionUNet(8, 2, TEXT, frequency_width=16, object_mask=True))
+    given_inputs, mask = inputs(), torch.zeros(2, 32, 16)
+    without = network(*given_inputs, some_text())
+    assert torch.equal(network(*given_inputs, some_text(), None, mask), without)
+    mask[0, 4:12, 4:12] = 1
+    shown = network(*given_inputs, some_text(), None, mask)
+    assert difference(shown[0], without[0]) > 1e-3
+    torch.testing.assert_close(shown[1], without[1])
+    torch.nn.init.zeros_(network.input_mask.weight)
+    assert torch.equal(network(*given_inputs, some_text(), None, mask), without)
+
+
+def test_a_network_without_a_mask_input_takes_no_notice_of_masks() -> None:
+    network, given_inputs = motion_unet(), inputs()
+    shown = network(*given_inputs, some_text(), None, torch.ones(2, 32, 16))
+    assert torch.equal(shown, network(*given_inputs, some_text()))

@@ -14,6 +14,7 @@ from diff4splat.training.recipe.losses import MotionDiffusionLosses
 from diff4splat.training.recipe.recipe import Recipe
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import TOTAL
+from diff4splat.training.stages.kinds.motion_diffusion import _cell_weights
 
 BASE = tiny_size()
 MODEL: ModelConfig = replace(BASE, motion_unet=MotionUNetConfig(width=16, heads=2))
@@ -132,3 +133,44 @@ def test_clips_of_the_models_size_are_enlarged_to_what_the_network_sees() -> Non
     assert all(bool(value.isfinite().all()) for value in stage.measure(batch).values())
     assert set(seen) == {2 * batch.video.shape[3]}
     assert bool(stage(batch)[TOTAL].isfinite().all())
+
+
+MASKED = replace(MODEL, motion_unet=replace(MODEL.motion_unet, object_mask=True))
+
+
+def test_a_network_that_is_shown_masks_learns_from_them() -> None:
+    recipe = motion_recipe()
+    stage = make_stage(recipe, model=MASKED)
+    shake_heads(stage)
+    terms = stage(moving_batch(recipe, tuple(range(8))))
+    terms[TOTAL].sum().backward()
+    gradient = stage.motion_unet.input_mask.weight.grad
+    assert bool(gradient.isfinite().all()) and bool(gradient.any())
+    unmasked = terms["motion_mask"] > 0
+    assert not bool(unmasked.all()), "a mask that is shown need not be predicted"
+
+
+def test_half_of_the_weight_is_on_the_cells_of_the_object() -> None:
+    moving = torch.zeros(3, 16, 16, dtype=torch.bool)
+    moving[0, 2:3, 5:9] = moving[1] = True
+    weights = _cell_weights(moving)
+    assert weights[0, 0, 1] == weights[0, 0, 2] == 1 + 16 / 2 and int((weights[0] > 1).sum()) == 2
+    assert bool((weights[1] == 2).all()) and bool((weights[2] == 1).all())
+
+
+@torch.no_grad()
+def test_the_true_mask_is_shown_when_it_is_measured() -> None:
+    recipe = motion_recipe()
+    stage, batch = make_stage(recipe, model=MASKED).eval(), moving_batch(recipe)
+    shown = []
+    stage.motion_unet.register_forward_pre_hook(lambda _, given: shown.append(given[5]))
+    stage.measure(batch)
+    assert shown and all(torch.equal(one > 0, batch.moving) for one in shown)
+
+
+def test_no_mask_is_predicted_where_no_loss_asks_for_it() -> None:
+    recipe = replace(motion_recipe(), losses=MotionDiffusionLosses())
+    stage = make_stage(recipe, model=MASKED)
+    shake_heads(stage)
+    stage(moving_batch(recipe))[TOTAL].sum().backward()
+    assert stage.motion_unet.mask_head.weight.grad is None
