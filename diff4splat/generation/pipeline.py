@@ -144,7 +144,7 @@ class Diff4SplatPipeline:
             text = self._text_states(request, log)
             motions = [
                 MotionRequest(text=event, seed=request.seed, settings=request.settings)
-                for event in text.events or (text.prompt,)
+                for event in text.events
             ]
             maps = image_maps(model, copies, frames, motions, log)
         request = sized_to_depth(request, maps.depth)
@@ -230,13 +230,15 @@ class Diff4SplatPipeline:
         encode = self.model.networks.text_encoder.encode_prompt
         negative = negative_prompt(request, self.model.config)
         with log.phases.phase("encode text"):
-            prompt = None if request.prompt is None else encode(request.prompt)
-            events = () if request.prompt is None else split_events(request.prompt)
-            return TextStates(
-                prompt=prompt,
-                negative=None if negative is None else encode(negative),
-                events=tuple(map(encode, events)) if len(events) > 1 else (),
-            )
+            states = TextStates(negative=None if negative is None else encode(negative))
+            if request.prompt is None:
+                return states
+            prompt = encode(request.prompt)
+            events = [
+                prompt if event == request.prompt else encode(event)
+                for event in split_events(request.prompt)
+            ]
+            return replace(states, prompt=prompt, events=tuple(events))
 
     def _provenance(self, request: Request) -> Provenance:
         return Provenance(

@@ -99,8 +99,7 @@ class ObjectMotion:
         """Of every component, if the network is shown masks, else of all together."""
         prior, masks = motion_prior(self.model.networks), None
         if self.model.config.motion_unet.object_mask:
-            numbers = range(1, int(component.max()) + 1)
-            masks = torch.stack([component == number for number in numbers])
+            masks = (component > 0)[None]
         sample = sample_motion(prior, image, self.frames, request, masks, advance)
         if sample.calls.saved:
             why = (
