@@ -125,6 +125,14 @@ def test_vectors_of_instances_change_the_fingerprint() -> None:
     assert len({config.fingerprint() for config in configs}) == 3
 
 
+def test_an_object_mask_that_is_shown_changes_the_fingerprint_and_needs_a_motion_network() -> None:
+    motions = [MotionUNetConfig(width=8, object_mask=shown) for shown in (False, True)]
+    configs = [dataclasses.replace(test_size(), motion_unet=motion) for motion in motions]
+    assert len({config.fingerprint() for config in configs}) == 2
+    with pytest.raises(ConfigError, match=r"object_mask: expected false without the network"):
+        MotionUNetConfig(object_mask=True)
+
+
 @pytest.mark.parametrize("weight", [-0.1, math.nan, math.inf])
 def test_a_guidance_that_no_model_can_have_is_refused(weight: float) -> None:
     with pytest.raises(ConfigError, match=r"ModelConfig\.default_guidance: expected at least 0"):
