@@ -1,6 +1,9 @@
-"""Write what three prompts make of one picture, row by row: to the left, to the right, nothing.
+"""Write what prompts make of one picture, row by row.
 
 Usage: python examples/make_text_figure.py picture.jpg figure.png --thing "a red ball"
+       python examples/make_text_figure.py picture.jpg figure.png --prompts "a red ball rolls" ...
+
+A thing stands for three prompts: it slides to the left, to the right, nothing moves around it.
 """
 
 import argparse
@@ -18,23 +21,27 @@ TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Shares of the scene's time."""
 
 
+def prompts_about(thing: str) -> list[str]:
+    """To the left, to the right, nothing."""
+    slides = [f"{thing} slides to the {side}" for side in ("left", "right")]
+    return [*slides, f"nothing moves around {thing}"]
+
+
 def main() -> None:
     """One row per prompt, from the first camera."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("picture", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--thing", required=True)
+    asked = parser.add_mutually_exclusive_group(required=True)
+    asked.add_argument("--thing")
+    asked.add_argument("--prompts", nargs="+")
     parser.add_argument("--model", default="small")
     options = parser.parse_args()
     pipeline = Diff4SplatPipeline.from_pretrained(options.model)
     side_px, multiple_px = find_image_size(options.model)
     picture = load_image(options.picture, side_px, multiple_px=multiple_px)
     rows = []
-    for prompt in (
-        f"{options.thing} slides to the left",
-        f"{options.thing} slides to the right",
-        f"nothing moves around {options.thing}",
-    ):
+    for prompt in options.prompts or prompts_about(options.thing):
         scene = pipeline(picture, "arc:0.1", prompt)
         last_s = float(scene.path.times_s[-1])
         shown = [render(scene, scene.path.cameras[0], share * last_s).rgb for share in TIMES]

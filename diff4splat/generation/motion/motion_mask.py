@@ -86,12 +86,14 @@ def motion_probability(
     return MotionProbability(probability=_shared(ObjectMaps(logits=logits), rgb))
 
 
-def event_of_pixels(found: Sequence[MotionProbability], threshold: float) -> Int[Tensor, "hh ww"]:
+def event_of_pixels(
+    probabilities: Sequence[MotionProbability], threshold: float
+) -> Int[Tensor, "hh ww"]:
     """Number of the event whose mask has the pixel, from 1; 0 where none has.
 
     Where several have it, it belongs to the one that is surest of it, against its own highest.
     """
-    sure = torch.stack([_relative(one, threshold) for one in found])
+    sure = torch.stack([_relative(one, threshold) for one in probabilities])
     highest, number = sure.max(0)
     return torch.where(highest > 0, number + 1, 0)
 
