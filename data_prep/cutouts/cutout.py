@@ -12,9 +12,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from diff4splat.captions.colors import main_color_name
+from diff4splat.captions.colors import linear_from_srgb, main_color_name
 from diff4splat.captions.cutout_nouns import ALL_NOUNS
-from diff4splat.captions.srgb import linear_from_srgb
 from diff4splat.errors import FileFormatError, InputError
 
 PUBLIC_NAMES = {

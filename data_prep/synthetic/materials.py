@@ -12,8 +12,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.captions.colors import color_name
-from diff4splat.captions.srgb import linear_from_srgb
+from diff4splat.captions.colors import color_name, linear_from_srgb
 from diff4splat.data_prep.synthetic.palettes import Palette
 from diff4splat.data_prep.synthetic.quantise import (
     COLOR_BITS,

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float64
 
-from diff4splat.captions.srgb import linear_from_hex
+from diff4splat.captions.colors import linear_from_hex
 
 Color = Float64[np.ndarray, "3"]
 

@@ -1,4 +1,4 @@
-"""Colour names.
+"""Colour names, and sRGB colours as linear light.
 
 The name of the nearest anchor in CIELAB (D65): d² = (0.55 ΔL)² + Δa² + Δb². Lightness has a lower
 weight because shading changes it.
@@ -8,8 +8,6 @@ from functools import cache
 
 import numpy as np
 from jaxtyping import Float64, Int64
-
-from diff4splat.captions.srgb import linear_from_hex
 
 _ANCHORS = {
     "red": "b52b2b d0453f 8c2320 a83a34",
@@ -66,3 +64,13 @@ def _lab(linear: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3"]:
     f = np.where(ratio > 0.008856, np.cbrt(ratio), 7.787 * ratio + 16 / 116)
     first, second, third = f[:, 0], f[:, 1], f[:, 2]
     return np.stack([116 * second - 16, 500 * (first - second), 200 * (second - third)], 1)
+
+
+def linear_from_hex(word: str) -> Float64[np.ndarray, "3"]:
+    """Linear RGB of the sRGB colour ``rrggbb``."""
+    return linear_from_srgb(np.array([int(word[k : k + 2], 16) / 255 for k in (0, 2, 4)]))
+
+
+def linear_from_srgb(value: Float64[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
+    """Linear RGB of sRGB in [0, 1] (IEC 61966-2-1)."""
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)

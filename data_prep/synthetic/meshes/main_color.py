@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from diff4splat.captions.colors import main_color_name
-from diff4splat.captions.srgb import linear_from_srgb
+from diff4splat.captions.colors import linear_from_srgb, main_color_name
 from diff4splat.data_prep.synthetic.meshes.palette import TexturedPart, triangle_areas
 
 
