@@ -9,8 +9,15 @@ objects.
 """
 
 import re
+from functools import cache
 
-from diff4splat.captions.known_words import read_prompt
+from diff4splat.captions.known_words import read_prompt, stem
+from diff4splat.captions.synonyms import TRAVEL_VERBS
+from diff4splat.captions.vocabulary import IN_PLACE, VERBS
+
+NO_OBJECT = "the prompt names no object or colour that the model knows"
+NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
+ONLY_IN_PLACE = "the prompt asks only for motion in place, and objects are moved as a whole"
 
 _SEPARATOR = re.compile(r"\s*[,;.]\s+(?:(?:and|while|then)\s+)*|\s+(?:and|while)\s+", re.IGNORECASE)
 _CAMERA = re.compile(r"(?:the )?(?:camera|view)\b", re.IGNORECASE)
@@ -32,6 +39,51 @@ def split_events(prompt: str) -> tuple[str, ...]:
             current = current + gap + piece if current else piece
         gap = prompt[end:next_start]
     return (*events, current) if current else (prompt,)
+
+
+def moving_events(prompt: str) -> tuple[str, ...]:
+    """The events after which an object is elsewhere."""
+    return tuple(event for event in split_events(prompt) if not is_in_place(event))
+
+
+def why_static(prompt: str) -> str:
+    """Why ``prompt`` moves nothing; empty where it may."""
+    words = read_prompt(prompt)
+    if not words.objects:
+        return NO_OBJECT
+    if not words.motions:
+        return NO_MOTION_WORD
+    return "" if moving_events(prompt) else ONLY_IN_PLACE
+
+
+def is_in_place(event: str) -> bool:
+    """Whether an object only turns, bends or changes its size, with no direction beside that."""
+    phrases, verbs = _words_in_place()
+    stems = _stem(event.casefold())
+    other = stems
+    for phrase in phrases:
+        other = re.sub(rf"\b{phrase}\b", "", other)
+    motions = [word for word in other.split() if read_prompt(word).motions]
+    return all(word in verbs for word in motions) and (bool(motions) or other != stems)
+
+
+@cache
+def _words_in_place() -> tuple[tuple[str, ...], frozenset[str]]:
+    """Stems of the phrases of motions in place, longest first, and of verbs of no other motion."""
+    phrases = [phrase for motion in IN_PLACE for phrase in VERBS[motion]]
+    others = [VERBS[motion] for motion in VERBS if motion not in IN_PLACE]
+    travel = [_stem(words) for forms in (*others, *TRAVEL_VERBS) for words in forms]
+    stems = [_stem(phrase) for phrase in phrases]
+    verbs = frozenset(" ".join(stems).split()) - frozenset(" ".join(travel).split())
+    return tuple(sorted(stems, key=len, reverse=True)), verbs
+
+
+def _stem(text: str) -> str:
+    return " ".join(map(stem, _words(text)))
+
+
+def _words(text: str) -> list[str]:
+    return re.findall(r"[^\W\d_]+", text)
 
 
 def _pieces(prompt: str) -> list[tuple[int, int, int]]:
@@ -57,7 +109,7 @@ def _begins_event(words: str) -> bool:
 def _kinds(words: str) -> list[str]:
     """Objects and motions in their order; ``rises`` is no ``rice``."""
     found = []
-    for word in re.findall(r"[^\W\d_]+", _NO_MOTION.sub("", words)):
+    for word in _words(_NO_MOTION.sub("", words)):
         read = read_prompt(word)
         if read.motions or read.objects:
             found.append("motion" if read.motions else "object")

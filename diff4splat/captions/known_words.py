@@ -21,8 +21,6 @@ from diff4splat.captions.synonyms import (
 )
 from diff4splat.captions.vocabulary import CAMERA_MOVES, PLACES, VERBS
 
-NO_OBJECT = "the prompt names no object or colour that the model knows"
-NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
 STATIC = "nothing moves"
 _ENDINGS = ("ing", "ed", "es", "s", "e")
 _LEAST_STEM = 3
@@ -74,14 +72,6 @@ def read_prompt(prompt: str) -> PromptWords:
         motions=tuple(word for word in words if stem(word) in motions),
         unknown=tuple(word for word in words if stem(word) not in objects | motions | others),
     )
-
-
-def why_static(prompt: str) -> str:
-    """Why ``prompt`` moves nothing; empty where it may."""
-    words = read_prompt(prompt)
-    if not words.objects:
-        return NO_OBJECT
-    return "" if words.motions else NO_MOTION_WORD
 
 
 def stem(word: str) -> str:

@@ -38,6 +38,11 @@ VERBS: dict[str, tuple[str, ...]] = {
     "wobbles": ("wobbles", "shakes like jelly"),
     "sways": ("sways in the wind", "sways"),
 }
+IN_PLACE = (
+    *("spins", "reaches", "turns_sails", "flutters", "squashes", "grows", "shrinks"),
+    *("twists", "bends", "wobbles", "sways"),
+)
+"""Motions after which an object is where it was."""
 CAMERA_MOVES: dict[tuple[str, int], tuple[str, ...]] = {
     ("static", 0): ("stands still", "does not move"),
     ("orbit", 1): ("circles right", "orbits to the right"),

@@ -16,7 +16,7 @@ from typing import Literal
 import torch
 
 from diff4splat import __version__
-from diff4splat.captions.events import split_events
+from diff4splat.captions.events import moving_events
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.copies import Copies
@@ -236,7 +236,7 @@ class Diff4SplatPipeline:
             prompt = encode(request.prompt)
             events = [
                 prompt if event == request.prompt else encode(event)
-                for event in split_events(request.prompt)
+                for event in moving_events(request.prompt)
             ]
             return replace(states, prompt=prompt, events=tuple(events))
 

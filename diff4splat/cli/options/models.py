@@ -58,7 +58,8 @@ def require_prompt_for(model: str, prompt: str) -> None:
 
 def prompt_notes(prompt: str | None, model: str) -> list[str]:
     """What a trained motion prior does not know of the prompt."""
-    from diff4splat.captions.known_words import read_prompt, why_static
+    from diff4splat.captions.events import why_static
+    from diff4splat.captions.known_words import read_prompt
     from diff4splat.models.hub.folders import find_provenance
 
     if prompt is None or "motion_unet" not in find_provenance(model).trained:

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.captions.known_words import why_static
+from diff4splat.captions.events import why_static
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.image_size import (

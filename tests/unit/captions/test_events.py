@@ -6,10 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diff4splat.captions.events import split_events
+from diff4splat.captions.events import (
+    ONLY_IN_PLACE,
+    is_in_place,
+    moving_events,
+    split_events,
+    why_static,
+)
 from diff4splat.captions.grammar import CaptionFacts, Event, NamedObject, describe
 from diff4splat.captions.phrasings import TRAINING, VALIDATION
-from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, PLACES, VERBS
+from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, IN_PLACE, PLACES, VERBS
 
 CAMERA = "the camera slides right and then moves back"
 
@@ -124,3 +130,37 @@ def test_any_text_has_an_event(prompt: str) -> None:
     pieces = split_events(prompt)
     assert len(pieces) >= 1 and (len(pieces) > 1 or pieces[0] == prompt)
     assert all(piece in prompt for piece in pieces)
+
+
+@pytest.mark.parametrize("direction", ["", *DIRECTIONS])
+@pytest.mark.parametrize("motion", VERBS)
+def test_motions_in_place_are_known_by_their_phrases(motion: str, direction: str) -> None:
+    event = Event(subject=NamedObject("red", "torus"), motion=motion, direction=direction)
+    for variant in range(len(VERBS[motion])):
+        caption = describe(CaptionFacts(events=(event,)), variant)
+        assert is_in_place(caption) is (motion in IN_PLACE and not direction), caption
+
+
+@pytest.mark.parametrize(
+    ("prompt", "in_place"),
+    [
+        ("the flag flutters", True),
+        ("THE WINDMILL IS TURNING", True),
+        ("the robot arm moves its joints", True),
+        ("the robot arm moves", False),
+        ("a ball grows and moves away", False),
+        ("the ball spins to the left", False),
+        ("the house", False),
+        ("nothing moves", False),
+        ("", False),
+    ],
+)
+def test_a_direction_or_another_motion_moves_an_object(prompt: str, in_place: bool) -> None:
+    assert is_in_place(prompt) is in_place
+
+
+def test_events_in_place_are_passed_over_and_alone_they_are_a_reason() -> None:
+    assert moving_events("a flag flutters, a red ball rolls") == ("a red ball rolls",)
+    assert why_static("a flag flutters, a red ball rolls") == ""
+    assert moving_events("a flag flutters, a red ball spins") == ()
+    assert why_static("a flag flutters, a red ball spins") == ONLY_IN_PLACE
