@@ -19,7 +19,9 @@ NO_OBJECT = "the prompt names no object or colour that the model knows"
 NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
 ONLY_IN_PLACE = "the prompt asks only for motion in place, and objects are moved as a whole"
 
-_SEPARATOR = re.compile(r"\s*[,;.]\s+(?:(?:and|while|then)\s+)*|\s+(?:and|while)\s+", re.IGNORECASE)
+_SEPARATOR = re.compile(
+    r"\s*[,;.]\s+(?:(?:and|while|then)\s+)*|\s+(?:and|while)\s+(?!fro\b)", re.IGNORECASE
+)
 _CAMERA = re.compile(r"(?:the )?(?:camera|view)\b", re.IGNORECASE)
 _NO_MOTION = re.compile(r"\b(?:camera|view|nothing|all else)\b.*", re.IGNORECASE | re.DOTALL)
 """From here on nothing is said about an object that moves."""

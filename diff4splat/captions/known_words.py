@@ -29,6 +29,7 @@ _FUNCTION_WORDS = frozenset(
         *("a", "an", "and", "are", "at", "by", "for", "from", "has", "in", "into", "is", "it"),
         *("its", "of", "off", "on", "onto", "out", "over", "the", "then", "to", "with"),
         *("above", "around", "beside", "camera", "gets", "joints", "like", "one", "ones", "way"),
+        *("circle", "fro", "itself", "jelly", "rope", "round", "sails", "us", "viewer", "wings"),
     ]
 )
 """Words that neither name an object nor a motion."""

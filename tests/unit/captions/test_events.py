@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diff4splat.captions.cutout_nouns import KNOWN_NOUNS
 from diff4splat.captions.events import (
     ONLY_IN_PLACE,
     is_in_place,
@@ -96,7 +97,7 @@ def test_two_directions_are_two_events() -> None:
 
 
 OBJECTS = st.builds(
-    NamedObject, st.sampled_from(["", "red", "grey"]), st.sampled_from(["torus", "car"])
+    NamedObject, st.sampled_from(["", "red", "orange"]), st.sampled_from(KNOWN_NOUNS)
 )
 EVENTS = st.builds(
     Event,
@@ -136,9 +137,11 @@ def test_any_text_has_an_event(prompt: str) -> None:
 @pytest.mark.parametrize("motion", VERBS)
 def test_motions_in_place_are_known_by_their_phrases(motion: str, direction: str) -> None:
     event = Event(subject=NamedObject("red", "torus"), motion=motion, direction=direction)
-    for variant in range(len(VERBS[motion])):
-        caption = describe(CaptionFacts(events=(event,)), variant)
-        assert is_in_place(caption) is (motion in IN_PLACE and not direction), caption
+    for noun in KNOWN_NOUNS:
+        subject = NamedObject("orange", noun)
+        for variant in range(len(VERBS[motion])):
+            caption = describe(CaptionFacts(events=(replace(event, subject=subject),)), variant)
+            assert is_in_place(caption) is (motion in IN_PLACE and not direction), caption
 
 
 @pytest.mark.parametrize(
