@@ -68,7 +68,7 @@ class TextStates:
     prompt: Float[Tensor, "1 s d"] | None = None
     negative: Float[Tensor, "1 s2 d"] | None = None
     """What guidance leads away from; all there is for a model that needs text, without a prompt."""
-    events: tuple[Float[Tensor, "1 s d"] | None, ...] = (None,)
+    events: tuple[Float[Tensor, "1 _ d"] | None, ...] = (None,)
     """Of each event of the prompt; None without one."""
 
 

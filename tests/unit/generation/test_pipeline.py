@@ -7,9 +7,13 @@ import pytest
 import torch
 
 from diff4splat.errors import CheckpointError, ConfigError, InputError
+from diff4splat.generation import pipeline as generation_pipeline
+from diff4splat.generation.inputs.copies import Copies
 from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.plan import MOTION_PARTS
+from diff4splat.generation.priors import image_maps
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.video_sampling import Conditions, initial_noise
 from diff4splat.geometry.camera import pinhole
@@ -124,6 +128,26 @@ def test_a_prompt_changes_the_scene_and_loads_the_text_encoder(
     assert "text_encoder" in {omission.what for omission in plain_log.skipped}
     assert "text_encoder" not in {omission.what for omission in log.skipped}
     assert prompted.provenance.prompt == "a red ball rolls"
+
+
+def test_every_event_of_a_prompt_that_moves_something_is_a_request(
+    pipeline: Diff4SplatPipeline, image: InputImage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requests = []
+
+    def recorded(model: Model, copies: Copies, frames: int, asked: list, log: RunLog) -> ImageMaps:
+        requests.append([request.text for request in asked])
+        return image_maps(model, copies, frames, asked, log)
+
+    monkeypatch.setattr(generation_pipeline, "image_maps", recorded)
+    events = ("a red ball rolls", "a blue cube hops")
+    for prompt in (f"{events[0]}, a flag flutters, {events[1]}, the camera rises", *events):
+        pipeline(image, "arc", prompt, settings=QUICK)
+    both, first, second = requests
+    assert len(both) == 2
+    assert torch.equal(both[0], first[0]) and torch.equal(both[1], second[0])
+    pipeline(image, "arc", settings=QUICK)
+    assert requests[-1] == [None]
 
 
 def test_the_image_latent_survives_sampling_unchanged(

@@ -11,8 +11,10 @@ from image_layers import input_image, random_rgb
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.input_image import InputImage, downsample
+from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import MIN_RELATIVE_DISPLACEMENT
+from diff4splat.generation.motion import object_motion
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.priors import (
     ENLARGEMENT,
@@ -274,3 +276,31 @@ def test_the_motion_network_does_not_run_where_nothing_is_to_move() -> None:
     model, log = model_of("motion_unet"), RunLog()
     model = moves_right(model, 2 * MIN_RELATIVE_DISPLACEMENT, probability=1e-9)
     assert maps_of(model, log=log).displacement is None
+    assert "sample motion" not in log.phases.seconds
+    assert "motion U-Net" in {item.what for item in log.skipped}
+
+
+@torch.no_grad()
+def test_the_rim_of_an_object_moves_with_its_event(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = model_of("motion_unet")
+    networks = replace(model.networks, motion_unet=ByText(), object_mask=Halves())
+    model = replace(model, networks=networks)
+    rgb = torch.full((SIDE_PX, SIDE_PX, 3), 0.5)
+    rgb[:, : SIDE_PX // 3], rgb[:, -(SIDE_PX // 3) :] = 0.0, 1.0
+    states = torch.zeros(1, 4, model.config.text.width)
+    requests = [
+        MotionRequest(text=text, seed=0, settings=GenerationSettings())
+        for text in (states, states + 1)
+    ]
+    reached = {}
+    for with_rim in (False, True):
+        if with_rim:
+            grow = lambda mask, depth, _: (grown(mask, 2), depth)  # noqa: E731
+            monkeypatch.setattr(object_motion, "with_rim", grow)
+        else:
+            monkeypatch.setattr(object_motion, "with_rim", lambda mask, depth, _: (mask, depth))
+        copies = Copies(image=input_image(rgb), small=input_image(rgb))
+        x = image_maps(model, copies, 2, requests, RunLog()).displacement[1, 16, :, 0]
+        reached[with_rim] = [int((x > 0).sum()), int((x < 0).sum())]
+    narrow, wide = reached[False], reached[True]
+    assert all(after > before for before, after in zip(narrow, wide, strict=True))
