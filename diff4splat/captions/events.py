@@ -19,9 +19,11 @@ NO_OBJECT = "the prompt names no object or colour that the model knows"
 NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
 ONLY_IN_PLACE = "the prompt asks only for motion in place, and objects are moved as a whole"
 
-_SEPARATOR = re.compile(
-    r"\s*[,;.]\s+(?:(?:and|while|then)\s+)*|\s+(?:and|while)\s+(?!fro\b)", re.IGNORECASE
+_SEPARATOR = re.compile(r"\s*[,;.]\s+(?:(?:and|while|then)\s+)*|\s+(?:and|while)\s+", re.IGNORECASE)
+_GOES_ON = re.compile(
+    r"(?:above|around|beside|by|fro|from|into|like|of|onto|over|toward|with)\b", re.IGNORECASE
 )
+"""What begins so belongs to the event before it: over and over, to and fro."""
 _CAMERA = re.compile(r"(?:the )?(?:camera|view)\b", re.IGNORECASE)
 _NO_MOTION = re.compile(r"\b(?:camera|view|nothing|all else)\b.*", re.IGNORECASE | re.DOTALL)
 """From here on nothing is said about an object that moves."""
@@ -105,7 +107,7 @@ def _is_event(words: str) -> bool:
 def _begins_event(words: str) -> bool:
     """Whether an object is named first; its motion may follow in a later piece."""
     kinds = _kinds(_SEPARATOR.split(words, maxsplit=1)[0])
-    return kinds[:1] == ["object"] and _is_event(words)
+    return kinds[:1] == ["object"] and not _GOES_ON.match(words) and _is_event(words)
 
 
 def _kinds(words: str) -> list[str]:

@@ -134,6 +134,18 @@ def test_any_text_has_an_event(prompt: str) -> None:
     assert all(piece in prompt for piece in pieces)
 
 
+@pytest.mark.parametrize("motion", VERBS)
+def test_every_phrase_ends_before_the_next_event(motion: str) -> None:
+    torus, car = NamedObject("red", "torus"), NamedObject("", "car")
+    first = Event(subject=car, motion=motion, direction="left", beside=torus)
+    second = Event(subject=torus, motion=motion)
+    for events in ((first, second), (second, first, second), (replace(first, direction=""),) * 3):
+        for variant in range(4):
+            caption = describe(CaptionFacts(events=events), variant)
+            pieces = split_events(caption)
+            assert ", ".join(pieces) == caption and len(pieces) == len(events), pieces
+
+
 @pytest.mark.parametrize("direction", ["", *DIRECTIONS])
 @pytest.mark.parametrize("motion", VERBS)
 def test_motions_in_place_are_known_by_their_phrases(motion: str, direction: str) -> None:
