@@ -47,7 +47,7 @@ class Told:
         wish = MotionRequest(text=self.text, seed=seed, settings=asked)
         frames = self.truth.shape[1]
         made = sample_motion(model.networks.motion_unet, self.picture, frames, wish)
-        return made.field[0], made.calls.conditional + made.calls.unconditional
+        return made.field, made.calls.conditional + made.calls.unconditional
 
 
 def prepared(model: Model, protocol: Protocol) -> list[Told]:

@@ -35,7 +35,7 @@ def image_maps(
     with log.phases.phase("predict depth"):
         depth, fine = _depths(model, images, log)
     maps = ImageMaps(depth=depth, displacement=None, fine=fine)
-    if model.networks.motion_unet is None or frames < 2:
+    if model.networks.motion_unet is None or frames < 2 or not requests:
         return maps
     motion = ObjectMotion(model=model, frames=frames, requests=tuple(requests), log=log)
     return motion.added_to(maps, images)

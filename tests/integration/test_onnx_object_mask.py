@@ -1,30 +1,18 @@
 """The graph of an object mask with vectors of instances, beside PyTorch."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import torch
+from onnx_parts import exported_part
 
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.priors import MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
-from diff4splat.models.hub.model import Model, load_model, save_model
+from diff4splat.models.hub.model import Model
 
 CHANNELS = 3
-EXPORT = """
-import sys
-from pathlib import Path
-from diff4splat.models.hub.model import load_model
-from diff4splat.models.onnx_export.folder import ExportSettings, export_model
-folder = Path(sys.argv[1])
-settings = ExportSettings(parts=("object_mask",))
-(row,) = export_model(load_model(folder / "model"), folder / "onnx", settings)
-assert set(row.errors) == {"mask_logits", "instances"}
-assert max(row.errors.values()) < 1e-4
-"""
 
 
 def config() -> ModelConfig:
@@ -35,11 +23,8 @@ def config() -> ModelConfig:
 
 def test_mask_and_instances_are_those_of_the_network(tmp_path: Path) -> None:
     model = Model(config=config(), networks=create_networks(config()))
-    save_model(model, tmp_path / "model")
-    # The exporter cannot trace checks of annotations, which this process has.
-    subprocess.run([sys.executable, "-c", EXPORT, str(tmp_path)], check=True)
     image, text = torch.rand(1, 3, 32, 48), torch.randn(1, 4, config().text.width)
-    graph = load_model(tmp_path / "onnx", parts=("object_mask",)).networks.object_mask
+    graph = exported_part(model, tmp_path, "object_mask", ("mask_logits", "instances"))
     with torch.no_grad():
         found = graph.predict_mask_and_instances(image, text)
         wanted = model.networks.object_mask.predict_mask_and_instances(image, text)

@@ -6,11 +6,12 @@ Axes: ``b`` samples, ``t`` latent frames, ``h w`` pixels, ``hc wc`` cells.
 from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.rigid_components import connected_components
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.training.batches.clip_batch import ClipBatch
 from diff4splat.training.batches.motion_targets import extended_from
@@ -48,9 +49,8 @@ def with_object_masks(
 
 def draw_component(moving: Bool[Tensor, "h w"], generator: torch.Generator) -> Bool[Tensor, "h w"]:
     """One of the connected components, whatever its size; all where none is large enough."""
-    count, labels = cv2.connectedComponents(moving.cpu().numpy().astype("uint8"), connectivity=8)
-    labels = torch.from_numpy(labels).to(moving.device)
-    sizes = torch.bincount(labels.flatten(), minlength=count)[1:]
+    labels = connected_components(moving)
+    sizes = torch.bincount(labels.flatten())[1:]
     large = (sizes >= LEAST_PX).nonzero()[:, 0]
     if len(large) == 0:
         return moving
@@ -68,19 +68,10 @@ def motion_of_object(
 def inexact(mask: Bool[Tensor, "h w"], generator: torch.Generator) -> Bool[Tensor, "h w"]:
     """About the same mask, as an object mask finds it: larger or smaller, or without one side."""
     error = int(torch.randint(-LARGEST_ERROR_PX, LARGEST_ERROR_PX + 1, (), generator=generator))
-    grown = _grown(mask, error)
+    found = grown(mask, error) if error >= 0 else ~grown(~mask, -error)
     if float(torch.rand((), generator=generator)) < CUT_SHARE:
-        grown = _cut(grown, generator)
-    return grown if grown.any() else mask
-
-
-def _grown(mask: Bool[Tensor, "h w"], radius_px: int) -> Bool[Tensor, "h w"]:
-    if radius_px == 0:
-        return mask
-    outside = radius_px < 0
-    values = (mask ^ outside).float()[None]
-    size = 2 * abs(radius_px) + 1
-    return (torch.nn.functional.max_pool2d(values, size, 1, abs(radius_px))[0] > 0) ^ outside
+        found = _cut(found, generator)
+    return found if found.any() else mask
 
 
 def _cut(mask: Bool[Tensor, "h w"], generator: torch.Generator) -> Bool[Tensor, "h w"]:

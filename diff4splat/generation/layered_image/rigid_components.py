@@ -18,29 +18,27 @@ MIN_RELATIVE_DISPLACEMENT = 0.1
 
 
 def rigid_component_offsets(
-    field: Float[Tensor, "n 3 t hc wc"],
-    component: Int[Tensor, "h w"],
+    field: Float[Tensor, "3 t hc wc"],
+    moving: Bool[Tensor, "h w"],
     depth: Float[Tensor, "h w"],
-    mean_field: Float[Tensor, "n 3 t hc wc"] | None = None,
+    mean_field: Float[Tensor, "3 t hc wc"] | None = None,
 ) -> Float[Tensor, "t h w 3"]:
     """Displacement of every pixel at the time of every latent frame, in scene units.
 
-    ``component`` numbers the objects, 0 is static; ``field`` has one for each, or one for all. Each
-    component is translated by its mean displacement at its median depth. Which ones move is
+    Each component is translated by its mean displacement at its median depth. Which ones move is
     decided on ``mean_field`` if that is given: a sample is noisier than the mean of all samples.
     """
-    mean_field = field if mean_field is None else mean_field
-    relative, place = torch.zeros_like(upsample_to_pixels(field[0])), depth.clone()
+    relative, place = upsample_to_pixels(field), depth.clone()
+    typical = relative.clone() if mean_field is None else upsample_to_pixels(mean_field)
+    component = connected_components(moving)
     for number in range(1, int(component.max()) + 1):
         inside = component == number
-        mean, expected = (
-            upsample_to_pixels(one[min(number, len(one)) - 1])[:, :, inside].mean(-1, keepdim=True)
-            for one in (field, mean_field)
-        )
+        mean = relative[:, :, inside].mean(-1, keepdim=True)
+        expected = typical[:, :, inside].mean(-1, keepdim=True)
         moves = expected.norm(dim=1).max() * UNIT >= MIN_RELATIVE_DISPLACEMENT
         relative[:, :, inside] = mean * moves
         place[inside] = depth[inside].median()
-    return masked_offsets(relative, component > 0, place)
+    return masked_offsets(relative, moving, place)
 
 
 def connected_components(mask: Bool[Tensor, "h w"]) -> Int[Tensor, "h w"]:

@@ -1,25 +1,22 @@
 """Displacement of an image by the motion prior: what moves, and how far each object does.
 
-Axes: ``y x`` pixels of the copy that the motion prior sees, ``n`` components.
+Axes: ``y x`` pixels of the copy that the motion prior sees.
 
-    copy, text of every event ─ mask ─ rim ─ components ─ motion U-Net ─ displacement of each
+    copy, text of every event ─ mask ─ rim ─ motion U-Net ─ displacement of every component
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.mask_rim import nearest_inside, with_rim
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
-from diff4splat.generation.layered_image.rigid_components import (
-    connected_components,
-    rigid_component_offsets,
-)
+from diff4splat.generation.layered_image.rigid_components import rigid_component_offsets
 from diff4splat.generation.motion.displacement_maps import (
     depth_at,
     with_displacement,
@@ -78,35 +75,30 @@ class ObjectMotion:
     ) -> Float[Tensor, "t y x 3"]:
         """Each component moves as the event that it belongs to says."""
         offsets = depth.new_zeros(self.frames, *depth.shape, 3)
-        motion = self._settings.motion
-        with self.log.phases.phase("sample motion", motion.steps * int(event.max())) as advance:
+        steps = self._settings.motion.steps * int(event.max())
+        with self.log.phases.phase("sample motion", steps) as advance:
             for number, request in enumerate(self.requests, 1):
-                component = connected_components(event == number)
-                if not component.any():
+                moving = event == number
+                if not moving.any():
                     continue
-                sample = self._sample(image, component, request, advance)
+                sample = self._sample(image, moving, request, advance)
                 field, mean = sample.field, sample.mean_field
-                offsets = offsets + rigid_component_offsets(field, component, depth, mean)
+                offsets = offsets + rigid_component_offsets(field, moving, depth, mean)
         return offsets
 
     def _sample(
         self,
         image: InputImage,
-        component: Int[Tensor, "y x"],
+        moving: Bool[Tensor, "y x"],
         request: MotionRequest,
         advance: Callable[[], None],
     ) -> MotionSample:
-        """Of every component, if the network is shown masks, else of all together."""
-        prior, masks = motion_prior(self.model.networks), None
-        if self.model.config.motion_unet.object_mask:
-            masks = (component > 0)[None]
-        sample = sample_motion(prior, image, self.frames, request, masks, advance)
+        """Of what an event moves, if the network is shown masks, else of the whole image."""
+        mask = moving if self.model.config.motion_unet.object_mask else None
+        prior, motion = motion_prior(self.model.networks), self._settings.motion
+        sample = sample_motion(prior, image, self.frames, request, mask, advance)
         if sample.calls.saved:
-            why = (
-                "no prompt"
-                if request.text is None
-                else why_unguided(self._settings.motion.guidance)
-            )
+            why = "no prompt" if request.text is None else why_unguided(motion.guidance)
             self.log.record_skipped("guidance pass", why, f"{sample.calls.saved} network calls")
         return sample
 

@@ -1,11 +1,9 @@
-"""Displacement of what one image shows, from noise, text and the mask of every object that moves.
+"""Displacement of what one image shows, from noise, text and the mask of what moves.
 
-Axes: ``n`` objects, ``s d`` text, ``t`` latent frames after the first, ``hc wc`` cells of 4 pixels,
+Axes: ``s d`` text, ``t`` latent frames after the first, ``hc wc`` cells of 4 pixels,
 ``hh ww`` pixels of the copy that the networks see.
 
-    noise, image, text, mask of an object ─ flow solver × motion U-Net ─ field of that object
-
-A network that is shown no masks has one field for all objects.
+    noise, image, text, mask ─ flow solver × motion U-Net ─ field
 """
 
 from collections.abc import Callable
@@ -37,11 +35,11 @@ class MotionRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSample:
-    """Displacement of every cell if it moves, by object, and the network calls."""
+    """Displacement of every cell if it moves, and the network calls."""
 
-    field: Float[Tensor, "n 3 t hc wc"]
+    field: Float[Tensor, "3 t hc wc"]
     """Relative displacement until the last time of each latent frame (``motion_field``)."""
-    mean_field: Float[Tensor, "n 3 t hc wc"]
+    mean_field: Float[Tensor, "3 t hc wc"]
     """The mean over all samples, which decides whether an object moves at all."""
     calls: CallCount
 
@@ -50,15 +48,15 @@ class MotionSample:
 class _Inputs:
     """What the network is shown beside motion and noise level."""
 
-    rgb: Float[Tensor, "n 3 hh ww"]
-    masks: Float[Tensor, "n hh ww"] | None
+    rgb: Float[Tensor, "1 3 hh ww"]
+    mask: Float[Tensor, "1 hh ww"] | None
 
     def clean(
         self, network: MotionPrior, noisy: Tensor, level: Tensor, text: Tensor | None
     ) -> Tensor:
         """The clean motion."""
         given = (self.rgb, noisy, level, text, None)
-        return network(*given) if self.masks is None else network(*given, self.masks)
+        return network(*given) if self.mask is None else network(*given, self.mask)
 
 
 def sample_motion(
@@ -66,30 +64,28 @@ def sample_motion(
     image: InputImage,
     frames: int,
     request: MotionRequest,
-    masks: Bool[Tensor, "n hh ww"] | None = None,
+    mask: Bool[Tensor, "hh ww"] | None = None,
     advance: Callable[[], None] | None = None,
 ) -> MotionSample:
-    """Motion over ``frames`` latent frames, 0 at the first; of each object in ``masks``.
+    """Motion over ``frames`` latent frames, 0 at the first; of what ``mask`` shows, if it is given.
 
     Raises:
         ConfigError: an unknown sampler or schedule.
     """
     calls, settings = CallCount(), request.settings
-    count = 1 if masks is None else len(masks)
-    rgb = image.rgb.movedim(-1, 0).expand(count, -1, -1, -1)
-    inputs = _Inputs(rgb=rgb, masks=None if masks is None else masks.to(rgb))
-    noise = initial_noise(image, frames, request.seed).expand(count, -1, -1, -1, -1)
-    text = None if request.text is None else request.text.expand(count, -1, -1)
+    rgb = image.rgb.movedim(-1, 0)[None]
+    inputs = _Inputs(rgb=rgb, mask=None if mask is None else mask[None].to(rgb))
+    noise = initial_noise(image, frames, request.seed)
     field = solve(
         _sampler(settings),
-        _velocity(network, inputs, text, settings, calls),
+        _velocity(network, inputs, request, calls),
         noise,
         SolverPath(levels=settings.motion.levels, control=settings.step_control),
         advance,
     )
     # One step gives the mean itself.
     is_mean = settings.motion.steps == 1
-    mean = field if is_mean else inputs.clean(network, noise, noise.new_ones(count), text)
+    mean = field if is_mean else inputs.clean(network, noise, noise.new_ones(1), request.text)
     return MotionSample(field=_from_first(field), mean_field=_from_first(mean), calls=calls)
 
 
@@ -108,16 +104,15 @@ def _sampler(settings: GenerationSettings) -> str:
     return FIXED_DEFAULT if fixed or settings.sampler == FITTED else settings.sampler
 
 
-def _from_first(field: Float[Tensor, "n 3 t hc wc"]) -> Float[Tensor, "n 3 t2 hc wc"]:
+def _from_first(field: Float[Tensor, "1 3 t hc wc"]) -> Float[Tensor, "3 t2 hc wc"]:
     """With the first latent frame, at which nothing has moved."""
-    return torch.cat([torch.zeros_like(field[:, :, :1]), field], 2)
+    return torch.cat([torch.zeros_like(field[0, :, :1]), field[0]], 1)
 
 
 def _velocity(
     network: MotionPrior,
     inputs: _Inputs,
-    text: Float[Tensor, "n s d"] | None,
-    settings: GenerationSettings,
+    request: MotionRequest,
     calls: CallCount,
 ) -> VelocityFn:
     def conditioned(text: Tensor | None) -> VelocityFn:
@@ -128,6 +123,8 @@ def _velocity(
 
         return call
 
-    if text is None:
+    if request.text is None:
         return guided(None, conditioned(None), UNGUIDED, calls)
-    return guided(conditioned(text), conditioned(None), settings.motion.guidance, calls)
+    return guided(
+        conditioned(request.text), conditioned(None), request.settings.motion.guidance, calls
+    )

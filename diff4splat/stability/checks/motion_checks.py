@@ -125,8 +125,8 @@ def _layered(share: float, dtype: torch.dtype) -> Gaussians:
     depth = torch.full((height, width), 4.0, dtype=dtype)
     field = torch.zeros(3, 3, height // 4, width // 4, dtype=dtype)
     field[0] = torch.linspace(0, 4, 3, dtype=dtype)[:, None, None]
-    component = torch.full((height, width), int(share == 1))
-    displacement = rigid_component_offsets(field[None], component, depth)
+    moving = torch.full((height, width), share == 1)
+    displacement = rigid_component_offsets(field, moving, depth)
     maps = ImageMaps(depth=depth, displacement=displacement if share else None)
     layered = build_layered_image(image, image, maps, BORDER_CELLS)
     found = image_gaussians(layered, torch.linspace(0, 1, 3, dtype=dtype))

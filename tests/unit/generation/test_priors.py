@@ -304,3 +304,9 @@ def test_the_rim_of_an_object_moves_with_its_event(monkeypatch: pytest.MonkeyPat
         reached[with_rim] = [int((x > 0).sum()), int((x < 0).sum())]
     narrow, wide = reached[False], reached[True]
     assert all(after > before for before, after in zip(narrow, wide, strict=True))
+
+
+def test_nothing_moves_without_a_request() -> None:
+    model = moves_right(model_of("motion_unet"), 2 * MIN_RELATIVE_DISPLACEMENT)
+    copies = Copies(image=image(), small=image())
+    assert image_maps(model, copies, 2, [], RunLog()).displacement is None

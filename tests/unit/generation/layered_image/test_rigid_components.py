@@ -15,12 +15,6 @@ from diff4splat.models.motion_unet.motion_field import UNIT, upsample_to_pixels
 SIDE = 16
 
 
-def offsets_of(cells: Tensor, moving: Tensor, depth: Tensor, mean: Tensor | None = None) -> Tensor:
-    """With one field for all components."""
-    mean = None if mean is None else mean[None]
-    return rigid_component_offsets(cells[None], connected_components(moving), depth, mean)
-
-
 def field(frames: int = 3) -> Tensor:
     """Cells differ a little, and all move far to the right."""
     torch.manual_seed(0)
@@ -50,7 +44,7 @@ def two_components() -> Tensor:
 
 def test_each_component_moves_by_its_mean_at_its_median_depth() -> None:
     result, relative = (
-        offsets_of(field(), two_components(), depth()),
+        rigid_component_offsets(field(), two_components(), depth()),
         upsample_to_pixels(field()),
     )
     assert result.shape == (3, SIDE, SIDE, 3)
@@ -62,29 +56,18 @@ def test_each_component_moves_by_its_mean_at_its_median_depth() -> None:
     assert not result[:, ~two_components()].any()
 
 
-def test_each_component_has_the_field_of_its_own_mask() -> None:
-    fields = torch.stack([field(), -field()])
-    component = connected_components(two_components())
-    first, second = component == 1, component == 2
-    found = rigid_component_offsets(fields, component, depth())
-    alone = offsets_of(field(), two_components(), depth())
-    assert torch.equal(found[:, first], alone[:, first])
-    assert torch.equal(found[:, second], -alone[:, second])
-    less = rigid_component_offsets(
-        fields, component, depth(), fields * torch.tensor([1, 0])[:, None, None, None, None]
-    )
-    assert torch.equal(less[:, first], alone[:, first]) and not less[:, second].any()
-
-
 def test_a_component_that_hardly_moves_is_static_and_affects_no_other() -> None:
     for share, moves in (
         (0.99 * MIN_RELATIVE_DISPLACEMENT, False),
         (1.01 * MIN_RELATIVE_DISPLACEMENT, True),
     ):
-        assert bool(offsets_of(rightwards(share), two_components(), depth()).any()) is moves
+        assert (
+            bool(rigid_component_offsets(rightwards(share), two_components(), depth()).any())
+            is moves
+        )
     relative = rightwards(2 * MIN_RELATIVE_DISPLACEMENT)
     relative[:, :, :2] = 0
-    result = offsets_of(relative, two_components(), depth())
+    result = rigid_component_offsets(relative, two_components(), depth())
     assert not result[:, :8].any() and bool(result[1, 10:13, 1:4, 0].all())
 
 
@@ -92,7 +75,7 @@ def test_displacements_that_cancel_are_static() -> None:
     relative = rightwards(4 * MIN_RELATIVE_DISPLACEMENT)
     relative[:, :, :, 2:] *= -1
     moving = torch.ones(SIDE, SIDE, dtype=torch.bool)
-    assert not offsets_of(relative, moving, depth()).any()
+    assert not rigid_component_offsets(relative, moving, depth()).any()
 
 
 def test_corners_connect() -> None:
@@ -106,12 +89,12 @@ def test_corners_connect() -> None:
 
 def test_an_empty_mask_moves_nothing() -> None:
     empty = torch.zeros(SIDE, SIDE, dtype=torch.bool)
-    assert not offsets_of(field(), empty, depth()).any()
+    assert not rigid_component_offsets(field(), empty, depth()).any()
 
 
 def test_arguments_are_not_changed() -> None:
     given_field, given_depth, moving = field(), depth(), two_components()
-    offsets_of(given_field, moving, given_depth)
+    rigid_component_offsets(given_field, moving, given_depth)
     assert torch.equal(given_field, field()) and torch.equal(given_depth, depth())
     assert torch.equal(moving, two_components())
 
@@ -121,7 +104,7 @@ def test_arguments_are_not_changed() -> None:
 def test_any_mask_at_any_depth_is_finite_and_moves_no_other_pixel(bits: int, unit: float) -> None:
     torch.manual_seed(bits)
     moving = torch.rand(SIDE, SIDE) < 0.3
-    result = offsets_of(field(), moving, unit * depth())
+    result = rigid_component_offsets(field(), moving, unit * depth())
     assert bool(result.isfinite().all()) and not result[:, ~moving].any()
     assert bool(result[:, moving].any(-1).all())
 
@@ -129,10 +112,12 @@ def test_any_mask_at_any_depth_is_finite_and_moves_no_other_pixel(bits: int, uni
 def test_the_mean_over_samples_decides_what_moves_and_the_sample_how_far() -> None:
     little, much = (rightwards(share * MIN_RELATIVE_DISPLACEMENT) for share in (0.5, 2.0))
     moving = two_components()
-    alone = offsets_of(little, moving, depth())
+    alone = rigid_component_offsets(little, moving, depth())
     assert not alone.any(), "a sample alone may be too short to count as motion"
-    offsets = offsets_of(little, moving, depth(), much)
+    offsets = rigid_component_offsets(little, moving, depth(), much)
     assert bool((offsets[1][moving][:, 0] > 0).all())
     assert not offsets[:, ~moving].any()
-    torch.testing.assert_close(offsets, offsets_of(much, moving, depth()) / 4, rtol=1e-4, atol=1e-6)
-    assert not offsets_of(much, moving, depth(), little).any()
+    torch.testing.assert_close(
+        offsets, rigid_component_offsets(much, moving, depth()) / 4, rtol=1e-4, atol=1e-6
+    )
+    assert not rigid_component_offsets(much, moving, depth(), little).any()
