@@ -91,6 +91,7 @@ _MODEL_ADDED = (
     "expert_boundary",
     "instance_channels",
     "uncertainty",
+    "object_mask",
 )
 """Settings of networks that are off where they are empty or 0."""
 _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}

@@ -10,8 +10,10 @@ from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import ModelConfig, MotionUNetConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.training.batches.clip_batch import ClipBatch
+from diff4splat.training.recipe.fingerprint import fingerprint_of
 from diff4splat.training.recipe.losses import MotionDiffusionLosses
 from diff4splat.training.recipe.recipe import Recipe
+from diff4splat.training.recipe.recipe_json import recipe_to_dict
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import TOTAL
 from diff4splat.training.stages.kinds.motion_diffusion import _cell_weights
@@ -174,3 +176,14 @@ def test_no_mask_is_predicted_where_no_loss_asks_for_it(monkeypatch: pytest.Monk
     shake_heads(stage)
     monkeypatch.delattr(type(stage.motion_unet), "predict_motion_and_mask")
     assert set(stage(moving_batch(recipe))) == {"flow", TOTAL}
+
+
+def test_runs_from_before_masks_were_shown_go_on() -> None:
+    def print_of(model: ModelConfig, *, without: bool = False) -> str:
+        data = recipe_to_dict(Recipe(name="x", seed=0, model=model, stages=(motion_recipe(),)))
+        if without:
+            del data["model"]["motion_unet"]["object_mask"]
+        return fingerprint_of(data, "motion_diffusion", "")
+
+    assert print_of(MODEL) == print_of(MODEL, without=True)
+    assert print_of(MASKED) != print_of(MODEL)
