@@ -89,9 +89,9 @@ def _motion_and_caption(
 ) -> tuple[Float[Tensor, "3 t h w"], str]:
     """The clip's own, or those of another request for its first image."""
     motion = pixel_motion(clip, settings.input_stride)
-    if not settings.other_object_share + settings.absent_object_share:
+    if not any(settings.request_shares):
         return motion, clip.note.caption
-    request = draw_request(clip, motion.shape[1], settings, generator)
+    request = draw_request(clip, motion, settings, generator)
     return (motion, clip.note.caption) if request is None else (request.motion, request.caption)
 
 

@@ -88,6 +88,9 @@ class DataSettings:
     absent_object_share: float = 0.0
     """Stage ``motion_diffusion``: share of samples that ask for an object that is not there, or has
     another colour; then nothing moves."""
+    single_event_share: float = 0.0
+    """Stage ``motion_diffusion``: share of samples with one event of the clip alone: its words, and
+    what its object does in the clip."""
     workers: int = 1
     """Worker processes; 0 prepares samples in the training process."""
     in_memory: bool = False
@@ -114,14 +117,18 @@ class DataSettings:
         require(0 <= self.fps < math.inf, "data.fps", "at least 0", self.fps)
         share = self.min_valid_depth
         require(0 <= share <= 1, "data.min_valid_depth", "0 to 1", share)
-        requests = (self.other_object_share, self.absent_object_share)
-        valid = min(requests) >= 0 and sum(requests) <= 1
+        valid = min(self.request_shares) >= 0 and sum(self.request_shares) <= 1
         require(
             valid,
-            "data.other_object_share and data.absent_object_share",
+            "data.absent_object_share, data.other_object_share and data.single_event_share",
             "0 to 1 together",
-            requests,
+            self.request_shares,
         )
+
+    @property
+    def request_shares(self) -> tuple[float, float, float]:
+        """Of samples that ask for an absent object, another one, and one event of the clip."""
+        return self.absent_object_share, self.other_object_share, self.single_event_share
 
     @property
     def clip_frames(self) -> int:

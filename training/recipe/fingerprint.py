@@ -100,7 +100,13 @@ _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
 _SOURCE_ADDED = {"depth_loss": "true", "motion_loss": "true", "views": 0, "unit": ""}
 _NOT_DECISIVE = ("workers", "in_memory", "photographs")
 _LOSS_ADDED = {"window_consistency": 0.0, "instances": 0.0, "uncertainty": 0.0}
-_ADDED = {"unit": "median_depth", "fps": 0.0, "commercial_only": False, "cutouts": ""}
+_ADDED = {
+    "unit": "median_depth",
+    "fps": 0.0,
+    "commercial_only": False,
+    "cutouts": "",
+    "single_event_share": 0.0,
+}
 """Settings of later releases, with the value that changes nothing."""
 
 

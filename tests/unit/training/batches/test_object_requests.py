@@ -26,6 +26,8 @@ DEPTHS = {1: 8.0, 2: 3.0, 3: 3.0, 4: 5.0}
 OTHERS = DataSettings(other_object_share=1.0)
 FILLED = {"name": "red ball", "moves": "moves", "move": "move", "moving": "moving", "side": "left"}
 ABSENT = DataSettings(absent_object_share=1.0)
+SINGLE = DataSettings(single_event_share=1.0)
+MOTION = torch.rand(3, FRAMES, SIDE, SIDE, generator=torch.Generator().manual_seed(0))
 
 
 def _note(instance: int, color: str, name: str, number: int) -> ObjectNote:
@@ -60,7 +62,7 @@ def clip(notes: tuple[ObjectNote, ...] = NOTES) -> Clip:
 def requests(settings: DataSettings, count: int = 80, given: Clip | None = None) -> list:
     given = given or clip()
     return [
-        draw_request(given, FRAMES, settings, torch.Generator().manual_seed(seed))
+        draw_request(given, MOTION, settings, torch.Generator().manual_seed(seed))
         for seed in range(count)
     ]
 
@@ -170,6 +172,8 @@ def test_shares_are_kept() -> None:
 def test_shares_must_fit_together(shares: tuple[float, float]) -> None:
     with pytest.raises(ConfigError, match="other_object_share"):
         DataSettings(other_object_share=shares[0], absent_object_share=shares[1])
+    with pytest.raises(ConfigError, match="single_event_share"):
+        DataSettings(single_event_share=shares[0], other_object_share=shares[1])
 
 
 def test_no_caption_is_of_a_validation_template() -> None:
@@ -177,3 +181,50 @@ def test_no_caption_is_of_a_validation_template() -> None:
     assert all(any(each.fullmatch(one.format(**FILLED)) for each in patterns) for one in VALIDATION)
     for asked in requests(OTHERS) + requests(ABSENT):
         assert not any(pattern.fullmatch(asked.caption) for pattern in patterns), asked.caption
+
+
+def moving_clip(caption: str, *motions: str) -> Clip:
+    """With that caption, and with motions of ground, mug, its handle, and box."""
+    notes = tuple(replace(one, motion=m) for one, m in zip(NOTES, motions, strict=True))
+    given = clip(notes)
+    return replace(given, note=replace(given.note, caption=caption))
+
+
+BOTH = "in a room, a red mug rolls to the left beside a blue box, a blue box hops, the camera rises"
+
+
+def test_one_event_moves_its_object_as_in_the_clip_and_no_other() -> None:
+    found = requests(SINGLE, 20, moving_clip(BOTH, "", "rolls to the left", "rolls", "hops"))
+    asked = {request.caption: request for request in found}
+    mug, box = sorted(asked, key=len, reverse=True)
+    assert mug == "in a room, a red mug rolls to the left beside a blue box"
+    assert box == "a blue box hops"
+    instances = clip().views[0].instances[0]
+    for caption, parts in ((mug, (2, 3)), (box, (4,))):
+        inside = torch.isin(instances, torch.tensor(parts, dtype=torch.uint8))
+        assert torch.equal(asked[caption].motion, torch.where(inside, MOTION, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("caption", "motions"),
+    [
+        ("a red mug spins, the camera rises", ("", "spins", "spins", "")),
+        ("a green box rolls", ("", "rolls", "rolls", "")),
+        ("a red mug rolls", ("", "", "", "")),
+        ("a dog that runs after a ball", ("", "rolls", "rolls", "hops")),
+        ("nothing moves", ("", "", "", "")),
+        ("", ("", "", "", "")),
+    ],
+)
+def test_clips_keep_their_caption_where_no_event_has_one_object(
+    caption: str, motions: tuple[str, ...]
+) -> None:
+    assert set(requests(SINGLE, 8, moving_clip(caption, *motions))) == {None}
+
+
+def test_two_objects_of_one_name_have_no_event_of_their_own() -> None:
+    twins = (*NOTES[:3], replace(NOTES[3], color="red", name="mug", motion="rolls"))
+    twins = tuple(replace(one, motion="rolls") if one.name == "mug" else one for one in twins)
+    given = clip(twins)
+    given = replace(given, note=replace(given.note, caption="a red mug rolls"))
+    assert set(requests(SINGLE, 8, given)) == {None}
