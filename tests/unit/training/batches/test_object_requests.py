@@ -19,7 +19,9 @@ from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.motion_unet.motion_field import UNIT
 from diff4splat.training.batches.requests.draw import ObjectRequest, draw_request
+from diff4splat.training.batches.sample import Origin, make_sample
 from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.stage import SampleKey
 
 SIDE, FRAMES = 16, 3
 DEPTHS = {1: 8.0, 2: 3.0, 3: 3.0, 4: 5.0}
@@ -203,6 +205,15 @@ def test_one_event_moves_its_object_as_in_the_clip_and_no_other() -> None:
     for caption, parts in ((mug, (2, 3)), (box, (4,))):
         inside = torch.isin(instances, torch.tensor(parts, dtype=torch.uint8))
         assert torch.equal(asked[caption].motion, torch.where(inside, MOTION, 0.0))
+
+
+def test_samples_have_the_words_of_one_event() -> None:
+    settings = replace(SINGLE, size_px=(SIDE, SIDE), frames=FRAMES)
+    given = moving_clip(BOTH, "", "rolls to the left", "rolls", "hops")
+    origins = [Origin(key=SampleKey(0, "x", k, "sample"), source="made") for k in range(12)]
+    captions = {make_sample(given, settings, origin).captions for origin in origins}
+    mug = "in a room, a red mug rolls to the left beside a blue box"
+    assert captions == {(mug,), ("a blue box hops",)}
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import pytest
 
 from diff4splat.configs.recipes import RECIPES, recipe_by_name
 from diff4splat.errors import ConfigError
-from diff4splat.training.recipe.fingerprint import fingerprint
+from diff4splat.training.recipe.fingerprint import fingerprint, fingerprint_of
 from diff4splat.training.recipe.overrides import override
-from diff4splat.training.recipe.recipe_json import recipe_from_json, recipe_to_json
+from diff4splat.training.recipe.recipe_json import recipe_from_json, recipe_to_dict, recipe_to_json
 
 
 @pytest.mark.parametrize("name", RECIPES)
@@ -108,6 +108,16 @@ def test_the_fingerprint_follows_what_decides_the_weights_of_its_stage() -> None
         assert fingerprint(override(recipe, [same]), "vae") == before
     for other in ("stages.vae.steps=3", "seed=1", "model.vae.latent_channels=5"):
         assert fingerprint(override(recipe, [other]), "vae") != before
+
+
+def test_runs_from_before_single_events_go_on() -> None:
+    recipe, name = recipe_by_name("small"), "motion_diffusion"
+    data = recipe_to_dict(recipe)
+    (stage,) = (one for one in data["stages"] if one["name"] == name)
+    assert stage["data"].pop("single_event_share") == 0
+    assert fingerprint_of(data, name, "") == fingerprint(recipe, name)
+    share = f"stages.{name}.data.single_event_share=0.5"
+    assert fingerprint(override(recipe, [share]), name) != fingerprint(recipe, name)
 
 
 def test_stages_that_do_not_exist_are_refused() -> None:
