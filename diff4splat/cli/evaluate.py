@@ -53,6 +53,8 @@ class Evaluate:
     """Sampling steps of motion and video. Default: 1 for motion, 4 for video."""
     fill: Literal["none", "video"] | None = None
     """What fills hidden regions, as in `generate`. Default: that of the model."""
+    photometric_steps: Annotated[int | None, Number(least=0, most=1000)] = None
+    """Gradient steps on the input frames, after a reconstruction. Default: 15."""
     device: str = "cpu"
     """Where networks of generation run: cpu, cuda, or auto, which is cuda where there is one."""
     dtype: Literal["float32", "bfloat16", "float16"] = "float32"
@@ -80,6 +82,11 @@ class Evaluate:
             raise ConfigError(
                 "--without: expected without --task reconstruction, which has no networks to "
                 "choose from; leave it out"
+            )
+        if self.task != "reconstruction" and self.photometric_steps is not None:
+            raise ConfigError(
+                f"--photometric-steps: expected with --task reconstruction, got {self.task}; "
+                "leave it out"
             )
         load_protocol(self.protocol)
 
@@ -141,16 +148,17 @@ class Evaluate:
         from diff4splat.models.hub.model import load_model, with_parts
         from diff4splat.models.networks import reconstruction_parts
 
+        settings = self.settings()
         if self.task != "reconstruction":
             pipeline = Diff4SplatPipeline.from_pretrained(self.model)
             pipeline.to(require_device(self.device), self.dtype)
-            return Generator(pipeline=pipeline, settings=self.settings())
+            return Generator(pipeline=pipeline, settings=settings)
         model = load_model(self.model, ())
         parts = reconstruction_parts(model.config)
-        model = with_parts(model, parts)
+        model, steps = with_parts(model, parts), settings.photometric_steps
         return Reconstructor(
-            reconstruct=partial(reconstruct_clip, model),
-            identity=model_identity(model, parts, "reconstruction"),
+            reconstruct=partial(reconstruct_clip, model, settings=settings),
+            identity=model_identity(model, parts, f"reconstruction, {steps} photometric steps"),
         )
 
     def video_networks(self) -> "VideoNetworks":
@@ -182,6 +190,8 @@ class Evaluate:
         """Steps and filling as requested, the defaults elsewhere."""
         from diff4splat.generation.settings import GenerationSettings, MotionSettings
 
+        if self.photometric_steps is not None:
+            return GenerationSettings(photometric_steps=self.photometric_steps)
         if self.steps is None:
             return GenerationSettings(fill=self.fill)
         motion = MotionSettings(steps=self.steps)

@@ -234,6 +234,7 @@ USER_CHOICES: UserChoices = {
     "GenerationSettings.motion": "the settings of the motion prior, each of its own",
     "GenerationSettings.fill": "what shows where the image hides: another scene, not a coarser one",
     "GenerationSettings.still": "whether anything may move",
+    "GenerationSettings.photometric_steps": "a scene nearer to its frames, with no exact value",
     "GenerationSettings.extended_layers": "whether anything shows where the image hides",
     "GenerationSettings.without": "networks that stay out: another scene, for ablations",
     "GenerationSettings.negative_prompt": "what the video is to keep away from",

@@ -90,6 +90,9 @@ class GenerationSettings:
     color_matching_steps: int = 7
     """Corrections of the image's colours against the rendered input view; 0 switches off."""
 
+    photometric_steps: int = 15
+    """Gradient steps on the frames of a true video after its reconstruction; 0 switches off."""
+
     subpixel_infill: bool = True
     """Gaussians between the image's pixels; without them there are a quarter as many, twice as
     wide."""
@@ -113,6 +116,10 @@ class GenerationSettings:
         if not 0 <= self.color_matching_steps <= 100:
             raise ConfigError(
                 f"color_matching_steps: expected 0 to 100, got {self.color_matching_steps}"
+            )
+        if not 0 <= self.photometric_steps <= 1000:
+            raise ConfigError(
+                f"--photometric-steps: expected 0 to 1000, got {self.photometric_steps}"
             )
         if self.key_times is not None and not 2 <= self.key_times <= MAX_KEY_TIMES:
             raise ConfigError(f"key_times: expected 2 to {MAX_KEY_TIMES}, got {self.key_times}")

@@ -97,11 +97,11 @@ class Reconstructor:
         return self.reconstruct(sample.input_clip)
 
 
-def reconstruct_clip(model: Model, clip: Clip) -> Scene:
+def reconstruct_clip(model: Model, clip: Clip, settings: GenerationSettings | None = None) -> Scene:
     """Reconstruct a scene from the input view of a clip."""
     view = clip.views[0]
     path = CameraPath(cameras=view.cameras.to(torch.float32), times_s=clip.times_s.float())
-    return scene_from_video(model, unit_rgb(view.rgb), path)
+    return scene_from_video(model, unit_rgb(view.rgb), path, settings)
 
 
 def model_identity(model: Model, parts: Collection[str], settings: str) -> Identity:

@@ -3,6 +3,8 @@
 Axes: ``f h w`` video frames and pixels.
 """
 
+from dataclasses import replace
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -14,6 +16,8 @@ from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
 from diff4splat.generation.video.canonical_scene import prune_cells
 from diff4splat.generation.video.deformation_motion import deform
+from diff4splat.generation.video.photometric_steps import Frames, take_photometric_steps
+from diff4splat.generation.video.scene_change import cell_rays
 from diff4splat.generation.video.video_to_gaussians import VideoLatent, video_gaussians
 from diff4splat.geometry.rays import relative_to_first
 from diff4splat.models.deformation.keyframes import DeformationUnits
@@ -35,8 +39,8 @@ def scene_from_video(
 ) -> Scene:
     """The scene that LDRM and the deformation network reconstruct from a true video.
 
-    ``video`` is RGB in [0, 1]; ``path`` holds one camera per frame, lengths in model units. Colours
-    are not matched to the first frame: evaluation is of what the networks predict.
+    ``video`` is RGB in [0, 1]; ``path`` holds one camera per frame, lengths in model units. What
+    the networks predict is brought nearer to the frames by ``settings.photometric_steps``.
 
     Raises:
         ShapeError: another number of cameras than frames.
@@ -64,6 +68,9 @@ def scene_from_video(
         path=path.to(torch.float32),
         provenance=_provenance(model),
     )
+    rays = cell_rays(canonical, seen.cameras)
+    frames = Frames(rgb=video.to(device).float(), path=replace(scene.path, cameras=seen.cameras))
+    scene = take_photometric_steps(scene, rays, frames, settings.photometric_steps, log)
     return scene.to(torch.device("cpu"))
 
 

@@ -85,22 +85,28 @@ def test_the_newest_protocol_of_all_tasks_is_the_default() -> None:
     assert Evaluate().protocol == whole[-1]
 
 
+@pytest.mark.parametrize("asked", [None, 0, 3])
 def test_reconstruction_sees_the_whole_input_video(
-    protocol_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    asked: int | None, protocol_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen = []
 
-    def reconstruct_clip(model: object, clip: object) -> object:
-        seen.append((clip.frames, len(clip.views)))
+    def reconstruct_clip(model: object, clip: object, settings: GenerationSettings) -> object:
+        seen.append((clip.frames, len(clip.views), settings.photometric_steps))
         return wall_and_patch()
 
     monkeypatch.setattr(
         "diff4splat.evaluation.systems.evaluated_system.reconstruct_clip", reconstruct_clip
     )
     Evaluate(
-        model="test", protocol=str(protocol_file), task="reconstruction", out=tmp_path / "out"
+        model="test",
+        protocol=str(protocol_file),
+        task="reconstruction",
+        photometric_steps=asked,
+        out=tmp_path / "out",
     ).run()
-    assert set(seen) == {(FRAMES, 1)}
+    steps = GenerationSettings().photometric_steps if asked is None else asked
+    assert set(seen) == {(FRAMES, 1, steps)}
 
 
 def test_another_size_is_asked_of_the_clips_too(
@@ -198,6 +204,7 @@ def test_networks_of_a_user_and_rows_without_a_network(protocol_file: Path, tmp_
     [
         ({"aesthetic": Path("head.pt")}, "--aesthetic: expected --clip"),
         ({"task": "reconstruction", "without": ("depth",)}, "--without: expected without --task"),
+        ({"photometric_steps": 5}, "--photometric-steps: expected with --task reconstruction"),
     ],
 )
 def test_options_that_need_others_are_refused(change: dict[str, object], says: str) -> None:

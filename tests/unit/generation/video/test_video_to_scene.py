@@ -8,6 +8,7 @@ from image_layers import FOCAL_PX, sliding_path
 
 from diff4splat.errors import InputError, ShapeError
 from diff4splat.generation.settings import GenerationSettings
+from diff4splat.generation.video.photometric_steps import Frames, video_error
 from diff4splat.generation.video.video_to_scene import scene_from_video
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.config.sizes import size_by_name
@@ -59,6 +60,23 @@ def test_equal_videos_give_equal_scenes() -> None:
     assert torch.equal(left.gaussians.sh, right.gaussians.sh)
     other = scene_from_video(model(), 1 - shown, path(), EVERYTHING)
     assert not torch.equal(left.gaussians.sh, other.gaussians.sh)
+
+
+@pytest.mark.parametrize("name", ["test", "small"])
+def test_photometric_steps_bring_the_scene_nearer_to_the_video(name: str) -> None:
+    """Of frames that look alike; the cameras count from the first one, wherever that is."""
+    shown = video()[:1].expand(FRAMES, -1, -1, -1)
+    turned = path()
+    moved = turned.cameras.world_from_camera.clone()
+    moved[:, 1, 3] += 3.0
+    turned = replace(turned, cameras=turned.cameras.with_pose(moved))
+    errors = []
+    for steps in (0, 10):
+        settings = replace(EVERYTHING, photometric_steps=steps)
+        scene = scene_from_video(model(name), shown, turned, settings)
+        frames = Frames(rgb=shown, path=path())
+        errors.append(video_error(scene, frames))
+    assert errors[1] < 0.9 * errors[0]
 
 
 def test_frames_and_cameras_must_fit() -> None:
