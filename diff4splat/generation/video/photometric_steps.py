@@ -7,11 +7,14 @@ squared error of all frames; what it changes is in ``scene_change``. Motion stay
 Axes: ``f h w`` frames and pixels.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
+from torch.optim import Adam
+from torch.optim.lr_scheduler import LinearLR
 
 from diff4splat.generation.video.scene_change import RATES, CellRays, changed, zero_change
 from diff4splat.paths.camera_path import CameraPath
@@ -42,13 +45,11 @@ def take_photometric_steps(
 
     Also under ``no_grad``. ``frames.path`` is in the world frame of the scene.
     """
-    if steps == 0 or len(scene.gaussians) == 0:
+    if steps == 0:
         return scene
     with log.phases.phase("photometric steps", steps) as advance, torch.enable_grad():
         change = zero_change(scene.gaussians, rays)
-        groups = [{"params": [value], "lr": RATES[name]} for name, value in change.items()]
-        optimizer = torch.optim.Adam(groups, betas=BETAS, eps=NO_EPS)
-        decay = torch.optim.lr_scheduler.LinearLR(optimizer, 1.0, LAST_RATE, steps)
+        optimizer, decay = falling_adam(change, steps)
         for _ in range(steps):
             optimizer.zero_grad()
             for index in range(len(frames.rgb)):
@@ -60,6 +61,13 @@ def take_photometric_steps(
     with torch.no_grad():
         new = replace(scene, gaussians=changed(scene.gaussians, change, rays))
         return better(scene, new, frames)
+
+
+def falling_adam(change: Mapping[str, Tensor], steps: int) -> tuple[Adam, LinearLR]:
+    """Adam with the rates of ``scene_change``, and what lets them fall over ``steps``."""
+    groups = [{"params": [value], "lr": RATES[name]} for name, value in change.items()]
+    optimizer = Adam(groups, betas=BETAS, eps=NO_EPS)
+    return optimizer, LinearLR(optimizer, 1.0, LAST_RATE, steps)
 
 
 def better(before: Scene, after: Scene, frames: Frames) -> Scene:

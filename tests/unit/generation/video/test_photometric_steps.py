@@ -9,10 +9,11 @@ from image_layers import sliding_path
 from diff4splat.generation.video.photometric_steps import (
     Frames,
     better,
+    falling_adam,
     take_photometric_steps,
     video_error,
 )
-from diff4splat.generation.video.scene_change import CellRays
+from diff4splat.generation.video.scene_change import RATES, CellRays, zero_change
 from diff4splat.geometry.camera import pinhole
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
@@ -126,6 +127,20 @@ def test_a_scene_that_shows_its_frames_is_kept() -> None:
     """Adam's first step is as long for a small gradient as for a large one."""
     truth = true_scene()
     assert stepped(truth, video_of(truth), 1) is truth
+
+
+def test_rates_fall_linearly_to_a_fifth() -> None:
+    change = zero_change(true_scene().gaussians, rays_of(true_scene()))
+    optimizer, decay = falling_adam(change, 4)
+    seen = []
+    for _ in range(5):
+        seen.append([group["lr"] for group in optimizer.param_groups])
+        optimizer.step()
+        decay.step()
+    first = torch.tensor(list(RATES.values()))
+    torch.testing.assert_close(torch.tensor(seen[0]), first)
+    torch.testing.assert_close(torch.tensor(seen[2]), 0.6 * first)
+    torch.testing.assert_close(torch.tensor(seen[4]), 0.2 * first)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
