@@ -13,7 +13,7 @@ from diff4splat.generation.video.photometric_steps import (
     take_photometric_steps,
     video_error,
 )
-from diff4splat.generation.video.scene_change import RATES, CellRays, zero_change
+from diff4splat.generation.video.scene_change import RATES, CellRays, changed, zero_change
 from diff4splat.geometry.camera import pinhole
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
@@ -87,6 +87,35 @@ def test_frames_and_a_view_beside_the_path_come_nearer_to_the_truth() -> None:
     ]
     assert distance[1] < 0.8 * distance[0]
     assert not end.gaussians.means.requires_grad
+
+
+def test_steps_are_those_of_the_formula() -> None:
+    """Adam as in arXiv 1412.6980, algorithm 1, on the gradient of the whole error at once."""
+    truth = true_scene(40)
+    start, frames, steps = wrong(truth), video_of(truth), 3
+    about = rays_of(start)
+    change = zero_change(start.gaussians, about)
+    first = {name: torch.zeros_like(value) for name, value in change.items()}
+    second = {name: torch.zeros_like(value) for name, value in change.items()}
+    for step in range(steps):
+        scene = replace(start, gaussians=changed(start.gaussians, change, about))
+        renders = [
+            render(scene, frames.path.cameras[i], float(frames.path.times_s[i])).rgb
+            for i in range(FRAMES)
+        ]
+        error = (torch.stack(renders) - frames.rgb).square().mean()
+        slopes = torch.autograd.grad(error, list(change.values()))
+        for (name, value), slope in zip(change.items(), slopes, strict=True):
+            first[name] = 0.8 * first[name] + 0.2 * slope
+            second[name] = 0.95 * second[name] + 0.05 * slope**2
+            mean = first[name] / (1 - 0.8 ** (step + 1))
+            deviation = (second[name] / (1 - 0.95 ** (step + 1))).sqrt()
+            rate = RATES[name] * (1 - 0.8 * step / steps)
+            change[name] = (value - rate * mean / (deviation + 1e-15)).detach().requires_grad_()
+    want = changed(start.gaussians, change, about)
+    got = stepped(start, frames, steps).gaussians
+    for name in ("means", "scales", "opacities", "sh"):
+        torch.testing.assert_close(getattr(got, name), getattr(want, name), rtol=1e-3, atol=1e-4)
 
 
 def test_more_steps_are_nearer_to_the_frames() -> None:
