@@ -20,8 +20,11 @@ from diff4splat.generation.video.scene_change import RATES, CellRays, changed, z
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
+from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.scene import Scene
 
+CHANGED = ("means", "scales", "opacities", "sh")
+"""What of the Gaussians depends on the change."""
 LAST_RATE = 0.2
 """Share of the learning rates at the last step."""
 BETAS = (0.8, 0.95)
@@ -52,15 +55,24 @@ def take_photometric_steps(
         optimizer, decay = falling_adam(change, steps)
         for _ in range(steps):
             optimizer.zero_grad()
-            for index in range(len(frames.rgb)):
-                new = replace(scene, gaussians=changed(scene.gaussians, change, rays))
-                frame_error(new, frames, index).backward()
+            add_gradients(scene, changed(scene.gaussians, change, rays), frames)
             optimizer.step()
             decay.step()
             advance()
     with torch.no_grad():
         new = replace(scene, gaussians=changed(scene.gaussians, change, rays))
         return better(scene, new, frames)
+
+
+def add_gradients(scene: Scene, new: Gaussians, frames: Frames) -> None:
+    """Gradients of the video's error with the Gaussians ``new``; one frame's graph at a time."""
+    cut = {name: getattr(new, name).detach().requires_grad_() for name in CHANGED}
+    shown = replace(scene, gaussians=replace(new, **cut))
+    for index in range(len(frames.rgb)):
+        frame_error(shown, frames, index).backward()
+    torch.autograd.backward(
+        [getattr(new, name) for name in CHANGED], [value.grad for value in cut.values()]
+    )
 
 
 def falling_adam(change: Mapping[str, Tensor], steps: int) -> tuple[Adam, LinearLR]:
