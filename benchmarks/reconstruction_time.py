@@ -52,7 +52,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="small")
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--photometric-steps", type=int, nargs="+", default=[0, 5, 10, 20, 40])
+    parser.add_argument("--photometric-steps", type=int, nargs="+", default=[0, 5, 15, 40])
     parser.add_argument("--out", type=Path, help="markdown file")
     options = parser.parse_args()
     model = load_model(options.model)

@@ -35,6 +35,8 @@ def test_the_schedule_follows_the_number_of_steps_unless_named() -> None:
         {"min_opacity": float("nan")},
         {"color_matching_steps": -1},
         {"color_matching_steps": 101},
+        {"photometric_steps": -1},
+        {"photometric_steps": 1001},
         {"shift": 0.0},
         {"sampler": "magic"},
         {"key_times": 1},
