@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from diff4splat.cli.options.capture import CaptureOptions
 from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.device import render_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
@@ -26,24 +27,6 @@ if TYPE_CHECKING:
     from diff4splat.scene.scene import Scene
 
 DEFAULT_LIVE_PORT = 8080
-
-
-@dataclass(frozen=True, kw_only=True)
-class CaptureOptions:
-    """How the capture is read."""
-
-    format: str = "auto"
-    """dnerf, neu3d, hypernerf, colmap, transforms, clips or cameras; auto detects it."""
-    hold_out: Annotated[tuple[int, ...] | None, Number(least=0)] = None
-    """Cameras to hold out, from 0. Default: the rule of the format."""
-    downscale: Annotated[int, Number(least=1)] = 1
-    """Downscale images by this factor."""
-    frame_step: Annotated[int, Number(least=1)] = 1
-    """Use every n-th time only."""
-    fps: Annotated[float | None, Number(above=0)] = None
-    """Frames per second, for formats that only count frames."""
-    clip: str | None = None
-    """Which clip of a folder of shards, or which effect of data sets of cameras."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,10 +235,7 @@ class Fit:
 
     def capture(self) -> "Capture":
         """The data."""
-        from diff4splat.data_prep.readers.options import ReadOptions
-        from diff4splat.data_prep.readers.registry import read_capture
-
-        return read_capture(self.data, ReadOptions(**asdict(self.options)))
+        return self.options.read(self.data)
 
     def initial_scene(self) -> "Scene | None":
         """The initial scene, if any."""

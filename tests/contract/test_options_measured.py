@@ -10,10 +10,11 @@ from diff4splat.cli.generate import Generate
 from diff4splat.cli.scenes.bake import Bake
 from diff4splat.cli.scenes.convert import Convert
 from diff4splat.cli.scenes.export_html import ExportHtml
+from diff4splat.cli.scenes.reconstruct import Reconstruct
 from diff4splat.cli.scenes.render import Render
 from diff4splat.error_time.known_knobs import known_knobs
 
-COMMANDS = (Generate, Render, Bake, ExportHtml, ExportOnnx, Fit, Convert)
+COMMANDS = (Generate, Reconstruct, Render, Bake, ExportHtml, ExportOnnx, Fit, Convert)
 MEASURED = {
     "Generate.resolution": "network-resolution",
     "Generate.runtime": "runtime",
@@ -27,6 +28,7 @@ MEASURED = {
     "Generate.min_opacity": "fill-pruning",
     "Generate.compression": "scene-compression",
     "Generate.dtype": "precision-dit",
+    "Reconstruct.compression": "scene-compression",
     "Bake.tolerance_px": "bake-tolerance",
     "Bake.keys": "bake-tolerance",
     "ExportOnnx.precision": "runtime",
@@ -56,13 +58,16 @@ CHOICES = {
         *("Convert.target", "Convert.spz_version", "ExportOnnx.model", "ExportOnnx.shapes_only"),
         *("ExportOnnx.triton", "ExportOnnx.skip_parity", "Generate.video", "Generate.ply"),
         *("Generate.lora", "Render.dtype", "Fit.dtype"),
+        *("Reconstruct.camera", "Reconstruct.frames", "Reconstruct.resolution"),
+        *("Reconstruct.median_depth", "Reconstruct.photometric_steps", "Reconstruct.model"),
+        "Reconstruct.options",
     ),
     WHERE: (
         *("Generate.images", "Generate.out", "Generate.depth", "Generate.device", "Render.scene"),
         *("Render.out", "Render.dataset", "Render.device", "Bake.scene", "Bake.out"),
         *("ExportHtml.scene", "ExportHtml.out", "ExportOnnx.out", "Fit.data", "Fit.out"),
         *("Fit.init", "Fit.renderer", "Fit.live", "Fit.restart", "Convert.scene", "Convert.out"),
-        "Fit.device",
+        *("Fit.device", "Reconstruct.data", "Reconstruct.out", "Reconstruct.device"),
     ),
     LIMITS: ("Generate.limits", "Render.limits", "Bake.limits", "ExportHtml.limits"),
 }

@@ -33,6 +33,11 @@ generate photo.png --frames 0
 generate photo.png --fov nan
 generate photo.png --seed -1
 generate grey.png
+reconstruct nowhere
+reconstruct folder --frames 4
+reconstruct folder --resolution 0
+reconstruct folder --median-depth -1
+reconstruct folder --model enormous
 fit nowhere
 fit pipe.png
 fit folder --init nowhere

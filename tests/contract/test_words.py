@@ -39,7 +39,8 @@ GEOMETRY = {
     "push_behind_surface": "farther along the ray than a surface",
 }
 COMMANDS = (
-    *("generate", "fit", "render", "bake", "convert", "inspect", "train", "pack", "eval", "doctor"),
+    *("generate", "reconstruct", "fit", "render", "bake", "convert", "inspect", "train", "pack"),
+    *("eval", "doctor"),
     *("paths preview", "paths list", "prepare synth", "prepare latents", "prepare check"),
     *("prepare import", "prepare doctor"),
     *("prepare align", "prepare captions", "prepare curate", "prepare poses"),

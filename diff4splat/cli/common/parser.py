@@ -36,6 +36,7 @@ from diff4splat.cli.report import ErrorTime, ListKnobs, Stability
 from diff4splat.cli.scenes.bake import Bake
 from diff4splat.cli.scenes.convert import Convert
 from diff4splat.cli.scenes.export_html import ExportHtml, View
+from diff4splat.cli.scenes.reconstruct import Reconstruct
 from diff4splat.cli.scenes.render import Render
 from diff4splat.cli.serve import Serve
 from diff4splat.cli.train import Train
@@ -75,6 +76,7 @@ Report = (
 )
 Command = (
     Annotated[Generate, subcommand("generate")]
+    | Annotated[Reconstruct, subcommand("reconstruct")]
     | Annotated[Fit, subcommand("fit")]
     | Annotated[Render, subcommand("render")]
     | Annotated[Bake, subcommand("bake")]

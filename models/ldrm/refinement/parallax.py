@@ -11,44 +11,33 @@ across epipolar lines, hardly count; motion along them is taken for depth. Where
 determine the depth, the correction is that of the neighbourhood; without any parallax it is 0.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.geometry.camera import Camera
-from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, camera_frames, flat_cameras
-from diff4splat.models.ldrm.refinement.warping import inside, other_pixels, sampled
+from diff4splat.models.ldrm.refinement.other_frames import (
+    OtherFrames,
+    blurred_key_frames,
+    other_frames,
+)
+from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, flat_cameras
 from diff4splat.models.ldrm.refinement.window_mean import window_mean
 
-DISTANCES = (2, 4, 8)
-"""Frames between a key frame and those that it is compared with, before and after."""
 STEPS = 6
-WINDOW_PX, SMOOTHING_WINDOW_PX, BLUR_PX = 9, 17, 3
+WINDOW_PX, SMOOTHING_WINDOW_PX = 9, 17
 SMOOTHNESS, RESIDUAL_SCALE = 0.03, 0.05
 PROBE = 0.02
 """Change of L over which the image's derivative is taken."""
 LONGEST_STEP = 0.1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _OtherFrames:
-    """One other frame for each key frame."""
-
-    rgb: Float[Tensor, "n 3 h w"]
-    cameras: Camera
-    exists: Bool[Tensor, " n"]
-    """False beyond the ends of the video."""
-
-
 def parallax_depth(
     log_depth: Float[Tensor, "b k h w"], video: PosedVideo
 ) -> tuple[Float[Tensor, "b k h w"], Float[Tensor, "b k h w"]]:
     """Logarithm of depth that the video agrees with, and a confidence from 0 to 1."""
-    key_rgb = window_mean(video.key_rgb.flatten(0, 1).float(), BLUR_PX)
-    cameras, others = flat_cameras(video.key_cameras), list(_other_frames(video))
+    key_rgb = blurred_key_frames(video)
+    cameras, others = flat_cameras(video.key_cameras), list(other_frames(video))
     first = log_depth.flatten(0, 1)
     correction, curvature = torch.zeros_like(first), torch.zeros_like(first)
     for _ in range(STEPS):
@@ -61,46 +50,22 @@ def parallax_depth(
     return (first + correction).unflatten(0, batch), confidence.unflatten(0, batch)
 
 
-def _other_frames(video: PosedVideo) -> Iterator[_OtherFrames]:
-    count, batch = video.rgb.shape[2], len(video.rgb)
-    for distance in (sign * length for length in DISTANCES for sign in (1, -1)):
-        frames = video.keys + distance
-        exists = (frames >= 0) & (frames < count)
-        if not exists.any():
-            continue
-        frames = frames.clamp(0, count - 1)
-        rgb = video.rgb[:, :, frames].transpose(1, 2).flatten(0, 1).float()
-        yield _OtherFrames(
-            rgb=window_mean(rgb, BLUR_PX),
-            cameras=flat_cameras(camera_frames(video.cameras, frames)),
-            exists=exists.repeat(batch),
-        )
-
-
 def _equation(
     log_depth: Float[Tensor, "n h w"],
     key_rgb: Float[Tensor, "n 3 h w"],
     cameras: Camera,
-    others: list[_OtherFrames],
+    others: list[OtherFrames],
 ) -> tuple[Float[Tensor, "n h w"], Float[Tensor, "n h w"]]:
     """Slope and curvature of half the squared error, averaged over the window."""
     slope, curvature = torch.zeros_like(log_depth), torch.zeros_like(log_depth)
     for other in others:
-        seen, visible = _seen_at(log_depth, cameras, other)
-        probed, _ = _seen_at(log_depth + PROBE, cameras, other)
+        seen, visible = other.colors_at(log_depth, cameras)
+        probed, _ = other.colors_at(log_depth + PROBE, cameras)
         derivative, error = (probed - seen) / PROBE, seen - key_rgb
         weight = _weight(error) * (visible & other.exists[:, None, None])
         slope = slope + weight * (derivative * error).sum(1)
         curvature = curvature + weight * derivative.square().sum(1)
     return _mean(slope, WINDOW_PX), _mean(curvature, WINDOW_PX)
-
-
-def _seen_at(
-    log_depth: Float[Tensor, "n h w"], cameras: Camera, other: _OtherFrames
-) -> tuple[Float[Tensor, "n 3 h w"], Bool[Tensor, "n h w"]]:
-    """Colours of the other frame where points at that depth are, and which it shows."""
-    pixels, relative = other_pixels(cameras, other.cameras, (-log_depth).exp()[:, None])
-    return sampled(other.rgb, pixels)[:, :, 0], inside(pixels, relative)[:, 0]
 
 
 def _weight(error: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n h w"]:

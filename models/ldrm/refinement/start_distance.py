@@ -38,12 +38,20 @@ def with_start_distance(
         return video
     with torch.autocast(video.rgb.device.type, enabled=False):
         raw = _prior_distance(video, prior)
-        depth = key_depth(raw, config.activation)
-        log_depth, confidence = parallax_depth(depth.log(), video)
+        first = key_depth(raw, config.activation).log()
+        log_depth, confidence = parallax_depth(first, video)
         ratio = log_depth - math.log(PLANE_DEPTH)
         parallax = raw_log_ratio(ratio, config.activation.log_distance_limit)
     start = StartDistance(prior=raw, parallax=parallax, confidence=confidence)
     return replace(video, start=start)
+
+
+@torch.no_grad()
+def prior_log_depth(
+    video: PosedVideo, prior: DepthPrior, config: ModelConfig
+) -> Float[Tensor, "b k h w"]:
+    """Natural logarithm of z of the key frames by the depth prior alone."""
+    return key_depth(_prior_distance(video, prior), config.activation).log()
 
 
 def _prior_distance(video: PosedVideo, prior: DepthPrior) -> Float[Tensor, "b k h w"]:

@@ -6,50 +6,16 @@ from dataclasses import replace
 import pytest
 import torch
 from depth_priors import DistanceOf
-from torch import Tensor
+from plane_videos import DEPTH, INNER, SIZE, plane_video, sliding_cameras
 
-from diff4splat.geometry.camera import Camera, pinhole
+from diff4splat.geometry.camera import Camera
 from diff4splat.models.config.sizes import small_size
-from diff4splat.models.ldrm.refinement import parallax
+from diff4splat.models.ldrm.refinement import other_frames, parallax
 from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.parallax import LONGEST_STEP, STEPS, parallax_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
 from diff4splat.models.ldrm.refinement.start_distance import with_start_distance
 from diff4splat.models.ldrm.refinement.window_mean import window_mean
-
-SIZE, FOCAL_PX, DEPTH = (48, 64), 60.0, 5.0
-INNER = (..., slice(12, -12), slice(12, -12))
-
-
-def texture(x: Tensor, y: Tensor) -> Tensor:
-    """Smooth colours of a point (x, y) of the plane."""
-    waves = [
-        torch.sin(3.1 * x + 1.3 * y),
-        torch.sin(2.3 * y - 1.1 * x + 1),
-        torch.cos(2.7 * x) * torch.sin(2.9 * y),
-    ]
-    return 0.5 + 0.4 * torch.stack(waves)
-
-
-def plane_video(step: float, frames: int = 9, bare: float = 0.0) -> PosedVideo:
-    """A camera that moves sideways by ``step`` a frame before a plane at DEPTH.
-
-    Within ``bare`` of its middle the plane has one colour.
-    """
-    rows, columns = (torch.arange(side) + 0.5 for side in SIZE)
-    y, x = torch.meshgrid(rows, columns, indexing="ij")
-    x, y = (x - SIZE[1] / 2) * DEPTH / FOCAL_PX, (y - SIZE[0] / 2) * DEPTH / FOCAL_PX
-    views = [(x + step * frame, y) for frame in range(frames)]
-    near = [((x.square() + y.square()) < bare**2)[None] for x, y in views]
-    images = [torch.where(one, 0.5, texture(*view)) for one, view in zip(near, views, strict=True)]
-    rgb = torch.stack(images, 1)
-    return PosedVideo(rgb=rgb[None], cameras=cameras(step, frames))
-
-
-def cameras(step: float, frames: int) -> Camera:
-    poses = torch.eye(4).repeat(1, frames, 1, 1)
-    poses[..., 0, 3] = step * torch.arange(frames)
-    return pinhole(FOCAL_PX, SIZE).with_pose(poses)
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
@@ -88,7 +54,7 @@ def test_where_there_is_no_texture_the_correction_is_that_of_the_neighbourhood()
 def test_extreme_depths_and_cameras_give_finite_bounded_corrections(
     log_depth: float, step: float
 ) -> None:
-    video = replace(plane_video(0.05), cameras=cameras(step, 9))
+    video = replace(plane_video(0.05), cameras=sliding_cameras(step, 9))
     start = torch.full((1, 3, *SIZE), log_depth)
     found, confidence = parallax_depth(start, video)
     assert bool(found.isfinite().all()) and bool(confidence.isfinite().all())
@@ -105,9 +71,9 @@ def test_frames_that_do_not_belong_together_change_depth_by_bounded_steps() -> N
 def test_frames_beyond_the_ends_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     video, start = plane_video(0.05), torch.full((1, 3, *SIZE), 1.2 * DEPTH).log()
     usual = parallax_depth(start, video)[0][:, 1]
-    monkeypatch.setattr(parallax, "DISTANCES", (2, 4, 8, 16))
+    monkeypatch.setattr(other_frames, "DISTANCES", (2, 4, 8, 16))
     torch.testing.assert_close(parallax_depth(start, video)[0][:, 1], usual)
-    monkeypatch.setattr(parallax, "DISTANCES", (2, 4))
+    monkeypatch.setattr(other_frames, "DISTANCES", (2, 4))
     torch.testing.assert_close(parallax_depth(start, video)[0][:, 1], usual)
 
 
