@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from diff4splat.models.hub.model import Model
     from diff4splat.progress.run_log import RunLog
 
-UNIT_UNKNOWN = (
-    "the camera moves too little to show distances; give --median-depth if you know it"
-)
+UNIT_UNKNOWN = "the camera moves too little to show distances; give --median-depth if you know it"
 
 
 @dataclass(frozen=True, kw_only=True)
