@@ -3,14 +3,14 @@
 DATA ── read_capture ── fit_scene (coarse, fine) ── write_results
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.options.capture import CaptureOptions
+from diff4splat.cli.options.capture import CaptureOptions, inputs_for_card
 from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.device import render_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
@@ -123,7 +123,7 @@ class Fit:
             result=result,
             capture=request.capture,
             settings=settings,
-            inputs=self.inputs(),
+            inputs=inputs_for_card(self),
             forecast=forecast,
         )
         scene, scene_file = write_results(report, self.out, log, self.compression)
@@ -242,14 +242,6 @@ class Fit:
         from diff4splat.io.scene_files.scene_file import load_scene
 
         return None if self.init is None else load_scene(self.init)
-
-    def inputs(self) -> dict[str, object]:
-        """All options as given, for ``card.json``."""
-        given = {name: value for name, value in asdict(self).items() if name != "options"}
-        given |= asdict(self.options)
-        return {
-            name: str(value) if isinstance(value, Path) else value for name, value in given.items()
-        }
 
 
 def closing_lines(report: "FitReport") -> list[str]:

@@ -1,7 +1,6 @@
 """``diff4splat reconstruct``: from a folder with cameras to a scene in their world."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +108,7 @@ def test_without_a_depth_prior_it_says_that_the_unit_is_not_shown(
 
 def test_a_clip_is_read_as_fit_reads_it(tmp_path: Path) -> None:
     with ShardWriter(tmp_path / "clips", ShardOptions(generator="test 1")) as writer:
-        writer.write(replace(textured_clip(FRAMES)))
+        writer.write(textured_clip(FRAMES))
     options = ("--model", "test", "--resolution", "32", "--frames", "5")
     assert reconstruct(tmp_path / "clips", tmp_path / "out", *options) == 0
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from diff4splat.cli.options.constraints import Number
 
 if TYPE_CHECKING:
+    from diff4splat.cli.fit import Fit
+    from diff4splat.cli.scenes.reconstruct import Reconstruct
     from diff4splat.data.capture.capture import Capture
 
 
@@ -33,3 +35,10 @@ class CaptureOptions:
         from diff4splat.data_prep.readers.registry import read_capture
 
         return read_capture(data, ReadOptions(**asdict(self)))
+
+
+def inputs_for_card(command: "Fit | Reconstruct") -> dict[str, object]:
+    """All options of a command as given, those of its capture among them, for ``card.json``."""
+    given = {name: value for name, value in asdict(command).items() if name != "options"}
+    given |= asdict(command.options)
+    return {name: str(value) if isinstance(value, Path) else value for name, value in given.items()}

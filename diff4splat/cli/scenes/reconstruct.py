@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from diff4splat.cli.options.capture import CaptureOptions
+from diff4splat.cli.options.capture import CaptureOptions, inputs_for_card
 from diff4splat.cli.options.constraints import InputPath, Number, OutFolder
 from diff4splat.cli.options.device import require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
@@ -155,17 +155,12 @@ class Reconstruct:
                     folder, made, record, facts, log.phases, self.compression
                 )
                 notes = movie.finish()
-            inputs = self.inputs() | {"quality": asdict(quality), "scale": asdict(result.scale)}
+            inputs = inputs_for_card(self) | {
+                "quality": asdict(quality),
+                "scale": asdict(result.scale),
+            }
             write_card(folder / "card.json", made, inputs, log, scene_file)
         return [*notes, *(f"{name}: {value}" for name, value in facts)]
-
-    def inputs(self) -> dict[str, object]:
-        """All options as given, for ``card.json``."""
-        given = {name: value for name, value in asdict(self).items() if name != "options"}
-        given |= asdict(self.options)
-        return {
-            name: str(value) if isinstance(value, Path) else value for name, value in given.items()
-        }
 
 
 def facts_of(

@@ -1,6 +1,7 @@
 """A video with known cameras as the networks see it: some of its frames, at one small size.
 
-Axes: ``f`` frames, ``g`` other frames, ``n`` all frames of the camera, ``h w`` pixels.
+Axes: ``f`` frames, ``g`` other frames, ``n`` all frames of the camera, ``m`` some of them,
+``h w`` pixels.
 """
 
 from dataclasses import dataclass
@@ -112,6 +113,12 @@ def frames_of_camera(capture: Capture, camera: int | None = None) -> Int[Tensor,
     return index[later]
 
 
+def evenly(index: Int[Tensor, " n"], most: int) -> Int[Tensor, " m"]:
+    """At most so many of them, the first and the last among them."""
+    count = min(len(index), most)
+    return index[torch.linspace(0, max(len(index) - 1, 0), count).round().long()]
+
+
 def _spread(index: Int[Tensor, " n"], frames: int) -> Int[Tensor, " f"]:
     """The largest 1 + 4 k of at most ``frames`` frames, evenly."""
     if len(index) < LEAST_FRAMES:
@@ -121,7 +128,7 @@ def _spread(index: Int[Tensor, " n"], frames: int) -> Int[Tensor, " f"]:
         )
     most = min(len(index), frames)
     count = 1 + TIME_STRIDE * ((most - 1) // TIME_STRIDE)
-    return index[torch.linspace(0, len(index) - 1, count).round().long()]
+    return evenly(index, count)
 
 
 def _require_pinholes(capture: Capture) -> None:

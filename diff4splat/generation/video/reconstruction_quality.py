@@ -6,9 +6,11 @@ Axes: ``h w`` pixels.
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from diff4splat.data.capture.capture import Capture
-from diff4splat.generation.inputs.input_video import InputVideo, VideoChoice, read_image
+from diff4splat.generation.inputs.input_video import InputVideo, VideoChoice, evenly, read_image
 from diff4splat.metrics.image import psnr
 from diff4splat.outputs.card import BEST_PSNR_DB
 from diff4splat.render.api import render
@@ -38,27 +40,22 @@ def measure_quality(
     Raises:
         FileFormatError: a frame cannot be read.
     """
-    others = _spread(video.other_index.tolist())
-    values = [_psnr_db(scene, capture, number, choice) for number in others]
-    seen = [_psnr_db(scene, capture, number, choice) for number in _spread(video.index.tolist())]
+    places = evenly(torch.arange(len(video.index)), MOST_FRAMES).tolist()
+    times_s = video.path.times_s.tolist()
+    seen = [_psnr_db(scene, times_s[place], video.rgb[place]) for place in places]
+    others = [
+        _psnr_db(scene, float(capture.times_s[number]), read_image(capture, number, choice).rgb)
+        for number in evenly(video.other_index, MOST_FRAMES).tolist()
+    ]
     return ReconstructionQuality(
         input_frames_db=sum(seen) / len(seen),
-        other_frames_db=sum(values) / len(values) if values else None,
-        other_frames=len(values),
+        other_frames_db=sum(others) / len(others) if others else None,
+        other_frames=len(others),
     )
 
 
-def _psnr_db(scene: Scene, capture: Capture, number: int, choice: VideoChoice) -> float:
-    """Of one frame, by its time."""
-    time_s = float(capture.times_s[number])
+def _psnr_db(scene: Scene, time_s: float, truth: Float[Tensor, "h w 3"]) -> float:
+    """Of the frame of the path at that time."""
     place = int((scene.path.times_s - time_s).abs().argmin())
     view = render(scene, scene.path.cameras[place], float(scene.path.times_s[place]))
-    truth = read_image(capture, number, choice).rgb
     return min(float(psnr(view.rgb.clamp(0, 1), truth)), BEST_PSNR_DB)
-
-
-def _spread(numbers: list[int]) -> list[int]:
-    """At most MOST_FRAMES of them, evenly."""
-    count = min(len(numbers), MOST_FRAMES)
-    places = torch.linspace(0, len(numbers) - 1, count).round().long().tolist() if count else []
-    return [numbers[place] for place in places]
