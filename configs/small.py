@@ -23,6 +23,7 @@ from diff4splat.training.recipe.losses import (
     DepthLosses,
     DynamicLosses,
     FlowLosses,
+    ImageClassifierLosses,
     MotionDiffusionLosses,
     MotionLosses,
     ObjectMaskLosses,
@@ -75,6 +76,7 @@ def small_recipe() -> Recipe:
             video,
             _motion_diffusion(video),
             _object_mask(video),
+            _image_classifier(video),
         ),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
@@ -213,6 +215,22 @@ def _object_mask(video: StageRecipe) -> StageRecipe:
         optimizer=OptimizerSettings(
             learning_rate=1e-3, warmup_steps=200, part_rates=(("object_mask.backbone", 0.1),)
         ),
+        data=replace(video.data, keyframes_only=True),
+        text_dropout=0.0,
+        public_backbone=True,
+    )
+
+
+def _image_classifier(video: StageRecipe) -> StageRecipe:
+    """After the object mask, which it corrects: few weights, of which none sees its neighbours."""
+    return replace(
+        video,
+        name="image_classifier",
+        kind="image_classifier",
+        steps=600,
+        trained=("image_classifier",),
+        losses=ImageClassifierLosses(),
+        optimizer=OptimizerSettings(learning_rate=5e-3, warmup_steps=50),
         data=replace(video.data, keyframes_only=True),
         text_dropout=0.0,
         public_backbone=True,

@@ -19,6 +19,7 @@ from diff4splat.models.cogvideox.vae import CogVideoXVae
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
+from diff4splat.models.image_classifier.network import ImageClassifier
 from diff4splat.models.image_encoder.clip import ClipImageEncoder
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
@@ -91,6 +92,7 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
             object_mask=motion.object_mask,
         ),
         "object_mask": lambda: _object_mask(config),
+        "image_classifier": ImageClassifier,
         "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 

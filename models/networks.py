@@ -10,6 +10,7 @@ from diff4splat.models.protocols import (
     DeformationMaps,
     DepthPrior,
     GaussianMaps,
+    ImageClasses,
     ImageStates,
     MotionPrior,
     ObjectMask,
@@ -32,6 +33,7 @@ class Networks:
     motion_unet: MotionPrior | None = None
     image_encoder: ImageStates | None = None
     object_mask: ObjectMask | None = None
+    image_classifier: ImageClasses | None = None
 
     def parts(self) -> list[tuple[str, Any]]:
         """(name, network) of the parts that exist."""
@@ -70,4 +72,6 @@ def model_parts(config: ModelConfig) -> tuple[str, ...]:
         absent.add("motion_unet")
     if not config.object_mask.used:
         absent.add("object_mask")
+    if not config.object_mask.image_classifier:
+        absent.add("image_classifier")
     return tuple(part for part in PARTS if part not in absent)

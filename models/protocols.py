@@ -69,6 +69,14 @@ class MotionPrior(Protocol):
 
 
 @runtime_checkable
+class ImageClasses(Protocol):
+    """As ``ImageClassifier``."""
+
+    def __call__(self, image: Tensor, mask_logits: Tensor, classes: Tensor) -> Tensor:
+        """Logits of an object mask, corrected where prompts name classes."""
+
+
+@runtime_checkable
 class ObjectMask(Protocol):
     """As ``ObjectMaskNet``."""
 

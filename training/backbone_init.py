@@ -3,13 +3,17 @@
 from collections.abc import Sequence
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.image_backbone.public_weights import public_backbone_weights
+from diff4splat.models.image_backbone.public_weights import (
+    public_backbone_weights,
+    public_classifier_weights,
+)
 from diff4splat.models.image_backbone.unet import BackboneUNet
+from diff4splat.models.image_classifier.network import ImageClassifier
 from diff4splat.models.networks import Networks
 
 
 def start_from_public_backbones(networks: Networks, parts: Sequence[str]) -> None:
-    """Fill the backbone of every one of ``parts``.
+    """Fill the backbone of every one of ``parts``, or the classifier.
 
     Raises:
         ConfigError: a part has no image backbone.
@@ -17,6 +21,9 @@ def start_from_public_backbones(networks: Networks, parts: Sequence[str]) -> Non
     """
     for part in parts:
         network = getattr(networks, part)
+        if isinstance(network, ImageClassifier):
+            network.cells.load_state_dict(public_classifier_weights())
+            continue
         if not isinstance(network, BackboneUNet):
             raise ConfigError(
                 f"public_backbone: expected parts on the image backbone, got {part}; set "

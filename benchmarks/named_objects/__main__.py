@@ -10,17 +10,19 @@ auc       an object has a higher most probable pixel than an absent one has
 
 ``--unknown-nouns`` asks by colour and a noun that no training shows, ``--objects 99`` for every
 object of an image in place of two, ``--without-instances`` does not share probabilities among the
-pixels of one object.
+pixels of one object, ``--without-classifier`` leaves the image classifier out.
 """
 
 import argparse
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from benchmarks.named_objects.requests import OBJECTS, AskedImage, asked_image
+from diff4splat.captions.image_classes.prompt_classes import prompt_classes
 from diff4splat.data.clip_folder import ClipFolder
 from diff4splat.generation.inputs.input_image import InputImage, downsample, enlarged
 from diff4splat.generation.motion.motion_mask import MotionProbability, motion_probability
@@ -40,7 +42,8 @@ def motion_of(model: Model, rgb: Tensor, sentence: str) -> MotionProbability:
     camera = pinhole(float(rgb.shape[1]), tuple(rgb.shape[:2]))
     image = InputImage(rgb=rgb, camera=camera, focal_source="")
     text = model.networks.text_encoder.encode_prompt(sentence)
-    request = MotionRequest(text=text, seed=0, settings=GenerationSettings())
+    classes = prompt_classes(sentence)
+    request = MotionRequest(text=text, seed=0, settings=GenerationSettings(), classes=classes)
     return motion_probability(motion_prior(model.networks), image, 2, request)
 
 
@@ -106,10 +109,13 @@ def main() -> None:
     parser.add_argument("--unknown-nouns", action="store_true")
     parser.add_argument("--objects", type=int, default=OBJECTS)
     parser.add_argument("--without-instances", action="store_true")
+    parser.add_argument("--without-classifier", action="store_true")
     options = parser.parse_args()
     model, folder = load_model(options.model, parts=MOTION_PARTS), ClipFolder(options.clips)
     if options.without_instances:
         model.networks.object_mask.instances = None
+    if options.without_classifier:
+        model = replace(model, networks=replace(model.networks, image_classifier=None))
     count = min(len(folder), options.most)
     asking = {"unknown_nouns": options.unknown_nouns, "most_objects": options.objects}
     images = [asked_image(folder.clip(index), **asking) for index in range(count)]

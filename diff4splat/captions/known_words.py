@@ -1,4 +1,4 @@
-"""The words of a prompt that the motion prior and the object mask know: those of their captions.
+"""The words of a prompt that the networks know: those of captions, and nouns of ImageNet's classes.
 
 A prompt moves something if it has a word for an object (a noun or a colour) and one for a motion (a
 verb or a direction). A colour is enough, even beside a noun that the model does not know. Endings
@@ -12,6 +12,7 @@ from functools import cache
 
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.cutout_nouns import KNOWN_NOUNS
+from diff4splat.captions.image_classes.class_nouns import noun_classes
 from diff4splat.captions.synonyms import (
     ANY_OBJECT,
     COLOR_SYNONYMS,
@@ -68,10 +69,13 @@ def read_prompt(prompt: str) -> PromptWords:
     """Sort the words of ``prompt``; function words and places are left out."""
     objects, motions, others = _stems()
     words = re.findall(r"[^\W\d_]+", prompt.casefold())
+    unknown = [word for word in words if stem(word) not in objects | motions | others]
+    # What the image classifier knows, but no caption of training has.
+    classes = {word for word in unknown if noun_classes(word)}
     return PromptWords(
-        objects=tuple(word for word in words if stem(word) in objects),
+        objects=tuple(word for word in words if stem(word) in objects or word in classes),
         motions=tuple(word for word in words if stem(word) in motions),
-        unknown=tuple(word for word in words if stem(word) not in objects | motions | others),
+        unknown=tuple(word for word in unknown if word not in classes),
     )
 
 

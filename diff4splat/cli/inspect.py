@@ -65,12 +65,18 @@ class Inspect:
 
 def word_lines(_: Path) -> list[str]:
     """What the motion prior knows, by kind."""
+    from diff4splat.captions.image_classes.class_nouns import classes_of_nouns
     from diff4splat.captions.known_words import known_words
 
     lists = (f"{kind:<12}{', '.join(words)}" for kind, words in known_words().items())
     lines = [part for line in lists for part in wrap(line, 100, subsequent_indent=12 * " ")]
     example = "the red car moves to the left"
-    return [*lines, f"A prompt names an object or a colour, and a motion or a direction: {example}"]
+    count = len(classes_of_nouns())
+    return [
+        *lines,
+        f"{count:,} nouns of ImageNet's classes count as objects, too: kangaroo, teapot",
+        f"A prompt names an object or a colour, and a motion or a direction: {example}",
+    ]
 
 
 def size_lines(name: str) -> list[str]:

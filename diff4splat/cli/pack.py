@@ -15,7 +15,7 @@ MEGABYTE = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class Pack:
-    """Write the trained parts of a model in half precision, with provenance and checksums."""
+    """Write the trained parts of a model in half precision or less, with provenance and sums."""
 
     model: Annotated[Path, tyro.conf.Positional]
     """Model folder, such as run/model."""
@@ -23,6 +23,8 @@ class Pack:
     """Folder for the exported model; an existing CARD.md is kept."""
     parts: tuple[str, ...] = ()
     """Parts to export, such as vae ldrm. Default: all parts whose training is complete."""
+    eight_bit: tuple[str, ...] = ()
+    """Parts to store in eight bits, half the size, such as dit."""
     license: str = "not stated"
     """Licence of the weights, as an SPDX name such as Apache-2.0."""
     origin: str = "not stated"
@@ -40,6 +42,7 @@ class Pack:
             license=self.license,
             origin=self.origin,
             parts=self.parts or None,
+            eight_bit=self.eight_bit,
         )
         total = sum(packed.bytes_by_part.values())
         for name, size in {**packed.bytes_by_part, "total": total}.items():

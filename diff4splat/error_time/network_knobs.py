@@ -30,7 +30,10 @@ PRECISIONS = ("float32", "bfloat16", "float16", "int8", *COMPUTED)
 RUNTIMES = ("PyTorch", *(f"ONNX Runtime {name}" for name in ("float32", "float16", "int8")))
 FILL_PARTS = ("dit", "vae", "ldrm")
 """Networks that run only where the video model fills."""
-NETWORKS = ("text_encoder", "monocular_depth", "motion_unet", "object_mask", "dit", "vae", "ldrm")
+NETWORKS = (
+    *("text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"),
+    *("dit", "vae", "ldrm"),
+)
 RGB_UNIT = "RMSE of RGB in [0, 1]"
 
 

@@ -17,6 +17,7 @@ import torch
 
 from diff4splat import __version__
 from diff4splat.captions.events import moving_events
+from diff4splat.captions.image_classes.prompt_classes import prompt_classes
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.copies import Copies
@@ -143,8 +144,10 @@ class Diff4SplatPipeline:
         with one_thread(), self._autocast():
             text = self._text_states(request, log)
             motions = [
-                MotionRequest(text=event, seed=request.seed, settings=request.settings)
-                for event in text.events
+                MotionRequest(
+                    text=event, seed=request.seed, settings=request.settings, classes=classes
+                )
+                for event, classes in zip(text.events, text.event_classes, strict=True)
             ]
             maps = image_maps(model, copies, frames, motions, log)
         request = sized_to_depth(request, maps.depth)
@@ -234,11 +237,13 @@ class Diff4SplatPipeline:
             if request.prompt is None:
                 return states
             prompt = encode(request.prompt)
-            events = [
-                prompt if event == request.prompt else encode(event)
-                for event in moving_events(request.prompt)
-            ]
-            return replace(states, prompt=prompt, events=tuple(events))
+            events = moving_events(request.prompt)
+            return replace(
+                states,
+                prompt=prompt,
+                events=tuple(prompt if one == request.prompt else encode(one) for one in events),
+                event_classes=tuple(map(prompt_classes, events)),
+            )
 
     def _provenance(self, request: Request) -> Provenance:
         return Provenance(

@@ -5,6 +5,7 @@
     motion prior         if the model has one and a prompt asks for motion in words that it knows;
                          else the image is static
     object mask          with the motion prior
+    image classifier     with the object mask, if the prompt has a noun that it knows
     text encoder         if a prompt is given and something takes it
     VAE, DiT, LDRM       only where hidden regions are filled by the video model
     deformation          only where such a fill may move
@@ -21,8 +22,8 @@ from diff4splat.models.hub.model import Model, parameter_counts
 from diff4splat.models.networks import model_parts
 from diff4splat.progress.run_log import RunLog
 
-MOTION_PARTS = ("text_encoder", "motion_unet", "object_mask")
-"""What a prompt that moves something needs; some models have no object mask."""
+MOTION_PARTS = ("text_encoder", "motion_unet", "object_mask", "image_classifier")
+"""What a prompt that moves something needs; some models have no object mask or classifier."""
 FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 """What fills hidden regions by video; some public models also have an image encoder."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
@@ -31,6 +32,7 @@ REMOVED = "it is left out on request"
 CHOICES = (WORSE_FILL, DEPTH_GIVEN, REMOVED)
 """Reasons that are choices: the part would give another scene."""
 NO_MOTION = "no prompt asks for motion"
+NO_CLASS = "the prompt has no noun that it knows"
 UNTRAINED_FILL = "the video model is not trained"
 
 
@@ -49,6 +51,8 @@ class RequestFacts:
     """Whether the request brings its depth along."""
     static_prompt: str = ""
     """Why a trained motion prior finds no motion in the prompt; empty where it may."""
+    names_class: bool = False
+    """Whether the prompt has a noun that the image classifier knows."""
     without: tuple[str, ...] = ()
     """Networks that stay out on request: ablations."""
 
@@ -128,6 +132,12 @@ def plan_generation(
     # What moves and how it moves belong together.
     reasons["object_mask"] = (
         reasons["motion_unet"] or _untrained("object_mask", trained) or facts.removed("object_mask")
+    )
+    reasons["image_classifier"] = (
+        reasons["object_mask"]
+        or _untrained("image_classifier", trained)
+        or facts.removed("image_classifier")
+        or ("" if facts.names_class else NO_CLASS)
     )
     reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:

@@ -45,6 +45,8 @@ class ObjectMaskConfig:
     """Whether it has a second encoder, the image backbone (ADR 32)."""
     instance_channels: int = 0
     """Of the vectors that separate instances, 2 or more; 0 leaves them out (ADR 36)."""
+    image_classifier: bool = False
+    """Whether a public image classifier corrects it for nouns that it knows (ADR 44)."""
 
     def __post_init__(self) -> None:
         for name in ("width", "instance_channels"):
@@ -53,6 +55,9 @@ class ObjectMaskConfig:
         expected = "0, or 2 or more with an object mask"
         require(fits, "ObjectMaskConfig.instance_channels", expected, self.instance_channels)
         _require_backbone_fits(self)
+        fits = self.used or not self.image_classifier
+        where = "ObjectMaskConfig.image_classifier"
+        require(fits, where, "false without an object mask", self.image_classifier)
 
     @property
     def used(self) -> bool:

@@ -68,7 +68,9 @@ def small_size() -> ModelConfig:
             channels=32, photo_scale=2, image_backbone=True, uncertainty=True
         ),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
-        object_mask=ObjectMaskConfig(width=24, image_backbone=True, instance_channels=12),
+        object_mask=ObjectMaskConfig(
+            width=24, image_backbone=True, instance_channels=12, image_classifier=True
+        ),
         default_fill="none",
         default_guidance=1.0,
     )

@@ -1,4 +1,4 @@
-"""A trained model as a folder to share: trained parts in half precision, with sums.
+"""A trained model as a folder to share: trained parts in half precision or less, with sums.
 
     RUN/model (float32, all parts) ─► config.json  provenance.json  <part>.safetensors  SHA256SUMS
 
@@ -42,8 +42,11 @@ def export_model(
     license: str,
     origin: str,
     parts: Collection[str] | None = None,
+    eight_bit: Collection[str] = (),
 ) -> Packed:
     """Write ``parts`` of a model, or its trained ones, and nothing of the others.
+
+    Those in ``eight_bit`` take half the room (``models.hub.eight_bit``).
 
     Raises:
         ConfigError: nothing is trained, or a named part has only random weights.
@@ -52,6 +55,7 @@ def export_model(
     """
     chosen = frozenset(model.trained if parts is None else parts)
     _require_weights(model, chosen)
+    _require_written(eight_bit, chosen)
     complete = with_parts(model, chosen)
     named = [(name, part) for name, part in complete.networks.parts() if name in chosen]
     for name, part in named:
@@ -59,7 +63,7 @@ def export_model(
     provenance = ModelProvenance(trained=chosen, license=license, origin=origin)
     owned = (CONFIG_FILE, PROVENANCE_FILE, SUMS_FILE, *(part_file(Path(), p).name for p in PARTS))
     with atomic_folder(folder, owned) as staging:
-        save_networks(complete.networks, model.config, staging, PACKED_TYPE, chosen)
+        save_networks(complete.networks, model.config, staging, PACKED_TYPE, chosen, eight_bit)
         write_provenance(provenance, staging)
         write_sums(staging)
         sizes = {name: part_file(staging, name).stat().st_size for name, _ in named}
@@ -78,6 +82,14 @@ def require_half_precision(part: nn.Module, name: str) -> None:
                 f"{name} weights: expected numbers of at most {LARGEST:g} in {key}, "
                 f"got {float(value.abs().max()):g}; half precision cannot hold them, train it again"
             )
+
+
+def _require_written(eight_bit: Collection[str], chosen: Collection[str]) -> None:
+    if others := sorted(set(eight_bit) - set(chosen)):
+        raise ConfigError(
+            f"eight bits: expected parts that are exported ({', '.join(sorted(chosen))}), "
+            f"got {', '.join(others)}"
+        )
 
 
 def _require_weights(model: Model, chosen: Collection[str]) -> None:

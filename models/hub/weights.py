@@ -3,8 +3,8 @@
     config.json  {vae,text_encoder,dit,ldrm,deformation,monocular_depth,motion_unet}.safetensors
 
 Reading is strict: every key and every shape must be that of the configuration. Weights
-may be stored in half precision; they are read into float32, but public ones are mapped
-(``mapped_weights.py``). Folders of version 1 are read too
+may be stored in half precision or eight bits (``eight_bit.py``); they are read into float32,
+but public ones are mapped (``mapped_weights.py``). Folders of version 1 are read too
 (``legacy.py``). provenance.py decides which parts may be absent.
 """
 
@@ -21,6 +21,7 @@ from diff4splat.io.require_file import is_file
 from diff4splat.io.scene_files.tensor_file import WEIGHT_DTYPES, read_tensors
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.eight_bit import from_eight_bits, to_eight_bits
 from diff4splat.models.hub.legacy import upgrade_tensors
 from diff4splat.models.hub.mapped_weights import map_weights, mapped_parts
 from diff4splat.models.hub.weight_files import (
@@ -42,8 +43,11 @@ def save_networks(
     folder: Path,
     dtype: torch.dtype = torch.float32,
     only: Collection[str] = PARTS,
+    eight_bit: Collection[str] = (),
 ) -> None:
-    """Write the parts in ``dtype``, and the configuration last: a folder with one is complete.
+    """Write the parts in ``dtype`` or ``eight_bit``, and the configuration last.
+
+    A folder with a configuration is complete.
 
     Raises:
         CheckpointError: a weight is NaN or infinite, in ``dtype``.
@@ -52,10 +56,11 @@ def save_networks(
     for name, part in networks.parts():
         if name not in only:
             continue
-        tensors = {
-            key: value.detach().cpu().to(dtype).contiguous()
-            for key, value in part.state_dict().items()
-        }
+        tensors = {key: value.detach().cpu() for key, value in part.state_dict().items()}
+        if name in eight_bit:
+            tensors = to_eight_bits(tensors)
+        else:
+            tensors = {key: value.to(dtype).contiguous() for key, value in tensors.items()}
         _require_finite(tensors, name)
         with atomic_path(part_file(folder, name)) as temporary:
             _save_readable(tensors, temporary)
@@ -98,7 +103,7 @@ def _read(path: Path) -> dict[str, Tensor]:
     if not is_file(path):
         raise CheckpointError(f"{path}: expected a weight file, got none; fetch the model again")
     try:
-        return read_tensors(path, WEIGHT_DTYPES)
+        return from_eight_bits(read_tensors(path, (*WEIGHT_DTYPES, "I8")))
     except FileFormatError as error:
         raise FileFormatError(
             f"{path}: expected safetensors, got a damaged file ({error}); fetch the model again"

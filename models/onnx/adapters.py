@@ -125,6 +125,15 @@ class OnnxObjectMask(OnnxPart):
         return found["mask_logits"], found.get("instances")
 
 
+class OnnxImageClassifier(OnnxPart):
+    """As ``ImageClassifier``."""
+
+    def __call__(self, image: Tensor, mask_logits: Tensor, classes: Tensor) -> Tensor:
+        """Logits of an object mask, corrected where prompts name classes."""
+        inputs = {"image": image, "mask_logits": mask_logits, "classes": classes}
+        return run_graph(self.model["image_classifier"], inputs)["corrected_logits"]
+
+
 class OnnxVae(OnnxPart):
     """As ``VideoVae``."""
 

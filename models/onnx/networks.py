@@ -9,6 +9,7 @@ from diff4splat.models.onnx.adapters import (
     OnnxDeformation,
     OnnxDepth,
     OnnxDit,
+    OnnxImageClassifier,
     OnnxLdrm,
     OnnxMotion,
     OnnxObjectMask,
@@ -26,8 +27,11 @@ ADAPTERS = {
     "monocular_depth": OnnxDepth,
     "motion_unet": OnnxMotion,
     "object_mask": OnnxObjectMask,
+    "image_classifier": OnnxImageClassifier,
 }
-FEW_THREADS = ("text_encoder", "monocular_depth", "motion_unet", "object_mask")
+FEW_THREADS = (
+    *("text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"),
+)
 """One thread: these decide about a scene by thresholds, and must not depend on the machine."""
 
 

@@ -1,7 +1,8 @@
-"""Graphs of the text encoder, the depth prior, the motion prior and the object mask."""
+"""Graphs of the text encoder and the networks that take one image and no video."""
 
 from torch import Tensor, nn
 
+from diff4splat.captions.image_classes.class_nouns import CLASSES
 from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import MOTION_CELL_PX
 from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
@@ -106,6 +107,25 @@ def object_mask_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
                 mask("text_mask", "batch", "tokens"),
             ),
             outputs=tuple(outputs),
+        )
+    ]
+
+
+def image_classifier_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """An image, logits of the object mask and classes of prompts to corrected logits."""
+    del config
+    size = _image_size(IMAGE_MULTIPLE_PX)
+    return [
+        GraphSource(
+            name="image_classifier",
+            part="image_classifier",
+            module=TensorFunction(network, lambda part, *inputs: (part(*inputs),)),
+            inputs=(
+                unit("image", "batch", 3, *size),
+                normal("mask_logits", "batch", "prompts", *size),
+                mask("classes", "batch", "prompts", CLASSES),
+            ),
+            outputs=(output("corrected_logits", "batch", "prompts", *size),),
         )
     ]
 

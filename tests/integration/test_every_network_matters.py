@@ -33,7 +33,9 @@ from diff4splat.scene.scene import Scene
 
 SIDE_PX = 64
 PROMPT = "the red box slides to the left"
-PRIORS = frozenset({"text_encoder", "monocular_depth", "motion_unet", "object_mask"})
+PRIORS = frozenset(
+    {"text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"}
+)
 VIDEO = frozenset({"vae", "dit", "ldrm", "deformation"})
 PARTS = sorted(PRIORS | VIDEO)
 
@@ -64,7 +66,7 @@ CASES = {
     ),
     "video, still": Case(
         prompt=PROMPT,
-        parts=(PRIORS | VIDEO) - {"motion_unet", "object_mask", "deformation"},
+        parts=(PRIORS | VIDEO) - {"motion_unet", "object_mask", "image_classifier", "deformation"},
         fill="video",
         still=True,
     ),

@@ -16,6 +16,7 @@ from diff4splat.training.batches.samples import ClipSamples
 from diff4splat.training.latents.latent_batch import LatentBatch, collate_latents
 from diff4splat.training.latents.latent_shards import LatentPack, read_packs, require_alike
 from diff4splat.training.recipe.data import SourceSettings
+from diff4splat.training.recipe.kinds import REQUEST_KINDS
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
@@ -80,7 +81,7 @@ def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples 
         )
     if encoded.pop():
         return LatentSamples(recipe, seed)
-    kind = RequestSamples if recipe.kind == "object_mask" else ClipSamples
+    kind = RequestSamples if recipe.kind in REQUEST_KINDS else ClipSamples
     return kind.open(recipe, seed)
 
 

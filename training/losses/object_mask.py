@@ -17,6 +17,8 @@ INSTANCE_WEIGHT = 4.0
 AREA_RANGE_PX = (80.0, 8000.0)
 """Areas beyond count as these: a small object's pixels weigh up to 4.5 times as much."""
 
+HIGHEST_PX = 80
+"""Of an image in which nothing is asked for."""
 NO_NAME_WEIGHT = 0.15
 """Of pixels of the ground, walls and the sky: most of an image."""
 UNKNOWN_NAME = 255
@@ -43,6 +45,15 @@ def dice_error(
     """
     truth = masks.flatten(2)
     return masked_mean(_dice(logits.flatten(2), truth), truth.any(-1))
+
+
+def absent_error(
+    logits: Float[Tensor, "b r h w"], masks: Bool[Tensor, "b r h w"]
+) -> Float[Tensor, " b"]:
+    """Cross-entropy of the most probable pixels, mean over prompts that ask for nothing."""
+    highest = logits.flatten(2).topk(min(HIGHEST_PX, logits[0, 0].numel()), -1).values
+    error = torch.nn.functional.softplus(highest).mean(-1)
+    return masked_mean(error, ~masks.flatten(2).any(-1))
 
 
 def _dice(logits: Float[Tensor, "b r p"], truth: Bool[Tensor, "b r p"]) -> Float[Tensor, "b r"]:

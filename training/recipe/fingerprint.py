@@ -92,6 +92,7 @@ _MODEL_ADDED = (
     "instance_channels",
     "uncertainty",
     "object_mask",
+    "image_classifier",
 )
 """Settings of networks that are off where they are empty or 0."""
 _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}

@@ -11,6 +11,7 @@ StageKind = Literal[
     "monocular_depth",
     "motion_diffusion",
     "object_mask",
+    "image_classifier",
     "video_diffusion",
     "video_distillation",
     "joint",
@@ -30,10 +31,13 @@ CAPTION_KINDS = (
     "video_distillation",
     "motion_diffusion",
     "object_mask",
+    "image_classifier",
     "joint",
 )
 """Kinds that read captions, which name left and right."""
-IMAGE_KINDS = ("motion_diffusion", "object_mask")
+REQUEST_KINDS = ("object_mask", "image_classifier")
+"""Kinds whose samples are images with many prompts."""
+IMAGE_KINDS = ("motion_diffusion", *REQUEST_KINDS)
 """Kinds that look at single images: clips need no frames but key frames."""
 LATENT_KINDS = ("video_diffusion", "video_distillation")
 """Kinds that can learn from encoded clips."""

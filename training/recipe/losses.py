@@ -154,6 +154,19 @@ class ObjectMaskLosses:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ImageClassifierLosses:
+    """Of the pixels that a prompt asks to move, corrected by the image classifier."""
+
+    cross_entropy: float = 3.0
+    """Mean over pixels."""
+    dice: float = 1.0
+    """1 − overlap, as in ``ObjectMaskLosses``."""
+    absent: float = 0.5
+    """Cross-entropy of the most probable pixels where nothing is asked for: the highest of all
+    decides whether anything moves."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointLosses:
     """Of the video diffusion model and the reconstruction together."""
 
@@ -172,6 +185,7 @@ Losses = (
     | DistillationLosses
     | MotionDiffusionLosses
     | ObjectMaskLosses
+    | ImageClassifierLosses
     | JointLosses
 )
 LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
@@ -184,6 +198,7 @@ LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
         "monocular_depth": DepthLosses,
         "motion_diffusion": MotionDiffusionLosses,
         "object_mask": ObjectMaskLosses,
+        "image_classifier": ImageClassifierLosses,
         "video_diffusion": FlowLosses,
         "video_distillation": DistillationLosses,
         "joint": JointLosses,

@@ -35,6 +35,9 @@ def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
     require(fits, f"{what}: model.motion_unet.width", "a motion network for its kind", 0)
     fits = stage.kind != "object_mask" or model.object_mask.used
     require(fits, f"{what}: model.object_mask.width", "an object mask for its kind", 0)
+    fits = stage.kind != "image_classifier" or model.object_mask.image_classifier
+    where = f"{what}: model.object_mask.image_classifier"
+    require(fits, where, "true for its kind", model.object_mask.image_classifier)
     needs = stage.kind == "object_mask" and stage.losses.instances
     fits = not needs or model.object_mask.instance_channels
     require(fits, f"{what}: model.object_mask.instance_channels", "2 or more for its loss", 0)

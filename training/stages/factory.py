@@ -6,6 +6,7 @@ from types import MappingProxyType
 from diff4splat.models.networks import Networks
 from diff4splat.training.recipe.kinds import StageKind
 from diff4splat.training.stages.kinds.dynamic import DynamicStage
+from diff4splat.training.stages.kinds.image_classifier import ImageClassifierStage
 from diff4splat.training.stages.kinds.joint import JointStage
 from diff4splat.training.stages.kinds.monocular_depth import MonocularDepthStage
 from diff4splat.training.stages.kinds.motion import MotionStage
@@ -28,6 +29,7 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "monocular_depth": MonocularDepthStage,
         "motion_diffusion": MotionDiffusionStage,
         "object_mask": ObjectMaskStage,
+        "image_classifier": ImageClassifierStage,
         "video_diffusion": VideoDiffusionStage,
         "video_distillation": VideoDistillationStage,
         "joint": JointStage,

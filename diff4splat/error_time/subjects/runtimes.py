@@ -20,7 +20,7 @@ from diff4splat.models.onnx_export.folder import ExportSettings, export_model
 from diff4splat.models.onnx_export.precision import convert_precision
 
 EAGER, FLOAT32 = "PyTorch", "float32"
-PARTS = ("text_encoder", "monocular_depth", "motion_unet", "object_mask")
+PARTS = ("text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier")
 """What a generation without video fill runs."""
 
 

@@ -68,7 +68,11 @@ class Generator:
         """Networks that run for an image with a prompt."""
         model, settings = self.pipeline.model, self.settings
         facts = RequestFacts(
-            prompt=True, fill=settings.fill, still=settings.still, without=settings.without
+            prompt=True,
+            fill=settings.fill,
+            still=settings.still,
+            names_class=True,
+            without=settings.without,
         )
         return plan_generation(model.config, model.trained, facts).parts
 

@@ -2,6 +2,8 @@
 
 from typing import Literal, get_args
 
-Network = Literal["depth", "motion", "object-mask", "text", "video", "ldrm", "deformation"]
+Network = Literal[
+    "depth", "motion", "object-mask", "image-classifier", "text", "video", "ldrm", "deformation"
+]
 """As on the command line, in the order of the table."""
 NETWORKS: tuple[Network, ...] = get_args(Network)

@@ -7,7 +7,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.captions.events import why_static
+from diff4splat.captions.events import moving_events, why_static
+from diff4splat.captions.image_classes.prompt_classes import prompt_classes
 from diff4splat.flow.guidance import DEFAULT_GUIDANCE
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.image_size import (
@@ -99,6 +100,7 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         frames=config.frames,
         depth_given=user.depth is not None,
         static_prompt="" if user.prompt is None else why_static(user.prompt),
+        names_class=any(map(prompt_classes, moving_events(user.prompt or ""))),
         without=settings.without,
     )
     plan = plan_generation(config, model.trained, facts)

@@ -74,7 +74,7 @@ def motion_probability(
     """
     rgb = image.rgb.movedim(-1, 0)[None]
     if request.text is not None and isinstance(network, MaskedMotion):
-        maps = network.object_maps(rgb, request.text)
+        maps = network.object_maps(rgb, request.text, request.classes)
         return MotionProbability(
             probability=_shared(maps, rgb),
             least_probability=LEAST_PROBABILITY,

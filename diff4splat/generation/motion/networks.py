@@ -1,17 +1,18 @@
 """The networks that decide about motion, as one prior.
 
-image, text ─ object mask ─ what moves
+image, text ─ object mask ─ image classifier ─ what moves
 image, noise, text, mask ─ motion U-Net ─ how
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.captions.image_classes.class_nouns import class_rows
 from diff4splat.models.networks import Networks
 from diff4splat.models.object_mask.enlarged import enlarged, reduced
-from diff4splat.models.protocols import MotionPrior, ObjectMask
+from diff4splat.models.protocols import ImageClasses, MotionPrior, ObjectMask
 
 LEAST_PROBABILITY = 0.4
 """Of the most probable pixel; below it nothing moves: the object is not there (chosen on validation
@@ -37,6 +38,7 @@ class MaskedMotion:
 
     motion_unet: MotionPrior
     object_mask: ObjectMask
+    image_classifier: ImageClasses | None = None
 
     def __call__(
         self,
@@ -63,18 +65,28 @@ class MaskedMotion:
         given = (image, noisy, level, text, text_mask, object_mask)
         return self.motion_unet.predict_motion_and_mask(*given)
 
-    def object_maps(self, image: Tensor, text: Tensor) -> ObjectMaps:
+    def object_maps(self, image: Tensor, text: Tensor, classes: tuple[int, ...] = ()) -> ObjectMaps:
         """What the text asks to move, as a mean with the mirror image, and vectors of instances.
 
-        Sides in a text are those of motion, so its object is the same in both.
+        Sides in a text are those of motion, so its object is the same in both. ``classes`` are
+        those of its nouns (``captions.image_classes``).
         """
         larger, size_px = enlarged(image), image.shape[-2:]
         logits, instances = self.object_mask.predict_mask_and_instances(larger, text)
         mirrored = self.object_mask(larger.flip(-1), text).flip(-1)
-        return ObjectMaps(
-            logits=reduced((logits + mirrored)[None] / 2, size_px)[0],
+        maps = ObjectMaps(
+            logits=reduced((logits + mirrored)[:, None] / 2, size_px)[:, 0],
             instances=None if instances is None else reduced(instances, size_px),
         )
+        return self._corrected(image, maps, classes) if classes else maps
+
+    def _corrected(self, image: Tensor, maps: ObjectMaps, classes: tuple[int, ...]) -> ObjectMaps:
+        """By the image classifier, if there is one."""
+        if self.image_classifier is None:
+            return maps
+        rows = class_rows([classes]).to(image.device)[None]
+        logits = self.image_classifier(image, maps.logits[:, None], rows)[:, 0]
+        return replace(maps, logits=logits)
 
 
 def motion_prior(networks: Networks) -> MotionPrior | None:
@@ -82,4 +94,6 @@ def motion_prior(networks: Networks) -> MotionPrior | None:
     motion, mask = networks.motion_unet, networks.object_mask
     if motion is None or mask is None:
         return motion
-    return MaskedMotion(motion_unet=motion, object_mask=mask)
+    return MaskedMotion(
+        motion_unet=motion, object_mask=mask, image_classifier=networks.image_classifier
+    )

@@ -31,6 +31,8 @@ class MotionRequest:
     """None without a prompt."""
     seed: int
     settings: GenerationSettings
+    classes: tuple[int, ...] = ()
+    """Of the prompt's nouns (``captions.image_classes``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -70,6 +70,8 @@ class TextStates:
     """What guidance leads away from; all there is for a model that needs text, without a prompt."""
     events: tuple[Float[Tensor, "1 _ d"] | None, ...] = (None,)
     """Of each event of the prompt; None without one."""
+    event_classes: tuple[tuple[int, ...], ...] = ((),)
+    """Of the nouns of every event (``captions.image_classes``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

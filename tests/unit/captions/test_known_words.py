@@ -58,7 +58,7 @@ def test_every_training_caption_is_known_word_by_word(
 @pytest.mark.parametrize(
     ("prompt", "reason"),
     [
-        ("an ostrich moves to the left", NO_OBJECT),
+        ("a zorkel moves to the left", NO_OBJECT),
         ("der Hund läuft nach links", NO_OBJECT),
         ("猫が歩く", NO_OBJECT),
         ("🚗💨", NO_OBJECT),
@@ -74,7 +74,7 @@ def test_every_training_caption_is_known_word_by_word(
         ("a gear is spinning", ONLY_IN_PLACE),
         ("nothing moves", ""),
         ("the blue one moves", ""),
-        ("the blue ostrich walks", ""),
+        ("the blue zorkel walks", ""),
         ("a purple contraption flies away", ""),
         ("the sofa beside the red car moves", ""),
     ],
@@ -93,14 +93,14 @@ def test_endings_do_not_count(forms: str) -> None:
 def test_a_trained_motion_prior_says_what_it_does_not_know() -> None:
     notes = partial(prompt_notes, model="small")
 
-    (line,) = notes("an ostrich sings")
+    (line,) = notes("a zorkel sings")
     assert "nothing moves: the prompt names no object" in line
     assert "diff4splat inspect words" in line
     unknown = "words of the prompt that the model does not know: {}"
-    assert notes("the red ostrich moves") == [unknown.format("ostrich")]
+    assert notes("the red zorkel moves") == [unknown.format("zorkel")]
     assert notes("the red car moves quickly") == [unknown.format("quickly")]
     assert notes("the red car moves to the left") == notes(None) == []
-    assert notes("an ostrich sings", model="test") == []
+    assert notes("a zorkel sings", model="test") == []
 
 
 def test_nouns_that_no_bundled_weights_know_count_as_unknown() -> None:

@@ -23,6 +23,7 @@ from diff4splat.progress.run_log import RunLog
 VIDEO = frozenset(FILL_PARTS)
 PRIORS = frozenset({"monocular_depth", "motion_unet", "object_mask", "text_encoder"})
 DEPTH = frozenset({"monocular_depth"})
+CLASSIFIER = frozenset({"image_classifier"})
 TABLE = [
     # size, trained, request, parts that run
     ("small", PARTS, {"prompt": True}, PRIORS),
@@ -41,6 +42,20 @@ TABLE = [
         (DEPTH | VIDEO | {"text_encoder"}) - {"deformation"},
     ),
     ("small", (), {"prompt": True}, PRIORS),
+    ("small", PARTS, {"prompt": True, "names_class": True}, PRIORS | CLASSIFIER),
+    ("small", PARTS, {"prompt": False, "names_class": True}, DEPTH),
+    (
+        "small",
+        PARTS,
+        {"prompt": True, "names_class": True, "without": ("image_classifier",)},
+        PRIORS,
+    ),
+    (
+        "small",
+        PARTS,
+        {"prompt": True, "names_class": True, "without": ("object_mask",)},
+        PRIORS - {"object_mask"},
+    ),
     ("small", (), {"prompt": True, "fill": "video"}, PRIORS | VIDEO),
     ("small", PARTS, {"prompt": True, "without": ("monocular_depth",)}, PRIORS - DEPTH),
     ("small", PARTS, {"prompt": True, "without": ("motion_unet",)}, DEPTH),
@@ -161,7 +176,7 @@ def test_the_log_says_why_a_network_does_not_run(
 
 def test_a_model_may_fill_by_default() -> None:
     filling = replace(config(), default_fill="video")
-    plan = plan_generation(filling, PARTS, RequestFacts(prompt=True))
+    plan = plan_generation(filling, PARTS, RequestFacts(prompt=True, names_class=True))
     assert plan.parts == frozenset(model_parts(filling)) and plan.skipped == ()
     assert not plan_generation(filling, PARTS, RequestFacts(prompt=True, fill="none")).fills
 

@@ -12,7 +12,9 @@ from torch import Tensor
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.cutout_nouns import ALL_NOUNS, CUTOUT_NOUNS, MESH_NOUNS
 from diff4splat.captions.grammar import NamedObject
+from diff4splat.captions.image_classes.class_nouns import classes_of_nouns, noun_classes
 from diff4splat.captions.random_draws import draw_share
+from diff4splat.captions.synonyms import names
 from diff4splat.captions.vocabulary import NOUNS, UNNAMED, UNSEEN_NOUNS
 from diff4splat.data.clip import ClipMetadata
 from diff4splat.data.clip_objects import PRESENT_SHARE, present_objects
@@ -20,18 +22,29 @@ from diff4splat.training.losses.object_mask import UNKNOWN_NAME
 
 AREA_SHARES = (0.003, 0.7)
 """Smallest and largest share of the image that an object is asked for with."""
+CLASS_NOUN_SHARE = 0.3
 TRAINING_NOUNS = tuple(noun for noun in NOUNS if noun not in UNSEEN_NOUNS)
 """Nouns that may be asked for where they are absent: one that is only ever asked for so would seem
 to be never there."""
 
 
 def absent_nouns(objects: list[NamedObject], generator: torch.Generator) -> tuple[str, ...]:
-    """Nouns to ask for where they are absent: those of cutouts half of the time beside cutouts."""
+    """Nouns to ask for where they are absent: those of cutouts half of the time beside cutouts.
+
+    Some are of ImageNet's classes that no object belongs to.
+    """
+    if draw_share(generator) < CLASS_NOUN_SHARE:
+        return _other_class_nouns(objects)
     shown = {one.noun for one in objects}
     has_meshes = not shown.isdisjoint(MESH_NOUNS)
     if (has_meshes or not shown.isdisjoint(CUTOUT_NOUNS)) and draw_share(generator) < 0.5:
         return (*CUTOUT_NOUNS, *MESH_NOUNS) if has_meshes else CUTOUT_NOUNS
     return TRAINING_NOUNS
+
+
+def _other_class_nouns(objects: list[NamedObject]) -> tuple[str, ...]:
+    shown = {number for one in objects for name in names(one.noun) for number in noun_classes(name)}
+    return tuple(noun for noun, some in classes_of_nouns().items() if shown.isdisjoint(some))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

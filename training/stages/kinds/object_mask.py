@@ -96,6 +96,7 @@ class ObjectMaskStage(ModelStage):
     def _logits(
         self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
     ) -> Float[Tensor, "b r h w"]:
+        """Of all prompts, at the size of the masks."""
         return self._logits_of(self._features(rgb), batch)
 
     def _features(self, rgb: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:

@@ -59,9 +59,12 @@ def test_a_network_that_runs_is_left_out() -> None:
     video = {"vae", "dit", "ldrm", "deformation"}
     assert gone == {
         "without depth prior": {"monocular_depth"},
-        "without motion prior": {"motion_unet", "object_mask"},
-        "without object mask": {"object_mask"},
-        "without text encoder": {"text_encoder", "motion_unet", "object_mask"},
+        "without motion prior": {"motion_unet", "object_mask", "image_classifier"},
+        "without object mask": {"object_mask", "image_classifier"},
+        "without image classifier": {"image_classifier"},
+        "without text encoder": {
+            *("text_encoder", "motion_unet", "object_mask", "image_classifier")
+        },
         "without video model": {"dit"},
         "without VAE and LDRM": video,
         "without deformation": {"deformation"},

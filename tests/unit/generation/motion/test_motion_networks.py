@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import torch
 
+from diff4splat.captions.image_classes.class_nouns import class_rows
 from diff4splat.generation.motion.networks import motion_prior
 from diff4splat.models.config.priors import MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
@@ -57,3 +58,20 @@ def test_an_image_and_its_mirror_image_give_the_same_mask() -> None:
     other = prior.object_mask(enlarged(image.flip(-1)), text).flip(-1)
     expected = reduced((own + other)[None] / 2, (32, 32))[0]
     torch.testing.assert_close(logits, expected)
+
+
+@torch.no_grad()
+def test_the_image_classifier_corrects_prompts_that_name_classes() -> None:
+    config = replace(CONFIG, object_mask=replace(CONFIG.object_mask, image_classifier=True))
+    parts = create_networks(config, parts=("motion_unet", "object_mask", "image_classifier"))
+    torch.nn.init.normal_(parts.image_classifier.output.weight, std=0.5)
+    parts.image_classifier.least_probability = 1e-9
+    image, text = torch.rand(1, 3, 32, 32), torch.randn(1, 5, CONFIG.text.width)
+    prior, without = motion_prior(parts), motion_prior(replace(parts, image_classifier=None))
+    own = without.object_maps(image, text).logits
+    assert torch.equal(without.object_maps(image, text, (3, 4)).logits, own)
+    assert torch.equal(prior.object_maps(image, text).logits, own)
+    corrected = prior.object_maps(image, text, (3, 4)).logits
+    rows = class_rows([(3, 4)])[None]
+    torch.testing.assert_close(corrected, parts.image_classifier(image, own[:, None], rows)[:, 0])
+    assert not torch.equal(corrected, own)

@@ -49,6 +49,7 @@ def test_the_file_lists_parts_in_one_order(tmp_path: Path) -> None:
             "motion_unet",
             "image_encoder",
             "object_mask",
+            "image_classifier",
         ],
         "license": "not stated",
         "origin": "not stated",

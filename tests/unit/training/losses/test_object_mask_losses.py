@@ -11,6 +11,7 @@ from diff4splat.training.losses.object_mask import (
     NO_NAME_WEIGHT,
     SMOOTHING_PX,
     UNKNOWN_NAME,
+    absent_error,
     cross_entropy,
     dice_error,
     instance_error,
@@ -133,3 +134,18 @@ def test_a_hundred_pixels_weigh_more_than_a_thousand() -> None:
     small[..., :10, :10], large[..., :40, :25] = True, True
     missed = [float(instances_of(torch.where(m, -5.0, -9.0), m) - 1) for m in (small, large)]
     assert missed[0] / 100 > 1.5 * missed[1] / 1000 > 0
+
+
+def test_absent_error_is_that_of_the_highest_pixels() -> None:
+    logits = torch.full((1, 2, 20, 20), -30.0)
+    logits[0, :, 4:12, 4:14] = 2.0
+    masks = torch.zeros(1, 2, 20, 20, dtype=torch.bool)
+    masks[0, 0, 0, 0] = True
+    wanted = torch.nn.functional.softplus(torch.tensor(2.0))
+    torch.testing.assert_close(absent_error(logits, masks), wanted[None])
+    assert not absent_error(logits[:, :1], masks[:, :1]).any()
+
+
+def test_absent_error_takes_images_of_fewer_pixels() -> None:
+    error = absent_error(torch.zeros(1, 1, 3, 3), torch.zeros(1, 1, 3, 3, dtype=torch.bool))
+    torch.testing.assert_close(error, torch.tensor([0.6931472]))

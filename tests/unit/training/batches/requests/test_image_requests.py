@@ -10,6 +10,7 @@ from torch import Tensor
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.cutout_nouns import CUTOUT_NOUNS, MESH_NOUNS
 from diff4splat.captions.grammar import NamedObject, parse_caption
+from diff4splat.captions.image_classes.class_nouns import noun_classes
 from diff4splat.captions.synonyms import names
 from diff4splat.captions.vocabulary import UNNAMED
 from diff4splat.errors import InputError
@@ -170,8 +171,17 @@ def test_absent_nouns_are_those_of_meshes_too_beside_meshes() -> None:
     generator = torch.Generator().manual_seed(0)
     objects = {noun: [NamedObject("", noun)] for noun in ("stroller", "cat", "ball")}
     drawn_from = {
-        noun: {absent_nouns(shown, generator) for _ in range(30)} for noun, shown in objects.items()
+        noun: {absent_nouns(shown, generator) for _ in range(60)} for noun, shown in objects.items()
     }
+    of_classes = {
+        noun: {one for one in some if "abacus" in one and "abaya" in one}
+        for noun, some in drawn_from.items()
+    }
+    for noun, (others,) in of_classes.items():
+        shown = set(noun_classes(noun))
+        assert noun not in others
+        assert all(shown.isdisjoint(noun_classes(one)) for one in others)
+        drawn_from[noun].remove(others)
     assert drawn_from["ball"] == {TRAINING_NOUNS}
     assert drawn_from["cat"] == {TRAINING_NOUNS, CUTOUT_NOUNS}
     assert drawn_from["stroller"] == {TRAINING_NOUNS, (*CUTOUT_NOUNS, *MESH_NOUNS)}

@@ -1,0 +1,1 @@
+"""ImageNet's classes by the nouns of prompts."""

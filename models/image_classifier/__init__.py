@@ -1,0 +1,1 @@
+"""A public image classifier, which knows where an image may show what a prompt names."""
