@@ -43,8 +43,12 @@ def with_noise(file: Path, share: float = 0.1) -> None:
 
 
 def with_nan(file: Path) -> None:
-    """Nothing but NaN."""
-    tensors = {key: torch.full_like(value, float("nan")) for key, value in load_file(file).items()}
+    """Nothing but NaN; of weights in eight bits the scales."""
+    stored = load_file(file)
+    tensors = {
+        key: torch.full_like(value, torch.nan) if value.is_floating_point() else value
+        for key, value in stored.items()
+    }
     save_file(tensors, file)
 
 
