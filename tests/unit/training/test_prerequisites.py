@@ -56,6 +56,7 @@ SMALL_BUILDS_ON = {
     "video_diffusion": {"vae": "vae", "monocular_depth": "monocular_depth"},
     "motion_diffusion": {"text_encoder": "video_diffusion"},
     "object_mask": {"text_encoder": "video_diffusion"},
+    "image_classifier": {"text_encoder": "video_diffusion", "object_mask": "object_mask"},
     "video_distillation": {
         "vae": "vae",
         "monocular_depth": "monocular_depth",
