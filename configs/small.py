@@ -62,6 +62,7 @@ def small_recipe() -> Recipe:
     static = replace(pretrain, name="static-low", kind="static", steps=400)
     dynamic = _dynamic(static, data.tracks)
     video = _video_diffusion(dynamic)
+    object_mask = _object_mask(video)
     return Recipe(
         name="small",
         seed=0,
@@ -75,8 +76,8 @@ def small_recipe() -> Recipe:
             dynamic,
             video,
             _motion_diffusion(video),
-            _object_mask(video),
-            _image_classifier(video),
+            object_mask,
+            _image_classifier(object_mask),
         ),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
@@ -221,17 +222,14 @@ def _object_mask(video: StageRecipe) -> StageRecipe:
     )
 
 
-def _image_classifier(video: StageRecipe) -> StageRecipe:
+def _image_classifier(object_mask: StageRecipe) -> StageRecipe:
     """After the object mask, which it corrects: few weights, of which none sees its neighbours."""
     return replace(
-        video,
+        object_mask,
         name="image_classifier",
         kind="image_classifier",
-        steps=600,
+        steps=400,
         trained=("image_classifier",),
         losses=ImageClassifierLosses(),
         optimizer=OptimizerSettings(learning_rate=5e-3, warmup_steps=50),
-        data=replace(video.data, keyframes_only=True),
-        text_dropout=0.0,
-        public_backbone=True,
     )

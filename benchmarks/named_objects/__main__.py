@@ -47,6 +47,11 @@ def motion_of(model: Model, rgb: Tensor, sentence: str) -> MotionProbability:
     return motion_probability(motion_prior(model.networks), image, 2, request)
 
 
+def without_classifier(model: Model) -> Model:
+    """The object mask alone decides."""
+    return replace(model, networks=replace(model.networks, image_classifier=None))
+
+
 def soft(rgb: Tensor) -> Tensor:
     """As an image of half the sides comes to the network."""
     camera = pinhole(float(rgb.shape[1]), tuple(rgb.shape[:2]))
@@ -115,7 +120,7 @@ def main() -> None:
     if options.without_instances:
         model.networks.object_mask.instances = None
     if options.without_classifier:
-        model = replace(model, networks=replace(model.networks, image_classifier=None))
+        model = without_classifier(model)
     count = min(len(folder), options.most)
     asking = {"unknown_nouns": options.unknown_nouns, "most_objects": options.objects}
     images = [asked_image(folder.clip(index), **asking) for index in range(count)]

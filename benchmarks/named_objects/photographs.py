@@ -23,6 +23,7 @@ from benchmarks.named_objects.__main__ import (
     means,
     measure,
     motion_of,
+    without_classifier,
 )
 from diff4splat.generation.plan import MOTION_PARTS
 from diff4splat.io.photos.images import write_png
@@ -106,11 +107,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("models", nargs="+")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--without-classifier", action="store_true")
     options = parser.parse_args()
     asked, columns = all_asked(), []
     lines = ["| model |" + " | ".join(COLUMNS) + " |", "|---|" + "---:|" * len(COLUMNS)]
     for name in options.models:
-        values, tiles = row(load_model(name, parts=MOTION_PARTS), asked)
+        model = load_model(name, parts=MOTION_PARTS)
+        model = without_classifier(model) if options.without_classifier else model
+        values, tiles = row(model, asked)
         columns.append(tiles)
         lines.append(f"| {name} | " + " | ".join(f"{values[c]:.3f}" for c in COLUMNS) + " |")
     print("\n".join(lines))

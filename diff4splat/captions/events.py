@@ -11,7 +11,7 @@ objects.
 import re
 from functools import cache
 
-from diff4splat.captions.known_words import read_prompt, stem
+from diff4splat.captions.known_words import read_prompt, stem, words_of
 from diff4splat.captions.synonyms import TRAVEL_VERBS
 from diff4splat.captions.vocabulary import IN_PLACE, VERBS
 
@@ -83,11 +83,7 @@ def _words_in_place() -> tuple[tuple[str, ...], frozenset[str]]:
 
 
 def _stem(text: str) -> str:
-    return " ".join(map(stem, _words(text)))
-
-
-def _words(text: str) -> list[str]:
-    return re.findall(r"[^\W\d_]+", text)
+    return " ".join(map(stem, words_of(text)))
 
 
 def _pieces(prompt: str) -> list[tuple[int, int, int]]:
@@ -113,7 +109,7 @@ def _begins_event(words: str) -> bool:
 def _kinds(words: str) -> list[str]:
     """Objects and motions in their order; ``rises`` is no ``rice``."""
     found = []
-    for word in _words(_NO_MOTION.sub("", words)):
+    for word in words_of(_NO_MOTION.sub("", words)):
         read = read_prompt(word)
         if read.motions or read.objects:
             found.append("motion" if read.motions else "object")

@@ -68,7 +68,7 @@ def _with_synonyms(
 def read_prompt(prompt: str) -> PromptWords:
     """Sort the words of ``prompt``; function words and places are left out."""
     objects, motions, others = _stems()
-    words = re.findall(r"[^\W\d_]+", prompt.casefold())
+    words = words_of(prompt)
     unknown = [word for word in words if stem(word) not in objects | motions | others]
     # What the image classifier knows, but no caption of training has.
     classes = {word for word in unknown if noun_classes(word)}
@@ -77,6 +77,11 @@ def read_prompt(prompt: str) -> PromptWords:
         motions=tuple(word for word in words if stem(word) in motions),
         unknown=tuple(word for word in unknown if word not in classes),
     )
+
+
+def words_of(text: str) -> list[str]:
+    """Runs of letters, in lower case."""
+    return re.findall(r"[^\W\d_]+", text.casefold())
 
 
 def stem(word: str) -> str:
@@ -103,4 +108,4 @@ def _stems() -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
 
 
 def _of(phrases: Iterable[str]) -> frozenset[str]:
-    return frozenset(stem(word) for phrase in phrases for word in re.findall(r"[^\W\d_]+", phrase))
+    return frozenset(stem(word) for phrase in phrases for word in words_of(phrase))

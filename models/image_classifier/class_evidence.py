@@ -19,9 +19,11 @@ def class_evidence(
     The probability is small where a cell shows something else; the logit is not, if that something
     is like them. 0 for prompts without classes.
     """
+    # In half precision the least share would be 0, and its logarithm infinite.
+    logits = logits.to(torch.promote_types(logits.dtype, torch.float32))
     highest = logits.amax(1, keepdim=True)
     shares = (logits - highest).exp()
-    ours = torch.einsum("brk,bkhw->brhw", classes.to(shares), shares)
+    ours = torch.where(classes[..., None, None], shares[:, None], 0.0).sum(2)
     together = ours.clamp_min(LEAST_SHARE).log()
     above_mean = together + highest - logits.mean(1, keepdim=True)
     probability = together - shares.sum(1, keepdim=True).log()

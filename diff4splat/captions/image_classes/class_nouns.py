@@ -1,7 +1,8 @@
 """ImageNet's classes of nouns: ``dog`` is 118 of its 1,000 classes, ``kangaroo`` one.
 
 ``nouns.txt`` has a noun and its classes in every line (``benchmarks.named_objects.class_nouns``
-writes it from WordNet 3.0). Classes are numbered as in the weights of the public classifier.
+writes it from WordNet 3.0, ``wordnet-license.txt``). Classes are numbered as in the weights of the
+public classifier.
 """
 
 from collections.abc import Mapping, Sequence

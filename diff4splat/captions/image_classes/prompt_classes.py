@@ -1,21 +1,19 @@
 """The classes of what a prompt asks to move."""
 
-import re
 from functools import cache
 from itertools import chain
 
 from diff4splat.captions.image_classes.class_nouns import MOST_WORDS, noun_classes
-from diff4splat.captions.known_words import known_words, read_prompt
+from diff4splat.captions.known_words import known_words, read_prompt, words_of
 
 
-@cache
 def prompt_classes(prompt: str) -> tuple[int, ...]:
     """ImageNet's classes of the objects before the first motion word, or else of the first object.
 
     ``a red ball and a car roll past the tree``: of balls and cars. Empty where none of them has
     classes: the image classifier says nothing then.
     """
-    words = re.findall(r"[^\W\d_]+", prompt.casefold())
+    words = words_of(prompt)
     first = next((k for k, word in enumerate(words) if read_prompt(word).motions), len(words))
     objects = _objects(words[:first]) or _objects(words[first:])[:1]
     return tuple(sorted(set(chain.from_iterable(objects))))

@@ -23,6 +23,7 @@ from diff4splat.training.losses.object_mask import UNKNOWN_NAME
 AREA_SHARES = (0.003, 0.7)
 """Smallest and largest share of the image that an object is asked for with."""
 CLASS_NOUN_SHARE = 0.3
+"""Of requests for absent nouns: those of ImageNet's classes."""
 TRAINING_NOUNS = tuple(noun for noun in NOUNS if noun not in UNSEEN_NOUNS)
 """Nouns that may be asked for where they are absent: one that is only ever asked for so would seem
 to be never there."""

@@ -46,3 +46,12 @@ def test_extreme_logits_stay_finite(height: float) -> None:
     assert torch.isfinite(found).all()
     floor = max(-height, math.log(LEAST_SHARE)) - math.log1p((CLASSES - 1) * math.exp(-height))
     assert float(found[0, 1, 1]) == pytest.approx(floor, rel=0.05, abs=2.0)
+
+
+@pytest.mark.parametrize("dtype", [torch.bfloat16, torch.float16])
+def test_half_precision_stays_finite(dtype: torch.dtype) -> None:
+    logits = torch.tensor([40.0, *[-40.0] * (CLASSES - 1)], dtype=dtype)[None, :, None, None]
+    with torch.autocast("cpu", dtype):
+        found = class_evidence(logits, rows((1,)))
+    assert found.dtype == torch.float32
+    assert torch.isfinite(found).all()

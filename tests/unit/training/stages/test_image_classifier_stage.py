@@ -6,6 +6,7 @@ import pytest
 import torch
 from stage_fixtures import make_stage, stage_recipe
 
+from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
@@ -99,7 +100,13 @@ def test_images_whose_requests_do_not_count_have_no_loss() -> None:
     assert not bool(stage(batch)[TOTAL].detach().any())
 
 
-def test_a_model_without_a_classifier_is_refused() -> None:
-    without = replace(MODEL, object_mask=replace(MODEL.object_mask, image_classifier=False))
-    with pytest.raises((ConfigError, AttributeError)):
-        make_stage(classifier_recipe(), model=without)
+def test_a_recipe_for_a_model_without_a_classifier_is_refused() -> None:
+    recipe = recipe_by_name("small")
+    mask = replace(recipe.model.object_mask, image_classifier=False)
+    with pytest.raises(ConfigError, match=r"object_mask\.image_classifier: expected true"):
+        replace(recipe, model=replace(recipe.model, object_mask=mask))
+
+
+def test_a_classifier_without_a_mask_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"image_classifier: expected false without an object"):
+        ObjectMaskConfig(image_classifier=True)
