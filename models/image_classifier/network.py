@@ -37,7 +37,6 @@ class ImageClassifier(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.least_probability = LEAST_PROBABILITY
         self.cells = CellClassifier()
         self.input = nn.Conv2d(4 * MAPS, WIDTH, 1)
         self.hidden = nn.Conv2d(WIDTH, WIDTH, 1)
@@ -89,7 +88,7 @@ class ImageClassifier(nn.Module):
 
     def _is_likely(self, maps: Float[Tensor, "b r c hc wc"]) -> Bool[Tensor, "b r"]:
         """Whether some cell shows the classes, at any enlargement."""
-        least = math.log(self.least_probability) / EVIDENCE_SCALES[1]
+        least = math.log(LEAST_PROBABILITY) / EVIDENCE_SCALES[1]
         return maps[:, :, 2::2].amax((-3, -2, -1)) > least
 
     def _correction(self, maps: Float[Tensor, "n c hc wc"]) -> Float[Tensor, "n hc wc"]:

@@ -10,6 +10,7 @@ from diff4splat.configs.recipes import recipe_by_name
 from diff4splat.errors import ConfigError
 from diff4splat.models.config.model import MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.image_classifier import network
 from diff4splat.training.batches.requests.request_batch import RequestBatch
 from diff4splat.training.recipe.losses import ImageClassifierLosses
 from diff4splat.training.recipe.stage import StageRecipe
@@ -33,11 +34,14 @@ def classifier_recipe() -> StageRecipe:
     )
 
 
+@pytest.fixture(autouse=True)
+def _every_cell_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A random classifier is sure of nothing."""
+    monkeypatch.setattr(network, "LEAST_PROBABILITY", 1e-9)
+
+
 def classifier_stage() -> ModelStage:
-    """One that corrects whatever its random classifier sees."""
-    stage = make_stage(classifier_recipe(), model=MODEL)
-    stage.image_classifier.least_probability = 1e-9
-    return stage
+    return make_stage(classifier_recipe(), model=MODEL)
 
 
 def requests(*captions: str) -> RequestBatch:
