@@ -26,3 +26,8 @@ def upsample_bilinear(maps: Float[Tensor, "n c h w"], scale: int) -> Float[Tenso
     return torch.nn.functional.interpolate(
         maps, scale_factor=scale, mode="bilinear", align_corners=False
     )
+
+
+def upsample_nearest(maps: Float[Tensor, "n c h w"], scale: int) -> Float[Tensor, "n c h2 w2"]:
+    """Each pixel repeated in space by a whole factor."""
+    return torch.nn.functional.interpolate(maps, scale_factor=scale, mode="nearest")

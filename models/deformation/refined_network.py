@@ -24,10 +24,12 @@ from diff4splat.models.config.model import ModelConfig
 from diff4splat.models.config.networks import DEFORMATION_SPLIT
 from diff4splat.models.ldrm.refinement.decoder import widths
 from diff4splat.models.ldrm.refinement.motion_features import (
-    CUES,
+    INPUT_CHANNELS,
+    MOTION_CHANNELS,
     RATE_UNIT,
     SLOT_CUES,
     SLOTS,
+    input_motion,
     keyframe_span,
     slot_weights,
 )
@@ -65,7 +67,7 @@ class RefinedDeformation(nn.Module):
         channels = widths(config.refinement.channels)[0]
         # Features grow along the skip connections and would dominate the motion features.
         self.norm_in = ChannelRmsNorm(channels)
-        self.input_conv = nn.Conv2d(channels + CUES, deformation.width, 3, padding=1)
+        self.input_conv = nn.Conv2d(channels + INPUT_CHANNELS, deformation.width, 3, padding=1)
         self.input_motion = nn.Conv2d(SLOT_CUES, deformation.width, 3, padding=1)
         self.time_mlp = EmbeddingMlp(4 * deformation.time_frequencies, deformation.width)
         self.blocks = nn.ModuleList(
@@ -94,8 +96,9 @@ class RefinedDeformation(nn.Module):
             yield self._at(input_features, tokens, time)
 
     def _input_features(self, tokens: Float[Tensor, "b d k h w"]) -> Float[Tensor, "n c h w"]:
-        features, cues = tokens.transpose(1, 2).flatten(0, 1).tensor_split([-CUES], 1)
-        return self.input_conv(torch.cat([self.norm_in(features), cues], 1))
+        flat = tokens.transpose(1, 2).flatten(0, 1)
+        features, motion = flat.tensor_split([-MOTION_CHANNELS], 1)
+        return self.input_conv(torch.cat([self.norm_in(features), input_motion(motion)], 1))
 
     def _at(
         self, input_features: Float[Tensor, "n c h w"], tokens: Tensor, time: Float[Tensor, " b"]
@@ -130,7 +133,7 @@ def _measured_motion(
 ) -> Float[Tensor, "n 4 h w"]:
     """Rate and difference of every cell at one time, interpolated from the two nearest slots."""
     keys = tokens.shape[2]
-    slots = tokens[:, -CUES:-1].transpose(1, 2).unflatten(2, (SLOTS, SLOT_CUES))
+    slots = tokens[:, -MOTION_CHANNELS:-1].transpose(1, 2).unflatten(2, (SLOTS, SLOT_CUES))
     weights = slot_weights(elapsed * keyframe_span(keys)).to(tokens.dtype)
     return torch.einsum("bks,bksdhw->bkdhw", weights, slots).flatten(0, 1)
 

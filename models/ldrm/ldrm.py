@@ -11,8 +11,8 @@ length:
 The zero layer makes a fresh model output exactly 0, which is the base scene.
 With refinement (``refinement/``) the last line differs:
 
-    tokens, decoded frames, cameras ─ decoder ─┬─ 12 channels per pixel of the key frames
-                                               └─ 12 channels per cell of the border layer
+    tokens, frames, cameras ─ decoder ─┬─ 12 channels per pixel of the key frames
+                                       └─ 12 channels per cell of the border layer
 """
 
 import torch
@@ -148,7 +148,7 @@ def _to_pixels(config: LdrmConfig, side_px: int) -> nn.ConvTranspose3d:
 def _require_frames(posed_video: PosedVideo | None) -> PosedVideo:
     if posed_video is None:
         raise ShapeError(
-            "LDRM: expected decoded frames with their cameras for refinement, got none; "
+            "LDRM: expected frames with their cameras for refinement, got none; "
             "hand over a PosedVideo"
         )
     return posed_video

@@ -16,7 +16,7 @@ from diff4splat.models.config.networks import (
     TOKEN_PATCH,
 )
 from diff4splat.models.ldrm.refinement.decoder import widths
-from diff4splat.models.ldrm.refinement.motion_features import CUES, SLOT_CUES, track_slot
+from diff4splat.models.ldrm.refinement.motion_features import MOTION_CHANNELS, SLOT_CUES, track_slot
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, StartDistance
 from diff4splat.models.onnx.manifest import TensorSpec
 from diff4splat.models.onnx.shapes import Axis
@@ -69,7 +69,7 @@ def deformation_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSou
     channels = sum(DEFORMATION_SPLIT)
     if config.refinement.used:
         keys, stride = "frames", config.token_px // CELL_PX
-        tokens = (widths(config.refinement.channels)[0] + CUES, keys)
+        tokens = (widths(config.refinement.channels)[0] + MOTION_CHANNELS, keys)
         raw = output("raw", "batch", channels, keys, *_pixels(config))
         cells = (f"{stride}*rows", f"{stride}*columns")
     else:

@@ -1,8 +1,8 @@
 """A reconstructed scene brought nearer to the frames of its video, by a few gradient steps.
 
-LDRM predicts from decoded frames, which are softer than the true ones, and gives one object a copy
-per key frame where its depths disagree. Rendering shows both. Adam (arXiv 1412.6980) lowers the
-squared error of all frames; what it changes is in ``scene_change``. Motion stays as predicted.
+LDRM predicts Gaussians once, and gives one object a copy per key frame where its depths disagree.
+Rendering shows that. Adam (arXiv 1412.6980) lowers the squared error of all frames; what it changes
+is in ``scene_change``. Motion stays as predicted.
 
 Axes: ``f h w`` frames and pixels.
 """

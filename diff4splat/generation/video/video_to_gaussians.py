@@ -1,6 +1,6 @@
 """A video's latent, its first frame and its cameras through LDRM.
 
-Axes: ``c t h w`` latents, ``f`` video frames. A generated video and a true one take this way.
+Axes: ``c t h2 w2`` latents, ``f h w`` video frames. A generated video and a true one take this way.
 """
 
 from dataclasses import dataclass
@@ -30,12 +30,14 @@ from diff4splat.progress.run_log import RunLog
 class VideoLatent:
     """A video as networks hand it on."""
 
-    latent: Float[Tensor, "1 c t h w"]
+    latent: Float[Tensor, "1 c t h2 w2"]
     """Standardised."""
     first_frame: InputImage
     """As it is, not decoded."""
     cameras: Camera
     """Batch shape (f,), of the image's size."""
+    frames: Float[Tensor, "f h w 3"] | None = None
+    """True frames; None for a generated video, whose frames are decoded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +46,7 @@ class RawVideoMaps:
 
     maps: RawGaussianMaps
     frames: PosedVideo | None
-    """Decoded; only refinement needs them."""
+    """True or decoded; only refinement needs them."""
 
 
 def raw_video_maps(model: Model, video: VideoLatent, *, moving: bool, log: RunLog) -> RawVideoMaps:
@@ -52,10 +54,11 @@ def raw_video_maps(model: Model, video: VideoLatent, *, moving: bool, log: RunLo
     rays = plucker_map(relative_to_first(video.cameras)).movedim(0, 1)[None]
     frames = None
     if model.config.refinement.used:
-        frames = decode_posed_video(model, video)
+        frames = posed_video(model, video)
+        if video.frames is not None:
+            log.record_skipped("video decoder", "the frames are given", "decoding every frame")
     else:
-        why = "LDRM reads latents"
-        log.record_skipped("video decoder", why, "decoding every frame")
+        log.record_skipped("video decoder", "LDRM reads latents", "decoding every frame")
     maps = model.networks.ldrm(video.latent, rays, frames, moving=moving)
     return RawVideoMaps(maps=maps, frames=frames)
 
@@ -74,10 +77,16 @@ def image_plane_base(model: Model, video: VideoLatent) -> PixelBase:
     return plane_base(image.rgb, image.camera, video.cameras, model.config.ldrm.grid_stride)
 
 
-def decode_posed_video(model: Model, video: VideoLatent) -> PosedVideo:
-    """The decoded video after the true first frame; with the start of its key frames."""
-    decoded = (model.networks.vae.decode(video.latent).float() + 1) / 2
-    first = video.first_frame.rgb.movedim(-1, 0)[None, :, None].to(decoded)
-    rgb = torch.cat([first, decoded[:, :, 1:].clamp(0, 1)], 2)
+def posed_video(model: Model, video: VideoLatent) -> PosedVideo:
+    """The video's frames with their cameras, and with the start of its key frames."""
+    frames = _decoded_frames(model, video) if video.frames is None else video.frames
+    rgb = frames.movedim(-1, 0)[None]
     posed = PosedVideo(rgb=rgb, cameras=stack_cameras([video.cameras]))
     return with_start_distance(posed, model.networks.monocular_depth, model.config)
+
+
+def _decoded_frames(model: Model, video: VideoLatent) -> Float[Tensor, "f h w 3"]:
+    """The true first frame, then decoded ones."""
+    decoded = (model.networks.vae.decode(video.latent)[0].float() + 1) / 2
+    first = video.first_frame.rgb[None].to(decoded)
+    return torch.cat([first, decoded[:, 1:].clamp(0, 1).movedim(0, -1)])

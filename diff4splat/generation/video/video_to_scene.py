@@ -82,6 +82,7 @@ def _encode(model: Model, video: Float[Tensor, "f h w 3"], path: CameraPath) -> 
         latent=model.networks.vae.encode(rgb.movedim(-1, 0)[None] * 2 - 1).mean,
         first_frame=InputImage(rgb=rgb[0], camera=cameras[0], focal_source="video"),
         cameras=cameras,
+        frames=rgb,
     )
 
 

@@ -29,10 +29,11 @@ def track_flow(
     source: Float[Tensor, "n 3 h w"],
     target: Float[Tensor, "n 3 h w"],
     start: Float[Tensor, "n 2 h w"],
+    pyramid: tuple[int, ...] = PYRAMID,
 ) -> Float[Tensor, "n 2 h w"]:
     """Flow (right, down) in pixels from ``source`` to ``target``, initialised with ``start``."""
     flow = start
-    for level in PYRAMID:
+    for level in pyramid:
         fixed, moving = _downsample(source, level), _downsample(target, level)
         coarse = _downsample(flow, level) / level
         gradients = _gradients(fixed)

@@ -23,19 +23,26 @@ from diff4splat.models.blocks.precision import at_least_float32
 from diff4splat.models.config.networks import TIME_STRIDE, ActivationConfig
 from diff4splat.models.ldrm import activations
 from diff4splat.models.ldrm.plane_prior import PLANE_DEPTH
-from diff4splat.models.ldrm.refinement.lucas_kanade import track_flow, warp
+from diff4splat.models.ldrm.refinement.lucas_kanade import warp
+from diff4splat.models.ldrm.refinement.optical_flow import optical_flow
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, camera_frames, flat_cameras
 from diff4splat.models.ldrm.refinement.warping import other_pixels, sampled
 
-DISTANCES = (1, 2, 4, 8)
-"""In frames, doubled each time; clamped to the ends of the video."""
+DISTANCES = tuple(range(1, 9))
+"""In frames; clamped to the ends of the video."""
 SLOTS = 2 * len(DISTANCES)
 RATE_UNIT, DIFFERENCE_UNIT = 0.25, 0.1
 """Value that is 1 in a feature: typical of moving points."""
 SLOT_CUES = 4
 """Rate (x, y, z), difference."""
-CUES = SLOT_CUES * SLOTS + 1
+MOTION_CHANNELS = SLOT_CUES * SLOTS + 1
 """Channels appended to the features: those of the slots, then the logarithm of depth."""
+INPUT_SLOTS = tuple(
+    sign + distance - 1 for sign in (0, len(DISTANCES)) for distance in (1, 2, 4, 8)
+)
+"""Distances of 1, 2, 4 and 8 to both sides: the deformation network sees these slots at once, and
+all of them at the time that it is asked for."""
+INPUT_CHANNELS = SLOT_CUES * len(INPUT_SLOTS) + 1
 
 
 def track_slot(
@@ -48,7 +55,7 @@ def track_slot(
     source = at_least_float32(posed_video.key_rgb.flatten(0, 1))
     elapsed = (frames - posed_video.keys).repeat(depth.shape[0]).to(source)[:, None, None, None]
     target = _warped_frames(depth, posed_video, frames)
-    flow = track_flow(source, target, rate_px * elapsed)
+    flow = optical_flow(source, target, rate_px * elapsed)
     difference = (warp(target, flow) - source).abs().mean(1, keepdim=True)
     nearest = torch.where(elapsed == 0, 1, elapsed)
     rate_px = torch.where(elapsed == 0, rate_px, flow / nearest)
@@ -99,11 +106,17 @@ def warped_flow(
 
 
 def slot_weights(elapsed: Float[Tensor, "*b"]) -> Float[Tensor, "*b s"]:
-    """Weights of the two nearest slots at an offset in frames; linear in its log₂."""
-    octave = elapsed.abs().clamp(DISTANCES[0], DISTANCES[-1]).log2()[..., None]
-    near = (1 - (octave - torch.arange(len(DISTANCES)).to(octave)).abs()).clamp_min(0)
+    """Weights of the two nearest slots at an offset in frames."""
+    distance = elapsed.abs().clamp(DISTANCES[0], DISTANCES[-1])[..., None]
+    near = (1 - (distance - torch.tensor(DISTANCES).to(distance)).abs()).clamp_min(0)
     later = (elapsed >= 0)[..., None]
     return torch.cat([near * later, near * ~later], -1)
+
+
+def input_motion(motion: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h w"]:
+    """Of all motion channels those that the deformation network sees at once."""
+    slots = motion[:, :-1].unflatten(1, (SLOTS, SLOT_CUES))[:, list(INPUT_SLOTS)]
+    return torch.cat([slots.flatten(1, 2), motion[:, -1:]], 1)
 
 
 def keyframe_span(keys: int) -> int:

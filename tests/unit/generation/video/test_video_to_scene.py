@@ -7,12 +7,15 @@ import torch
 from image_layers import FOCAL_PX, sliding_path
 
 from diff4splat.errors import InputError, ShapeError
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.video.photometric_steps import Frames, video_error
+from diff4splat.generation.video.video_to_gaussians import VideoLatent, posed_video
 from diff4splat.generation.video.video_to_scene import scene_from_video
 from diff4splat.geometry.camera import pinhole
 from diff4splat.models.config.sizes import size_by_name
-from diff4splat.models.hub.model import Model
+from diff4splat.models.hub.model import Model, with_parts
+from diff4splat.models.networks import reconstruction_parts
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.progress.run_log import RunLog
 from diff4splat.scene.motion.static import StaticMotion
@@ -52,6 +55,20 @@ def test_only_what_reconstructs_is_loaded_and_the_video_model_is_not() -> None:
     assert "sample video" not in log.phases.seconds
     trained = replace(whole, trained=frozenset({"vae", "ldrm", "deformation"}))
     assert not scene_from_video(trained, video(), path(), EVERYTHING).provenance.untrained
+
+
+def test_a_true_video_is_not_decoded() -> None:
+    log, shown = RunLog(), video()
+    known = with_parts(model("small"), reconstruction_parts(model("small").config))
+    scene_from_video(known, shown, path(), EVERYTHING, log)
+    assert "video decoder" in {record.what for record in log.skipped}
+    cameras, frames = path().cameras, known.config.latent_grid(FRAMES, (SIDE_PX, SIDE_PX))
+    first = InputImage(rgb=shown[0], camera=cameras[0], focal_source="video")
+    latent = torch.zeros(1, known.config.vae.latent_channels, *frames)
+    given = VideoLatent(latent=latent, first_frame=first, cameras=cameras, frames=shown)
+    assert torch.equal(posed_video(known, given).rgb[0].movedim(0, -1), shown)
+    generated = posed_video(known, replace(given, frames=None)).rgb[0].movedim(0, -1)
+    assert torch.equal(generated[0], shown[0]) and not torch.equal(generated[1:], shown[1:])
 
 
 def test_equal_videos_give_equal_scenes() -> None:

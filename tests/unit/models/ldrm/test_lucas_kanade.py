@@ -13,8 +13,11 @@ from diff4splat.models.ldrm.refinement.lucas_kanade import track_flow, warp
 from diff4splat.models.ldrm.refinement.motion_features import (
     DIFFERENCE_UNIT,
     DISTANCES,
+    MOTION_CHANNELS,
     RATE_UNIT,
+    SLOT_CUES,
     SLOTS,
+    input_motion,
     slot_weights,
     warped_flow,
 )
@@ -133,5 +136,12 @@ def test_slots_speak_for_the_times_they_are_at_and_share_those_between() -> None
     torch.testing.assert_close(shares.sum(-1), torch.ones(81))
     assert bool((shares >= 0).all())
     torch.testing.assert_close(slot_weights(torch.tensor(0.0)), torch.eye(SLOTS)[0])
-    middle = slot_weights(torch.tensor(math.sqrt(8.0)))
+    middle = slot_weights(torch.tensor(2.5))
     torch.testing.assert_close(middle[1:3], torch.full((2,), 0.5))
+
+
+def test_the_network_sees_doubled_distances_of_both_directions_and_the_depth() -> None:
+    motion = torch.arange(1.0 * MOTION_CHANNELS)[None, :, None, None]
+    slots = [distance - 1 + side for side in (0, len(DISTANCES)) for distance in (1, 2, 4, 8)]
+    want = [SLOT_CUES * slot + cue for slot in slots for cue in range(SLOT_CUES)]
+    assert input_motion(motion).flatten().tolist() == [*want, MOTION_CHANNELS - 1]

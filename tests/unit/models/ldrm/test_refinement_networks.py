@@ -137,10 +137,10 @@ def test_the_cost_volume_and_the_border_can_be_left_out(change: dict[str, int]) 
 def test_a_static_video_needs_no_optical_flow(monkeypatch: pytest.MonkeyPatch) -> None:
     network, given = randomised(Ldrm(CONFIG)), inputs(5, (32, 32))
     moving = network(*given)
-    monkeypatch.delattr(motion_features, "track_flow")
+    monkeypatch.delattr(motion_features, "optical_flow")
     static = network(*given, moving=False)
     assert torch.equal(static.gaussians, moving.gaussians)
-    assert static.tokens.shape[1] == moving.tokens.shape[1] - motion_features.CUES
+    assert static.tokens.shape[1] == moving.tokens.shape[1] - motion_features.MOTION_CHANNELS
 
 
 def test_gradients_and_extreme_maps_are_finite() -> None:
@@ -158,5 +158,5 @@ def test_gradients_and_extreme_maps_are_finite() -> None:
 
 def test_a_missing_video_is_refused() -> None:
     latent, rays, _ = inputs(1, (32, 32))
-    with pytest.raises(ShapeError, match="expected decoded frames with their cameras"):
+    with pytest.raises(ShapeError, match="expected frames with their cameras"):
         Ldrm(CONFIG)(latent, rays)

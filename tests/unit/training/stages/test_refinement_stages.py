@@ -9,6 +9,7 @@ from stage_fixtures import make_batch, make_stage, shake_heads, stage_recipe
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.config.model import ModelConfig, MonocularDepthConfig, RefinementConfig
 from diff4splat.models.config.sizes import test_size as tiny_size
+from diff4splat.models.ldrm.refinement.motion_features import INPUT_CHANNELS, MOTION_CHANNELS
 from diff4splat.training.latents.video_latents import encode_video, zero_latents
 from diff4splat.training.recipe.losses import MotionLosses, ReconstructionLosses
 from diff4splat.training.recipe.stage import StageRecipe
@@ -89,7 +90,8 @@ def test_motion_alone_is_the_dynamic_stage_without_images() -> None:
 def test_many_times_at_once_are_the_same_as_each_alone() -> None:
     stage = make_stage(refined(MOTION), model=MODEL)
     shake_heads(stage)
-    tokens = torch.rand(2, stage.deformation.input_conv.in_channels, 2, 8, 8)
+    channels = stage.deformation.input_conv.in_channels + MOTION_CHANNELS - INPUT_CHANNELS
+    tokens = torch.rand(2, channels, 2, 8, 8)
     times = torch.tensor([[0.0, 0.3], [0.5, 1.0]])
     together = stage.deformation.at_times(tokens, times)
     for time, found in zip(times, together, strict=True):
