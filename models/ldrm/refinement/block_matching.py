@@ -8,14 +8,15 @@ clearly better than at rest: background that is occluded is found nowhere.
 """
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.models.ldrm.refinement.lucas_kanade import warp
 from diff4splat.models.ldrm.refinement.window_mean import window_mean
 
 REACH_PX = 8
-"""Longest displacement along each axis."""
+DISPLACEMENTS = tuple(range(-REACH_PX, REACH_PX + 1))
+"""Along each axis."""
 BLOCK_PX = 7
 LARGEST_DIFFERENCE = 0.15
 LENGTH_COST = 3e-4
@@ -32,44 +33,45 @@ def matched_displacement(
     source: Float[Tensor, "n 3 h w"], target: Float[Tensor, "n 3 h w"]
 ) -> tuple[Float[Tensor, "n 2 h w"], Bool[Tensor, "n h w"]]:
     """Displacement (right, down) from ``source`` to ``target`` in pixels, and where it counts."""
-    costs, displacements = _costs(source, target), _displacements().to(source)
-    least, index = costs.min(1)
-    forward = displacements[index].movedim(-1, 1)
-    backward = displacements[_costs(target, source).argmin(1)].movedim(-1, 1)
+    forward, least, at_rest = _best_displacement(source, target)
+    backward, _, _ = _best_displacement(target, source)
     gap = (forward + warp(backward, forward)).norm(dim=1)
-    at_rest = costs[:, len(displacements) // 2]
     long = forward.norm(dim=1) > LEAST_LENGTH_PX
     return forward, long & (gap <= LARGEST_GAP_PX) & (least < CLEAR_SHARE * at_rest)
 
 
-def _displacements() -> Float[Tensor, "k 2"]:
-    """All of them (right, down); the one at rest is in the middle."""
-    reach = torch.arange(-REACH_PX, REACH_PX + 1).to(torch.get_default_dtype())
-    return torch.cartesian_prod(reach, reach)
-
-
-def _costs(
+def _best_displacement(
     source: Float[Tensor, "n 3 h w"], target: Float[Tensor, "n 3 h w"]
+) -> tuple[Float[Tensor, "n 2 h w"], Float[Tensor, "n h w"], Float[Tensor, "n h w"]]:
+    """Displacement of the least cost, that cost, and the cost at rest."""
+    columns = [_column_costs(source, target, right) for right in DISPLACEMENTS]
+    least = [costs.min(1) for costs in columns]
+    cost, index = torch.stack([one.values for one in least], 1).min(1)
+    rows = torch.stack([one.indices for one in least], 1).gather(1, index[:, None])
+    displacement = torch.cat([index[:, None], rows], 1).to(source) - REACH_PX
+    return displacement, cost, columns[REACH_PX][:, REACH_PX]
+
+
+def _column_costs(
+    source: Float[Tensor, "n 3 h w"], target: Float[Tensor, "n 3 h w"], right: int
 ) -> Float[Tensor, "n k h w"]:
-    """Cost of every displacement of every pixel."""
-    difference = (_displaced(target) - source[:, :, None]).abs().mean(1)
-    limited = difference.clamp_max(LARGEST_DIFFERENCE)
-    length = LENGTH_COST * _displacements().to(source).norm(dim=-1)[:, None, None]
-    outside = 1 - _displaced(torch.ones_like(source[:1, :1]))[0, 0]
-    return window_mean(limited, BLOCK_PX) + (length + OUTSIDE_COST * outside)
+    """Cost of every pixel's displacements by ``right`` and DISPLACEMENTS down.
+
+    One column at a time: its costs fit into the processor's cache.
+    """
+    difference = (_displaced(target, right) - source[:, :, None]).abs().mean(1)
+    costs = window_mean(difference.clamp_max(LARGEST_DIFFERENCE), BLOCK_PX)
+    down = torch.tensor(DISPLACEMENTS).to(source)
+    length = LENGTH_COST * (right**2 + down.square()).sqrt()
+    outside = 1 - _displaced(torch.ones_like(source[:1, :1]), right)[0, 0]
+    return costs + (length[:, None, None] + OUTSIDE_COST * outside)
 
 
-def _displaced(image: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c k h w"]:
-    """The image at x + displacement, for every displacement; 0 outside."""
-    index = [_shifted_indices(side).to(image.device) for side in image.shape[-2:]]
+def _displaced(image: Float[Tensor, "n c h w"], right: int) -> Float[Tensor, "n c k h w"]:
+    """The image at x + (right, down) for all DISPLACEMENTS down; 0 outside."""
+    height, width = image.shape[-2:]
     padded = torch.nn.functional.pad(image, (REACH_PX,) * 4)
-    # Whole columns, then whole rows are copied, which is ten times as fast as single pixels.
-    columns = padded.index_select(3, index[1].flatten()).unflatten(3, index[1].shape)
-    columns = columns.movedim(3, 2).contiguous()
-    rows = columns.index_select(3, index[0].flatten()).unflatten(3, index[0].shape)
-    return rows.flatten(2, 3)
-
-
-def _shifted_indices(side: int) -> Int[Tensor, "r l"]:
-    """Indices of a padded axis, for every displacement along it."""
-    return torch.arange(2 * REACH_PX + 1)[:, None] + torch.arange(side)
+    column = padded[..., REACH_PX + right : REACH_PX + right + width]
+    shifts = torch.arange(len(DISPLACEMENTS), device=image.device)[:, None]
+    rows = shifts + torch.arange(height, device=image.device)
+    return column.index_select(2, rows.flatten()).unflatten(2, rows.shape)

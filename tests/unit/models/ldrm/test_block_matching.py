@@ -12,7 +12,7 @@ from diff4splat.models.ldrm.refinement.block_matching import (
     LENGTH_COST,
     OUTSIDE_COST,
     REACH_PX,
-    _costs,
+    _column_costs,
     matched_displacement,
 )
 
@@ -36,7 +36,8 @@ def test_far_shifts_are_found_to_the_pixel(right: int, down: int) -> None:
 
 def test_costs_are_those_of_the_formula() -> None:
     own, other = (texture(seed=seed)[..., :10, :12].double() for seed in (1, 2))
-    costs, span = _costs(own, other), range(-REACH_PX, REACH_PX + 1)
+    span = range(-REACH_PX, REACH_PX + 1)
+    costs = torch.cat([_column_costs(own, other, right) for right in span], 1)
     displacements = [(right, down) for right in span for down in span]
     for y, x, index in [(0, 0, 40), (5, 6, 144), (9, 11, 200), (4, 2, 180)]:
         right, down = displacements[index]
