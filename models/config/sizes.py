@@ -60,7 +60,7 @@ def small_size() -> ModelConfig:
         ),
         ldrm=LdrmConfig(width=128, heads=4, feedforward_width=384, blocks=8),
         deformation=DeformationConfig(
-            width=64, blocks=3, time_frequencies=3, static_threshold_px=1.5
+            width=64, blocks=3, time_frequencies=3, static_threshold_px=4.0
         ),
         activation=ActivationConfig(),
         refinement=RefinementConfig(channels=48, depth_prior=True),

@@ -68,14 +68,12 @@ STAGES_OF_SMALL = (
 def since(old: ModelConfig, new: ModelConfig) -> ModelConfig:
     """Sets what the first release did not know and this one sets for ``small``."""
     assert old.monocular_depth.photo_scale == old.motion_unet.input_scale == 1
-    assert old.deformation.static_threshold_px == 4
     prior = replace(old.monocular_depth, photo_scale=2, image_backbone=True, uncertainty=True)
     return replace(
         old,
         monocular_depth=prior,
         motion_unet=replace(old.motion_unet, input_scale=2),
         object_mask=new.object_mask,
-        deformation=replace(old.deformation, static_threshold_px=1.5),
         refinement=replace(old.refinement, depth_prior=True),
         default_guidance=new.default_guidance,
     )
