@@ -12,7 +12,10 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.models.blocks.resize import upsample_nearest
-from diff4splat.models.ldrm.refinement.block_matching import matched_displacement
+from diff4splat.models.ldrm.refinement.block_matching import (
+    LARGEST_DIFFERENCE,
+    matched_displacement,
+)
 from diff4splat.models.ldrm.refinement.lucas_kanade import track_flow, warp
 from diff4splat.models.ldrm.refinement.window_mean import window_mean
 
@@ -22,7 +25,7 @@ FROM_MATCHES = (1,)
 """Pyramid of Lucas and Kanade's method from there: a match is off by a pixel."""
 NEIGHBOURHOOD_PX, LEAST_SHARE = 9, 0.05
 """Reduced pixels around a match, and share of matches there, that may have its displacement."""
-COMPARED_PX, LARGEST_DIFFERENCE = 5, 0.15
+COMPARED_PX = 5
 SMALLER_SHARE = 0.85
 """Of the difference after the first flow, below which the second counts."""
 

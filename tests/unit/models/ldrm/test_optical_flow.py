@@ -14,11 +14,11 @@ WITHIN = (0, slice(None), slice(23, 33), slice(13, 23))
 def images(right: int, down: int) -> tuple[Tensor, Tensor]:
     """An object before a background, displaced in the second image."""
     coarse = torch.rand(2, 3, 16, 16, generator=torch.Generator().manual_seed(5))
-    background, thing = torch.nn.functional.interpolate(coarse, scale_factor=4, mode="bicubic")
+    background, item = torch.nn.functional.interpolate(coarse, scale_factor=4, mode="bicubic")
     source, target = (background.clamp(0, 1).clone() for _ in range(2))
     rows, columns = OBJECT
     there = (slice(rows.start + down, rows.stop + down), slice(10 + right, 26 + right))
-    source[:, rows, columns] = thing[:, rows, columns].clamp(0, 1)
+    source[:, rows, columns] = item[:, rows, columns].clamp(0, 1)
     target[:, there[0], there[1]] = source[:, rows, columns]
     return source[None], target[None]
 
