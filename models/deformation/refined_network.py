@@ -26,13 +26,11 @@ from diff4splat.models.ldrm.refinement.decoder import widths
 from diff4splat.models.ldrm.refinement.motion_features import (
     INPUT_CHANNELS,
     MOTION_CHANNELS,
-    RATE_UNIT,
-    SLOT_CUES,
-    SLOTS,
     input_motion,
     keyframe_span,
     slot_weights,
 )
+from diff4splat.models.ldrm.refinement.warped_flow import RATE_UNIT, SLOT_CUES, SLOTS
 
 CHANNELS = sum(DEFORMATION_SPLIT)
 

@@ -225,22 +225,13 @@ class OnnxLdrm(OnnxPart):
         if moving and self.config.refinement.used:
             features, config = tokens.transpose(1, 2), self.config.activation
             tokens = motion_features(
-                features, gaussians[:, -1], posed_video, config, self._track_slot
+                features, gaussians[:, -1], posed_video, config, self._optical_flow
             )
         return RawGaussianMaps(gaussians=gaussians, tokens=tokens, border=found.get("border"))
 
-    def _track_slot(
-        self, depth: Tensor, posed_video: PosedVideo, frames: Tensor, rate_px: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        batch = len(depth)
-        inputs = {
-            "depth": depth,
-            "frames": frames,
-            "rate_px": rate_px.unflatten(0, (batch, -1)),
-            **posed_inputs(posed_video),
-        }
-        found = run_graph(self.model["ldrm_optical_flow"], inputs)
-        return found["next_rate_px"].flatten(0, 1), found["slot"].flatten(0, 1)
+    def _optical_flow(self, source: Tensor, target: Tensor, start: Tensor) -> Tensor:
+        inputs = {"source": source, "target": target, "start": start}
+        return run_graph(self.model["ldrm_optical_flow"], inputs)["flow"]
 
 
 class OnnxDeformation(OnnxPart):

@@ -1,7 +1,7 @@
 """Graphs of LDRM and the deformation network.
 
-With refinement, optical flow has a graph of its own: one call per direction and distance in time,
-each initialised with the result of the one before.
+With refinement, optical flow has a graph of its own: one call per distance in time, each
+initialised with the result of the one before.
 """
 
 from torch import Tensor, nn
@@ -15,8 +15,9 @@ from diff4splat.models.config.networks import (
     TIME_STRIDE,
     TOKEN_PATCH,
 )
+from diff4splat.models.ldrm.optical_flow.optical_flow import optical_flow
 from diff4splat.models.ldrm.refinement.decoder import widths
-from diff4splat.models.ldrm.refinement.motion_features import MOTION_CHANNELS, SLOT_CUES, track_slot
+from diff4splat.models.ldrm.refinement.motion_features import MOTION_CHANNELS
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, StartDistance
 from diff4splat.models.onnx.manifest import TensorSpec
 from diff4splat.models.onnx.shapes import Axis
@@ -24,12 +25,10 @@ from diff4splat.models.onnx_export.source import (
     GraphSource,
     InputSource,
     TensorFunction,
-    integers,
     normal,
     output,
     pixels,
     poses,
-    positive,
     unit,
 )
 
@@ -38,7 +37,7 @@ KEYS: Axis = "packs+1"
 
 
 def ldrm_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
-    """Raw maps, and with refinement the optical flow of one slot."""
+    """Raw maps, and with refinement the optical flow of pairs of images."""
     refined = config.refinement.used
     posed = refined or config.ldrm.input == "frames"
     size = _pixels(config)
@@ -138,29 +137,13 @@ def _map_outputs(config: ModelConfig) -> tuple[TensorSpec, ...]:
 
 
 def _optical_flow(config: ModelConfig) -> GraphSource:
-    def track(
-        _: nn.Module, depth: Tensor, frames: Tensor, rate_px: Tensor, *video: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        found = track_slot(depth, posed_video(*video), frames, rate_px.flatten(0, 1))
-        batch = depth.shape[0]
-        return tuple(maps.unflatten(0, (batch, -1)) for maps in found)
-
-    size = _pixels(config)
-    rate = ("batch", KEYS, 2, *size)
+    image, flow = (("pairs", channels, *_pixels(config)) for channels in (3, 2))
     return GraphSource(
         name="ldrm_optical_flow",
         part="ldrm",
-        module=TensorFunction(nn.Identity(), track),
-        inputs=(
-            positive("depth", "batch", KEYS, *size),
-            integers("frames", 1, KEYS),
-            normal("rate_px", *rate),
-            *posed_sources(config),
-        ),
-        outputs=(
-            output("next_rate_px", *rate),
-            output("slot", "batch", KEYS, SLOT_CUES, *size),
-        ),
+        module=TensorFunction(nn.Identity(), lambda _, *images: optical_flow(*images)),
+        inputs=(unit("source", *image), unit("target", *image), normal("start", *flow)),
+        outputs=(output("flow", *flow),),
     )
 
 

@@ -82,11 +82,6 @@ def unit(name: str, *shape: Axis) -> InputSource:
     return _float(name, shape, lambda size, generator: torch.rand(size, generator=generator))
 
 
-def positive(name: str, *shape: Axis) -> InputSource:
-    """In [1, 2)."""
-    return _float(name, shape, lambda size, generator: 1 + torch.rand(size, generator=generator))
-
-
 def pixels(name: str, *shape: Axis) -> InputSource:
     """In [32, 64), such as focal lengths."""
     return _float(

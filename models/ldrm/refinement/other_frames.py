@@ -12,7 +12,7 @@ from torch import Tensor
 from diff4splat.geometry.camera import Camera
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, camera_frames, flat_cameras
 from diff4splat.models.ldrm.refinement.warping import inside, other_pixels, sampled
-from diff4splat.models.ldrm.refinement.window_mean import window_mean
+from diff4splat.models.ldrm.window_mean import window_mean
 
 DISTANCES = (2, 4, 8)
 """Frames between a key frame and those that it is compared with, before and after."""

@@ -22,7 +22,7 @@ from diff4splat.models.ldrm.refinement.other_frames import (
     other_frames,
 )
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo, flat_cameras
-from diff4splat.models.ldrm.refinement.window_mean import window_mean
+from diff4splat.models.ldrm.window_mean import window_mean
 
 STEPS = 6
 WINDOW_PX, SMOOTHING_WINDOW_PX = 9, 17

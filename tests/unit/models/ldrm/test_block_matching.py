@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from diff4splat.models.ldrm.refinement.block_matching import (
+from diff4splat.models.ldrm.optical_flow.block_matching import (
     BLOCK_PX,
     LARGEST_DIFFERENCE,
     LENGTH_COST,

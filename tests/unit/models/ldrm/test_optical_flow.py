@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from diff4splat.models.ldrm.refinement.lucas_kanade import track_flow
-from diff4splat.models.ldrm.refinement.optical_flow import optical_flow
+from diff4splat.models.ldrm.optical_flow.lucas_kanade import track_flow
+from diff4splat.models.ldrm.optical_flow.optical_flow import optical_flow
 
 OBJECT = (slice(20, 36), slice(10, 26))
 WITHIN = (0, slice(None), slice(23, 33), slice(13, 23))

@@ -15,7 +15,7 @@ from diff4splat.models.ldrm.refinement.motion_features import key_depth
 from diff4splat.models.ldrm.refinement.parallax import LONGEST_STEP, STEPS, parallax_depth
 from diff4splat.models.ldrm.refinement.posed_video import PosedVideo
 from diff4splat.models.ldrm.refinement.start_distance import with_start_distance
-from diff4splat.models.ldrm.refinement.window_mean import window_mean
+from diff4splat.models.ldrm.window_mean import window_mean
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])

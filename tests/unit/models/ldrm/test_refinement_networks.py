@@ -137,7 +137,7 @@ def test_the_cost_volume_and_the_border_can_be_left_out(change: dict[str, int]) 
 def test_a_static_video_needs_no_optical_flow(monkeypatch: pytest.MonkeyPatch) -> None:
     network, given = randomised(Ldrm(CONFIG)), inputs(5, (32, 32))
     moving = network(*given)
-    monkeypatch.delattr(motion_features, "optical_flow")
+    monkeypatch.delattr(motion_features, "warped_flow")
     static = network(*given, moving=False)
     assert torch.equal(static.gaussians, moving.gaussians)
     assert static.tokens.shape[1] == moving.tokens.shape[1] - motion_features.MOTION_CHANNELS

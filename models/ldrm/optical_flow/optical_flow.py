@@ -12,12 +12,12 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.models.blocks.resize import upsample_nearest
-from diff4splat.models.ldrm.refinement.block_matching import (
+from diff4splat.models.ldrm.optical_flow.block_matching import (
     LARGEST_DIFFERENCE,
     matched_displacement,
 )
-from diff4splat.models.ldrm.refinement.lucas_kanade import track_flow, warp
-from diff4splat.models.ldrm.refinement.window_mean import window_mean
+from diff4splat.models.ldrm.optical_flow.lucas_kanade import track_flow, warp
+from diff4splat.models.ldrm.window_mean import window_mean
 
 REDUCTION = 2
 """Of the images in which blocks are matched."""

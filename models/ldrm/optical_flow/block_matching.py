@@ -11,8 +11,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.models.ldrm.refinement.lucas_kanade import warp
-from diff4splat.models.ldrm.refinement.window_mean import window_mean
+from diff4splat.models.ldrm.optical_flow.lucas_kanade import warp
+from diff4splat.models.ldrm.window_mean import window_mean
 
 REACH_PX = 8
 DISPLACEMENTS = tuple(range(-REACH_PX, REACH_PX + 1))

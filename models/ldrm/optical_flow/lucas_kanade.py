@@ -14,7 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.models.blocks.resize import upsample_bilinear
-from diff4splat.models.ldrm.refinement.window_mean import window_mean
+from diff4splat.models.ldrm.window_mean import window_mean
 
 PYRAMID = (2, 1)
 """Downsampling factors, coarse first."""

@@ -1,0 +1,1 @@
+"""Optical flow between two images: gradients, and blocks where displacements are large."""
