@@ -14,6 +14,7 @@ import torch
 from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
+from diff4splat.generation.layered_image.windows import largest_around
 
 MARGIN_SHARE = 1 / 48
 """Of the image's longer side: near what moves, colours are mixed and shadows fall."""
@@ -27,4 +28,7 @@ def disoccluded_layer(pixels: ImageLayer) -> ImageLayer | None:
     known = ~grown(moving, margin_px)
     if not bool(moving.any()) or not bool(known.any()):
         return None
-    return static_layer(pixels, known, grown(moving, 1), pixels.depth)
+    # A footprint covers the neighbours too: a cell behind its own pixel alone would be in front of
+    # a farther pixel of the object beside it, and stay there as a part of the object moves.
+    farthest = largest_around(torch.where(moving, pixels.depth, 0.0), 1)
+    return static_layer(pixels, known, grown(moving, 1), torch.maximum(pixels.depth, farthest))
