@@ -115,8 +115,10 @@ def _is_large(entry: object) -> bool:
 def quantized(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
     """Symmetric int8 with one scale for each index of ``axis``; zeros have the scale 1."""
     others = tuple(other for other in range(values.ndim) if other != axis)
-    scale = np.abs(values).max(axis=others) / 127
-    scale = np.where(scale > 0, scale, 1).astype(np.float32)
+    largest = np.abs(values).max(axis=others)
+    # A subnormal scale would have too few digits.
+    scale = np.maximum(largest / 127, np.finfo(np.float32).tiny)
+    scale = np.where(largest > 0, scale, 1).astype(np.float32)
     shape = [-1 if other == axis else 1 for other in range(values.ndim)]
     return np.clip(np.rint(values / scale.reshape(shape)), -127, 127).astype(np.int8), scale
 

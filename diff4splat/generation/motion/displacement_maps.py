@@ -6,9 +6,9 @@ that the motion prior sees.
 
 from dataclasses import replace
 
-import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
+from torch.nn.functional import avg_pool2d
 
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
@@ -31,7 +31,7 @@ def with_displacement(
 ) -> ImageMaps:
     """``maps`` whose pixels move as the copy ``image`` does; ``depth`` is that of the copy."""
     if displacement.shape[1:3] == maps.depth.shape:
-        return replace(maps, displacement=displacement)
+        return replace(maps, depth=depth, displacement=displacement)
     fine = maps.fine or FineMaps(rgb=image.rgb, depth=depth)
     if fine.depth.shape == depth.shape:
         fine = replace(fine, depth=depth)
@@ -61,7 +61,13 @@ def reduced_displacement(
     """
     factor = depth.shape[0] // small_depth.shape[0]
     relative = (displacement / depth[..., None]).movedim(-1, 1)
-    moving = displacement.any(-1).any(0).to(depth)[None, None]
-    share = torch.nn.functional.avg_pool2d(moving, factor)
-    means = torch.nn.functional.avg_pool2d(relative, factor) / share.clamp_min(0.5 / factor**2)
+    means, share = mean_of_moving(relative, displacement.any(-1).any(0), factor)
     return (means * (share >= least_share)).movedim(1, -1) * small_depth[..., None]
+
+
+def mean_of_moving(
+    values: Float[Tensor, "t c y x"], moving: Bool[Tensor, "y x"], factor: int
+) -> tuple[Float[Tensor, "t c h w"], Float[Tensor, "h w"]]:
+    """Mean over the moving pixels of every cell, 0 where none moves, and the share that does."""
+    share = avg_pool2d(moving.to(values)[None], factor)[0]
+    return avg_pool2d(values * moving, factor) / share.clamp_min(0.5 / factor**2), share

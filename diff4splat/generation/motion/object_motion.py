@@ -24,7 +24,7 @@ from diff4splat.generation.motion.displacement_maps import (
 )
 from diff4splat.generation.motion.motion_mask import event_of_pixels, motion_probability
 from diff4splat.generation.motion.networks import motion_prior
-from diff4splat.generation.motion.object_relief import bounded_relief, with_relief
+from diff4splat.generation.motion.object_relief import with_bounded_relief
 from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import GenerationSettings, why_unguided
 from diff4splat.models.hub.model import Model
@@ -57,10 +57,8 @@ class ObjectMotion:
         displacement = self._displacement(image, event, depth)
         if not displacement.any():
             return maps
-        if maps.fine is None or maps.fine.smooth:  # given depth is no prediction
-            moving, predicted = displacement.any(-1).any(0), depth
-            depth = bounded_relief(predicted, moving, float(image.camera.focal_px[0]))
-            maps = with_relief(maps, (depth / predicted).log(), moving)
+        moving, focal_px = displacement.any(-1).any(0), float(image.camera.focal_px[0])
+        maps, depth = with_bounded_relief(maps, depth, moving, focal_px)
         if shows_photograph:
             return with_displacement(maps, image, depth, displacement)
         return with_majority_displacement(maps, depth, displacement)

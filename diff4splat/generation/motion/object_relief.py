@@ -1,9 +1,8 @@
 """Relief of what moves: no deeper than an object of that size in the image.
 
-Axes: ``h w`` pixels of the copy that other networks see, ``y x`` of the copy that the motion prior
-sees. Predicted depth mixes the pixels of an object with the background beside them. Of what is
-static that bends an edge. What moves is torn by it: in the image a pixel at twice the depth moves
-half as far.
+Axes: ``y x`` pixels of the copy that the motion prior sees. Predicted depth mixes the pixels of an
+object with the background beside them. Of what is static that bends an edge. What moves is torn by
+it: in the image a pixel at twice the depth moves half as far.
 """
 
 from dataclasses import replace
@@ -11,16 +10,32 @@ from dataclasses import replace
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
-from torch.nn.functional import avg_pool2d
 
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.rigid_components import connected_components
+from diff4splat.generation.motion.displacement_maps import mean_of_moving
 
 RELIEF_SHARE = 0.25
 """Of a component's extent: largest distance in depth from its median. The visible half of a ball
 lies within a quarter of the diameter."""
 LEAST_SHARE = 0.5
 """Share of a cell's pixels that must move, for its depth to change."""
+
+
+def with_bounded_relief(
+    maps: ImageMaps, depth: Float[Tensor, "y x"], moving: Bool[Tensor, "y x"], focal_px: float
+) -> tuple[ImageMaps, Float[Tensor, "y x"]]:
+    """``maps`` and ``depth`` of the copy, bounded where it moves; as they are if depth was given.
+
+    Cells of the maps, where most of them moves, change as the copy does.
+    """
+    if maps.fine is not None and not maps.fine.smooth:
+        return maps, depth
+    bounded = bounded_relief(depth, moving, focal_px)
+    change = (bounded / depth).log()[None, None]
+    mean, share = mean_of_moving(change, moving, len(depth) // len(maps.depth))
+    factor = torch.where(share >= LEAST_SHARE, mean[0, 0], 0.0).exp()
+    return replace(maps, depth=maps.depth * factor), bounded
 
 
 def bounded_relief(
@@ -34,16 +49,6 @@ def bounded_relief(
         median = depth[inside].median()
         bounded[inside] = median * (depth[inside] / median).log().clamp(-limit, limit).exp()
     return bounded
-
-
-def with_relief(
-    maps: ImageMaps, change: Float[Tensor, "y x"], moving: Bool[Tensor, "y x"]
-) -> ImageMaps:
-    """``maps`` whose cells, where most of them moves, take the ``change`` of a copy's log depth."""
-    factor = change.shape[0] // maps.depth.shape[0]
-    share = avg_pool2d(moving.to(change)[None, None], factor)[0, 0]
-    mean = avg_pool2d((change * moving)[None, None], factor)[0, 0] / share.clamp_min(LEAST_SHARE)
-    return replace(maps, depth=maps.depth * torch.where(share >= LEAST_SHARE, mean, 0.0).exp())
 
 
 def _extent_px(inside: Bool[Tensor, "y x"]) -> int:

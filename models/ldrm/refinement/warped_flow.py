@@ -65,20 +65,21 @@ def _tracks(
         (inside,) = torch.where((frames >= 0) & (frames <= last))
         if len(inside):
             pairs = torch.stack([inside % len(keys), frames[inside]])
-            found = _track_pairs(depth, posed_video, pairs, (flow, track[:, inside, :2]))
+            found = _tracked(depth, posed_video, pairs, track[:, inside, :2], flow)
             track = track.index_copy(1, inside, found)
         tracks.append(track)
     return torch.stack(tracks, 2)
 
 
-def _track_pairs(
+def _tracked(
     depth: Float[Tensor, "b k h w"],
     posed_video: PosedVideo,
     pairs: Int[Tensor, "2 p"],
-    start: tuple[OpticalFlow, Float[Tensor, "b p 2 h w"]],
+    rate_px: Float[Tensor, "b p 2 h w"],
+    flow: OpticalFlow,
 ) -> Float[Tensor, "b p 3 h w"]:
-    """Pixels per frame and difference from key frames to frames, from rates so far."""
-    (keys, frames), (flow, rate_px) = pairs, start
+    """Pixels per frame and difference from key frames to frames, initialised with ``rate_px``."""
+    keys, frames = pairs
     elapsed = (frames - posed_video.keys[keys]).to(rate_px)[:, None, None, None]
     source = at_least_float32(posed_video.key_rgb[:, keys].flatten(0, 1))
     target = _warped_frames(depth, posed_video, pairs)

@@ -8,9 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import connected_components
-from diff4splat.generation.motion.object_relief import RELIEF_SHARE, bounded_relief, with_relief
+from diff4splat.generation.motion.object_relief import (
+    RELIEF_SHARE,
+    bounded_relief,
+    with_bounded_relief,
+)
 
 SIDE, FOCAL_PX = 16, 16.0
 
@@ -47,15 +51,27 @@ def test_every_component_has_its_own_median() -> None:
     assert torch.equal(bounded_relief(depth, left | right, FOCAL_PX), depth)
 
 
-@pytest.mark.parametrize(("pixels", "changes"), [(1, False), (2, True), (4, True)])
-def test_a_cell_takes_the_mean_change_of_what_moves_in_it(pixels: int, changes: bool) -> None:
-    moving, change = torch.zeros(4, 4, dtype=torch.bool), torch.zeros(4, 4)
-    for pixel in range(pixels):
-        moving[pixel // 2, pixel % 2] = True
-    change[moving] = math.log(2.0)
-    maps = ImageMaps(depth=torch.full((2, 2), 3.0), displacement=None)
-    found = with_relief(maps, change, moving).depth
-    assert found.flatten().tolist() == pytest.approx([6.0 if changes else 3.0, 3.0, 3.0, 3.0])
+@pytest.mark.parametrize(("pixels", "changes"), [(3, False), (8, True), (16, True)])
+def test_cells_of_which_most_moves_change_as_the_copy_does(pixels: int, changes: bool) -> None:
+    moving, depth = box(slice(0, 4), slice(0, 4)), torch.full((SIDE, SIDE), 3.0)
+    # All that moves in the second cell of four pixels is at the depth of the background.
+    moving[4:8, 0:4] = torch.arange(16).view(4, 4) < pixels
+    depth[4:8, 0:4] = 9.0
+    maps = ImageMaps(depth=torch.full((4, 4), 5.0), displacement=None)
+    found, bounded = with_bounded_relief(maps, depth, moving, FOCAL_PX)
+    assert torch.equal(bounded, bounded_relief(depth, moving, FOCAL_PX))
+    change = float((bounded / depth)[4, 0])
+    assert change < 0.5
+    assert float(found.depth[1, 0]) == pytest.approx(5.0 * change if changes else 5.0)
+    assert bool((found.depth.flatten()[[0, 1, 2, 3, 5]] == 5.0).all())
+
+
+def test_given_depth_is_not_changed() -> None:
+    depth, moving = torch.rand(SIDE, SIDE) + 1, box(slice(2, 9), slice(2, 9))
+    fine = FineMaps(rgb=torch.rand(SIDE, SIDE, 3), depth=depth, smooth=False)
+    maps = ImageMaps(depth=depth[::2, ::2], displacement=None, fine=fine)
+    found, same = with_bounded_relief(maps, depth, moving, FOCAL_PX)
+    assert found is maps and same is depth
 
 
 def test_nothing_changes_where_nothing_moves() -> None:

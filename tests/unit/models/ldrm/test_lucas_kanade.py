@@ -2,19 +2,11 @@
 
 import pytest
 import torch
+from flow_images import INSIDE, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from torch import Tensor
 
 from diff4splat.models.ldrm.optical_flow.lucas_kanade import track_flow, warp
-
-INSIDE = (..., slice(12, -12), slice(12, -12))
-
-
-def texture(count: int = 1, side: int = 64) -> Tensor:
-    """Smooth enough to have slopes."""
-    coarse = torch.rand(count, 3, side // 8, side // 8, generator=torch.Generator().manual_seed(0))
-    return torch.nn.functional.interpolate(coarse, scale_factor=8, mode="bicubic").clamp(0, 1)
 
 
 @pytest.mark.parametrize(("right", "down"), [(0, 0), (1, 0), (2, -1), (-2, 3)])

@@ -3,9 +3,9 @@
 import math
 
 import torch
+from flow_images import INSIDE, cameras, texture
 from torch import Tensor
 
-from diff4splat.geometry.camera import Camera, pinhole
 from diff4splat.models.ldrm.optical_flow.optical_flow import optical_flow
 from diff4splat.models.ldrm.refinement.motion_features import (
     MOTION_CHANNELS,
@@ -22,35 +22,12 @@ from diff4splat.models.ldrm.refinement.warped_flow import (
     warped_flow,
 )
 
-INSIDE = (..., slice(12, -12), slice(12, -12))
-
-
-def texture(count: int = 1, side: int = 64) -> Tensor:
-    """Smooth enough to have slopes."""
-    coarse = torch.rand(count, 3, side // 8, side // 8, generator=torch.Generator().manual_seed(0))
-    return torch.nn.functional.interpolate(coarse, scale_factor=8, mode="bicubic").clamp(0, 1)
-
-
-def cameras(count: int, turn: float = 0.0) -> Camera:
-    """All at one place; each is turned around z once more than the one before it."""
-    poses = torch.eye(4).repeat(1, count, 1, 1)
-    for index in range(count):
-        sine, cosine = math.sin(turn * index), math.cos(turn * index)
-        poses[0, index, :2, :2] = torch.tensor([[cosine, -sine], [sine, cosine]])
-    one = pinhole(64.0, (64, 64))
-    return Camera(
-        focal_px=one.focal_px.expand(1, count, 2),
-        center_px=one.center_px.expand(1, count, 2),
-        world_from_camera=poses,
-        size_px=(64, 64),
-    )
-
 
 def test_rates_are_depths_per_clip_and_ends_take_the_other_side() -> None:
     own, count = texture()[0], 9
     video = torch.stack([own.roll(index, -1) for index in range(count)], 1)[None]
-    sight = PosedVideo(rgb=video, cameras=cameras(count))
-    found = warped_flow(torch.full((1, 3, 64, 64), 5.0), sight)
+    posed = PosedVideo(rgb=video, cameras=cameras(count))
+    found = warped_flow(torch.full((1, 3, 64, 64), 5.0), posed)
     assert found.shape == (1, 3, SLOTS, 4, 64, 64)
     # One pixel per frame, eight of them per clip, at a focal length of 64.
     rate, difference = found[:, :, :, :3] * RATE_UNIT, found[:, :, :, 3] * DIFFERENCE_UNIT
@@ -74,17 +51,17 @@ def test_rates_are_along_the_axes_of_the_first_camera() -> None:
     )
     assert float(still[:, :, :, :3][INSIDE].abs().median()) < 0.02
     shifted = torch.stack([own.roll(i, -1).rot90(i, (-2, -1)) for i in range(count)], 1)[None]
-    sight = PosedVideo(rgb=shifted, cameras=cameras(5, quarter))
+    posed = PosedVideo(rgb=shifted, cameras=cameras(5, quarter))
     rates = (
-        warped_flow(torch.full((1, 2, 64, 64), 5.0), sight)[INSIDE].flatten(-2).median(-1).values
+        warped_flow(torch.full((1, 2, 64, 64), 5.0), posed)[INSIDE].flatten(-2).median(-1).values
     )
     want = torch.tensor([4 / 64, 0.0, 0.0]) / RATE_UNIT
     torch.testing.assert_close(rates[0, :, 0, :3], want.expand(2, 3), atol=0.02, rtol=0)
 
 
 def test_one_frame_moves_nowhere() -> None:
-    sight = PosedVideo(rgb=texture()[:, :, None], cameras=cameras(1))
-    found = warped_flow(torch.full((1, 1, 64, 64), 5.0), sight)
+    posed = PosedVideo(rgb=texture()[:, :, None], cameras=cameras(1))
+    found = warped_flow(torch.full((1, 1, 64, 64), 5.0), posed)
     assert not found.any()
 
 
@@ -109,21 +86,12 @@ def test_frames_beyond_the_video_are_not_computed_and_repeat_the_last_one() -> N
 def test_every_video_of_a_batch_is_tracked_as_if_alone() -> None:
     own = texture(2)
     video = torch.stack([own.roll((index, -2 * index), (-1, -2)) for index in range(5)], 2)
-    both = PosedVideo(rgb=video, cameras=_repeated(cameras(5, 0.02), 2))
+    both = PosedVideo(rgb=video, cameras=cameras(5, 0.02, batch=2))
     depth = torch.stack([torch.full((2, 64, 64), depth) for depth in (4.0, 6.0)])
     found = warped_flow(depth, both)
     for index in range(2):
         alone = warped_flow(depth[index : index + 1], both.sample(index))
         torch.testing.assert_close(found[index : index + 1], alone, atol=1e-4, rtol=1e-4)
-
-
-def _repeated(camera: Camera, count: int) -> Camera:
-    return Camera(
-        focal_px=camera.focal_px.repeat(count, 1, 1),
-        center_px=camera.center_px.repeat(count, 1, 1),
-        world_from_camera=camera.world_from_camera.repeat(count, 1, 1, 1),
-        size_px=camera.size_px,
-    )
 
 
 def test_slots_speak_for_the_times_they_are_at_and_share_those_between() -> None:

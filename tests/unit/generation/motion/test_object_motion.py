@@ -1,0 +1,48 @@
+"""What the motion prior adds to the maps of an image."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from image_layers import input_image, random_rgb
+from torch import Tensor
+
+from diff4splat.generation.inputs.copies import Copies
+from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
+from diff4splat.generation.motion.object_motion import ObjectMotion
+from diff4splat.models.config.sizes import size_by_name
+from diff4splat.models.hub.model import Model
+from diff4splat.progress.run_log import RunLog
+
+SIDE = 16
+MOVING = (slice(4, 10), slice(4, 10))
+
+
+def moved(monkeypatch: pytest.MonkeyPatch, depth: Tensor, scale: int = 2) -> ImageMaps:
+    """Maps of an image of which a box moves by one unit to the right."""
+    event = torch.zeros(scale * SIDE, scale * SIDE, dtype=torch.long)
+    rows, columns = (slice(scale * one.start, scale * one.stop) for one in MOVING)
+    event[rows, columns] = 1
+    displacement = (event > 0)[None, ..., None] * torch.tensor([1.0, 0.0, 0.0])
+    monkeypatch.setattr(ObjectMotion, "_events", lambda *_: event)
+    monkeypatch.setattr(ObjectMotion, "_displacement", lambda *_: displacement)
+    small = size_by_name("small")
+    unet = replace(small.motion_unet, input_scale=scale)
+    model = Model(config=replace(small, motion_unet=unet))
+    image = input_image(random_rgb(SIDE, SIDE))
+    motion = ObjectMotion(model=model, frames=1, requests=(), log=RunLog())
+    maps = ImageMaps(depth=depth, displacement=None)
+    return motion.added_to(maps, Copies(image=image, small=image))
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+def test_background_in_the_edge_of_what_moves_moves_as_far_in_the_image(
+    monkeypatch: pytest.MonkeyPatch, scale: int
+) -> None:
+    depth = torch.full((SIDE, SIDE), 9.0)
+    depth[4:10, 4:9] = 3.0
+    maps = moved(monkeypatch, depth, scale)
+    in_image = (maps.displacement[0, ..., 0] / maps.depth)[MOVING]
+    # Unbounded, the last column would move by a third.
+    assert float(in_image.min()) > 0.8 * float(in_image.max())
+    assert float(maps.depth[6, 9]) < 4 and float(maps.depth[6, 12]) == 9.0
