@@ -13,11 +13,11 @@ from functools import cache
 
 from diff4splat.captions.known_words import read_prompt, stem, words_of
 from diff4splat.captions.synonyms import TRAVEL_VERBS
-from diff4splat.captions.vocabulary import IN_PLACE, VERBS
+from diff4splat.captions.vocabulary import IN_PLACE, OF_PARTS, ROLLING, VERBS
 
 NO_OBJECT = "the prompt names no object or colour that the model knows"
 NO_MOTION_WORD = "the prompt names no motion or direction that the model knows"
-ONLY_IN_PLACE = "the prompt asks only for motion in place, and objects are moved as a whole"
+ONLY_OF_PARTS = "the prompt asks only for motion of parts, and objects are moved as a whole"
 
 _SEPARATOR = re.compile(r"\s*[,;.]\s+(?:(?:and|while|then)\s+)*|\s+(?:and|while)\s+", re.IGNORECASE)
 _GOES_ON = re.compile(
@@ -46,8 +46,9 @@ def split_events(prompt: str) -> tuple[str, ...]:
 
 
 def moving_events(prompt: str) -> tuple[str, ...]:
-    """The events after which an object is elsewhere."""
-    return tuple(event for event in split_events(prompt) if not is_in_place(event))
+    """The events that move an object as a whole: it is elsewhere after them, or moves in place."""
+    events = split_events(prompt)
+    return tuple(event for event in events if local_motion(event) or not is_in_place(event))
 
 
 def why_static(prompt: str) -> str:
@@ -57,7 +58,7 @@ def why_static(prompt: str) -> str:
         return NO_OBJECT
     if not words.motions:
         return NO_MOTION_WORD
-    return "" if moving_events(prompt) else ONLY_IN_PLACE
+    return "" if moving_events(prompt) else ONLY_OF_PARTS
 
 
 def is_in_place(event: str) -> bool:
@@ -69,6 +70,23 @@ def is_in_place(event: str) -> bool:
         other = re.sub(rf"\b{phrase}\b", "", other)
     motions = [word for word in other.split() if read_prompt(word).motions]
     return all(word in verbs for word in motions) and (bool(motions) or other != stems)
+
+
+def local_motion(event: str) -> str:
+    """Motion of the object about itself, as in ``VERBS``: turning, growing, bending; or empty."""
+    words = _stem(_NO_MOTION.sub("", event).casefold())
+    for phrase, motion in _local_phrases():
+        if re.search(rf"\b{phrase}\b", words):
+            return motion
+    return ""
+
+
+@cache
+def _local_phrases() -> tuple[tuple[str, str], ...]:
+    """Stems of phrases with their motion, longest first."""
+    local = [motion for motion in (*ROLLING, *IN_PLACE) if motion not in OF_PARTS]
+    phrases = [(_stem(phrase), motion) for motion in local for phrase in VERBS[motion]]
+    return tuple(sorted(phrases, key=lambda one: -len(one[0])))
 
 
 @cache

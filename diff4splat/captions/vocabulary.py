@@ -43,6 +43,10 @@ IN_PLACE = (
     *("twists", "bends", "wobbles", "sways"),
 )
 """Motions after which an object is where it was."""
+OF_PARTS = ("reaches", "turns_sails", "flutters")
+"""Of these, those in which parts of an object move on their own."""
+ROLLING = ("rolls", "tumbles")
+"""Motions in which an object turns as far as it travels."""
 CAMERA_MOVES: dict[tuple[str, int], tuple[str, ...]] = {
     ("static", 0): ("stands still", "does not move"),
     ("orbit", 1): ("circles right", "orbits to the right"),

@@ -16,7 +16,7 @@ from typing import Literal
 import torch
 
 from diff4splat import __version__
-from diff4splat.captions.events import moving_events
+from diff4splat.captions.events import is_in_place, local_motion, moving_events
 from diff4splat.captions.image_classes.prompt_classes import prompt_classes
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
@@ -32,6 +32,7 @@ from diff4splat.generation.inputs.request import (
 from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
+from diff4splat.generation.motion.local_motion.gaussians import with_local_motion
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
@@ -143,12 +144,7 @@ class Diff4SplatPipeline:
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread(), self._autocast():
             text = self._text_states(request, log)
-            motions = [
-                MotionRequest(
-                    text=event, seed=request.seed, settings=request.settings, classes=classes
-                )
-                for event, classes in zip(text.events, text.event_classes, strict=True)
-            ]
+            motions = _motion_requests(request, text)
             maps = image_maps(model, copies, frames, motions, log)
         request = sized_to_depth(request, maps.depth)
         gaussians = self._gaussians(request, maps, text, log)
@@ -199,9 +195,12 @@ class Diff4SplatPipeline:
             if not request.settings.extended_layers:
                 layered = layered.visible
             found = image_gaussians(layered, request.key_times_s)
+            visible_count = layered.visible_count
+            if maps.objects is not None:
+                found, visible_count = with_local_motion(found, layered, maps.objects)
         threshold_px, camera = request.settings.static_threshold_px, request.image.camera
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
-        return replace(found, motion=motion), layered.visible_count
+        return replace(found, motion=motion), visible_count
 
     def _fill_request(self, request: Request, maps: ImageMaps, text: TextStates) -> FillRequest:
         border_cells = self.model.config.refinement.border_cells
@@ -243,6 +242,7 @@ class Diff4SplatPipeline:
                 prompt=prompt,
                 events=tuple(prompt if one == request.prompt else encode(one) for one in events),
                 event_classes=tuple(map(prompt_classes, events)),
+                event_words=events,
             )
 
     def _provenance(self, request: Request) -> Provenance:
@@ -259,3 +259,22 @@ class Diff4SplatPipeline:
     def _license(self, parts: Collection[str]) -> str:
         """That of the weights that ran; a scene of no trained network has none."""
         return self.model.license if self.model.trained.intersection(parts) else UNKNOWN_LICENSE
+
+
+def _motion_requests(request: Request, text: TextStates) -> list[MotionRequest]:
+    """One for each event of the prompt."""
+    key_times_s = tuple(request.key_times_s.tolist())
+    return [
+        MotionRequest(
+            text=states,
+            seed=request.seed,
+            settings=request.settings,
+            classes=classes,
+            local_motion=local_motion(words),
+            in_place=is_in_place(words),
+            key_times_s=key_times_s,
+        )
+        for states, classes, words in zip(
+            text.events, text.event_classes, text.event_words, strict=True
+        )
+    ]

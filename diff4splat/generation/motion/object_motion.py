@@ -6,7 +6,7 @@ Axes: ``y x`` pixels of the copy that the motion prior sees.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -22,13 +22,24 @@ from diff4splat.generation.motion.displacement_maps import (
     with_displacement,
     with_majority_displacement,
 )
+from diff4splat.generation.motion.local_motion.find_objects import (
+    LEAST_SIDE_PX,
+    MovingMaps,
+    with_moving_objects,
+)
 from diff4splat.generation.motion.motion_mask import event_of_pixels, motion_probability
 from diff4splat.generation.motion.networks import motion_prior
-from diff4splat.generation.motion.object_relief import with_bounded_relief
+from diff4splat.generation.motion.object_relief import (
+    has_given_depth,
+    with_bounded_relief,
+    with_changed_depth,
+)
 from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
 from diff4splat.generation.settings import GenerationSettings, why_unguided
 from diff4splat.models.hub.model import Model
 from diff4splat.progress.run_log import RunLog
+
+TOO_SMALL = f"what turns has less than {LEAST_SIDE_PX} px of the image"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,14 +65,41 @@ class ObjectMotion:
         if shows_photograph:
             mask, depth = with_rim(event > 0, depth, image.rgb)
             event = torch.where(mask, event.flatten()[nearest_inside(event > 0)], event)
-        displacement = self._displacement(image, event, depth)
-        if not displacement.any():
+        copy = MovingMaps(
+            camera=image.camera,
+            depth=depth,
+            event=event,
+            displacement=self._displacement(image, event, depth),
+            image_scale=len(images.image.rgb) / len(image.rgb),
+        )
+        moved, copy = self._moved(maps, copy)
+        if not copy.displacement.any():
             return maps
-        moving, focal_px = displacement.any(-1).any(0), float(image.camera.focal_px[0])
-        maps, depth = with_bounded_relief(maps, depth, moving, focal_px)
         if shows_photograph:
-            return with_displacement(maps, image, depth, displacement)
-        return with_majority_displacement(maps, depth, displacement)
+            return with_displacement(moved, image, copy.depth, copy.displacement)
+        return with_majority_displacement(moved, copy.depth, copy.displacement)
+
+    def _moved(self, maps: ImageMaps, copy: MovingMaps) -> tuple[ImageMaps, MovingMaps]:
+        """Both with bounded relief of what moves, and what it does about itself."""
+        in_place = self._in_place(copy.event)
+        moving = copy.displacement.any(-1).any(0) | in_place
+        if not moving.any():
+            return maps, copy
+        maps, depth = with_bounded_relief(maps, copy.depth, moving, float(copy.camera.focal_px[0]))
+        copy = replace(copy, depth=depth)
+        found, objects = with_moving_objects(
+            copy, self.requests, round_bodies=not has_given_depth(maps)
+        )
+        if in_place.any() and objects is None:
+            self.log.record_skipped("motion in place", TOO_SMALL, "the other side of objects")
+        if found.depth is not depth:
+            maps = with_changed_depth(maps, found.depth / depth, moving)
+        return replace(maps, objects=objects), found
+
+    def _in_place(self, event: Int[Tensor, "y x"]) -> Bool[Tensor, "y x"]:
+        """Pixels that move about themselves alone."""
+        numbers = [number for number, one in enumerate(self.requests, 1) if one.in_place]
+        return torch.isin(event, event.new_tensor(numbers))
 
     def _events(self, image: InputImage) -> Int[Tensor, "y x"]:
         """Number of the event that moves a pixel, from 1; 0 where none does."""
@@ -82,7 +120,7 @@ class ObjectMotion:
         with self.log.phases.phase("sample motion", steps) as advance:
             for number, request in enumerate(self.requests, 1):
                 moving = event == number
-                if not moving.any():
+                if not moving.any() or request.in_place:
                     continue
                 sample = self._sample(image, moving, request, advance)
                 field, mean = sample.field, sample.mean_field

@@ -29,13 +29,25 @@ def with_bounded_relief(
 
     Cells of the maps, where most of them moves, change as the copy does.
     """
-    if maps.fine is not None and not maps.fine.smooth:
+    if has_given_depth(maps):
         return maps, depth
     bounded = bounded_relief(depth, moving, focal_px)
-    change = (bounded / depth).log()[None, None]
-    mean, share = mean_of_moving(change, moving, len(depth) // len(maps.depth))
+    return with_changed_depth(maps, bounded / depth, moving), bounded
+
+
+def has_given_depth(maps: ImageMaps) -> bool:
+    """Whether depth is no prediction."""
+    return maps.fine is not None and not maps.fine.smooth
+
+
+def with_changed_depth(
+    maps: ImageMaps, factor: Float[Tensor, "y x"], moving: Bool[Tensor, "y x"]
+) -> ImageMaps:
+    """``maps`` whose cells change as the copy's depth does, where most of them move."""
+    change = factor.log()[None, None]
+    mean, share = mean_of_moving(change, moving, len(factor) // len(maps.depth))
     factor = torch.where(share >= LEAST_SHARE, mean[0, 0], 0.0).exp()
-    return replace(maps, depth=maps.depth * factor), bounded
+    return replace(maps, depth=maps.depth * factor)
 
 
 def bounded_relief(

@@ -33,6 +33,12 @@ class MotionRequest:
     settings: GenerationSettings
     classes: tuple[int, ...] = ()
     """Of the prompt's nouns (``captions.image_classes``)."""
+    local_motion: str = ""
+    """Of the object about itself (``captions.events.local_motion``); empty for none."""
+    in_place: bool = False
+    """Whether the object is where it was after the motion."""
+    key_times_s: tuple[float, ...] = (0.0, 1.0)
+    """At which the scene keeps motion."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -72,6 +72,8 @@ class TextStates:
     """Of each event of the prompt; None without one."""
     event_classes: tuple[tuple[int, ...], ...] = ((),)
     """Of the nouns of every event (``captions.image_classes``)."""
+    event_words: tuple[str, ...] = ("",)
+    """The events themselves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,15 +9,24 @@ from hypothesis import strategies as st
 
 from diff4splat.captions.cutout_nouns import KNOWN_NOUNS
 from diff4splat.captions.events import (
-    ONLY_IN_PLACE,
+    ONLY_OF_PARTS,
     is_in_place,
+    local_motion,
     moving_events,
     split_events,
     why_static,
 )
 from diff4splat.captions.grammar import CaptionFacts, Event, NamedObject, describe
 from diff4splat.captions.phrasings import TRAINING, VALIDATION
-from diff4splat.captions.vocabulary import CAMERA_MOVES, DIRECTIONS, IN_PLACE, PLACES, VERBS
+from diff4splat.captions.vocabulary import (
+    CAMERA_MOVES,
+    DIRECTIONS,
+    IN_PLACE,
+    OF_PARTS,
+    PLACES,
+    ROLLING,
+    VERBS,
+)
 
 CAMERA = "the camera slides right and then moves back"
 
@@ -183,8 +192,41 @@ def test_a_direction_or_another_motion_moves_an_object(prompt: str, in_place: bo
     assert is_in_place(prompt) is in_place
 
 
-def test_events_in_place_are_passed_over_and_alone_they_are_a_reason() -> None:
+def test_motions_of_parts_are_passed_over_and_alone_they_are_a_reason() -> None:
     assert moving_events("a flag flutters, a red ball rolls") == ("a red ball rolls",)
     assert why_static("a flag flutters, a red ball rolls") == ""
-    assert moving_events("a flag flutters, a red ball spins") == ()
-    assert why_static("a flag flutters, a red ball spins") == ONLY_IN_PLACE
+    assert moving_events("a flag flutters, a robot arm moves its joints") == ()
+    assert why_static("a flag flutters, a robot arm moves its joints") == ONLY_OF_PARTS
+
+
+def test_events_in_place_move_an_object_about_itself() -> None:
+    events = ("a bush sways in the wind", "a red ball spins")
+    assert moving_events(", ".join(events)) == events
+    assert [local_motion(event) for event in events] == ["sways", "spins"]
+
+
+@pytest.mark.parametrize("motion", VERBS)
+def test_every_phrase_of_a_motion_about_itself_is_known(motion: str) -> None:
+    is_local = motion in (*ROLLING, *IN_PLACE) and motion not in OF_PARTS
+    for noun in (*KNOWN_NOUNS[::40], "rounded block"):
+        for direction in ("", "left"):
+            event = Event(subject=NamedObject("orange", noun), motion=motion, direction=direction)
+            for variant in range(len(VERBS[motion])):
+                caption = describe(CaptionFacts(events=(event,)), variant)
+                assert local_motion(caption) == (motion if is_local else ""), caption
+
+
+@pytest.mark.parametrize(
+    ("event", "motion"),
+    [
+        ("The Balloon is GROWING", "grows"),
+        ("a wheel rolling away", "rolls"),
+        ("the ball moves away and shrinks", "shrinks"),
+        ("the windmill turns its sails", ""),
+        ("the bush is static, the camera rolls clockwise", ""),
+        ("the ball moves", ""),
+        ("", ""),
+    ],
+)
+def test_words_of_a_motion_about_itself(event: str, motion: str) -> None:
+    assert local_motion(event) == motion

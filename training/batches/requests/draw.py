@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.captions.events import moving_events
+from diff4splat.captions.events import is_in_place, split_events
 from diff4splat.captions.grammar import parse_caption
 from diff4splat.captions.requests import (
     caption_of_absent_object,
@@ -113,7 +113,8 @@ def _single_event(
     generator: torch.Generator,
 ) -> ObjectRequest | None:
     """One event of the clip, after which an object is elsewhere, as if it were the only one."""
-    events = [(event, _subject(event, objects)) for event in moving_events(caption)]
+    travels = [event for event in split_events(caption) if not is_in_place(event)]
+    events = [(event, _subject(event, objects)) for event in travels]
     events = [(event, one) for event, one in events if one is not None]
     if not events:
         return None

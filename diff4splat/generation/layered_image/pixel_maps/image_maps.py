@@ -9,6 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
+from diff4splat.generation.motion.local_motion.moving_object import MovingObjects
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +34,8 @@ class ImageMaps:
     """From the first frame, in scene units, at the times of the latent frames; None is static."""
     fine: FineMaps | None = None
     """The same of a larger copy, for the image's own pixels."""
+    objects: MovingObjects | None = None
+    """What moves about itself; None where nothing does."""
 
 
 def is_reduced(small: InputImage, image: InputImage) -> bool:

@@ -1,0 +1,1 @@
+"""Motion of an object about itself: it rolls, spins, grows, bends."""

@@ -1,0 +1,86 @@
+"""Round bodies from outlines, and the side that the image hides."""
+
+import pytest
+import torch
+from image_layers import layer
+from torch import Tensor
+
+from diff4splat.generation.motion.local_motion.body import rounded
+from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX, hidden_side
+from diff4splat.geometry.camera import project
+
+SIDE, FOCAL_PX, DEPTH = 48, 48.0, 6.0
+
+
+def box(first: int, last: int) -> Tensor:
+    mask = torch.zeros(SIDE, SIDE, dtype=torch.bool)
+    mask[first:last, first:last] = True
+    return mask
+
+
+def disc(radius_px: float) -> Tensor:
+    at = torch.arange(SIDE) + 0.5 - SIDE / 2
+    return at.square()[:, None] + at.square() < radius_px**2
+
+
+def test_a_disc_becomes_the_front_of_a_ball() -> None:
+    inside, depth = disc(16.0), torch.full((SIDE, SIDE), DEPTH)
+    body, middle = rounded(depth, inside, FOCAL_PX, RIM_PX)
+    assert torch.equal(body[~inside], depth[~inside])
+    radius = middle * 16 / FOCAL_PX
+    assert float(middle - body[SIDE // 2, SIDE // 2]) == pytest.approx(radius, rel=0.05)
+    at = (torch.arange(SIDE) + 0.5 - SIDE / 2)[disc(13.0)[SIDE // 2]]
+    want = middle * (1 - (16**2 - at.square()).sqrt() / FOCAL_PX)
+    found = body[SIDE // 2][disc(13.0)[SIDE // 2]]
+    torch.testing.assert_close(found, want, atol=0.05 * radius, rtol=0)
+    assert float(body[inside].median()) == pytest.approx(DEPTH)
+
+
+@pytest.mark.parametrize("first", [0, 23])
+def test_bodies_of_a_whole_image_or_of_a_pixel_are_before_the_camera(first: int) -> None:
+    inside = box(first, SIDE if first == 0 else first + 1)
+    body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, 10.0, RIM_PX)
+    assert bool((body > 0).all()) and bool(body.isfinite().all()) and middle > 0
+
+
+def test_the_back_mirrors_the_front_on_the_same_rays() -> None:
+    inside = disc(16.0)
+    body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
+    pixels = layer(body)
+    back = hidden_side(pixels, inside, middle)
+    at, z = project(pixels.camera, back.means)
+    column, row = (at - 0.5).round().long().unbind(-1)
+    torch.testing.assert_close(at, torch.stack([column, row], -1) + 0.5)
+    assert bool(inside[row, column].all())
+    # Nothing lies before the front, and the farthest cell is as far behind the middle.
+    assert bool((z >= body[row, column] - 1e-4).all())
+    farthest = 2 * middle - float(body[inside].min())
+    assert float(z.max()) == pytest.approx(farthest, rel=1e-4)
+
+
+def test_the_surface_is_closed() -> None:
+    """From the side no gap between cells is wider than two of them."""
+    inside = disc(16.0)
+    body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
+    pixels, row = layer(body), SIDE // 2
+    back = hidden_side(pixels, inside, middle)
+    at, z = project(pixels.camera, back.means)
+    front = body[row][disc(16.0 - RIM_PX)[row]]
+    along = torch.cat([z[(at[:, 1] - 0.5).round().long() == row], front]).sort().values
+    spacing = float(middle / pixels.camera.focal_px[0])
+    assert float(along.diff().max()) < 2 * spacing
+
+
+def test_an_object_of_nothing_but_rim_has_no_back() -> None:
+    pixels = layer(torch.full((SIDE, SIDE), DEPTH))
+    assert len(hidden_side(pixels, box(20, 23), DEPTH)) == 0
+
+
+def test_colours_of_the_other_side_are_those_within_the_outline() -> None:
+    inside, rgb = disc(16.0), torch.zeros(SIDE, SIDE, 3)
+    rgb[disc(12.0)] = 1.0
+    pixels = layer(torch.full((SIDE, SIDE), DEPTH), rgb=rgb)
+    pure, mixed = (hidden_side(pixels, inside, DEPTH, margin).sh for margin in (6, RIM_PX))
+    assert float(pure.std()) < 1e-5 < float(mixed.std())
+    # Nothing is as far from the outline: the colours as they are.
+    assert torch.equal(hidden_side(pixels, inside, DEPTH, SIDE).sh, mixed)
