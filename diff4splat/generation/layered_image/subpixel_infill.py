@@ -4,7 +4,8 @@ Axes: ``h w`` pixels, ``hh ww`` = 2 h − 1, 2 w − 1 lattice points, ``v`` = w
 frames. From other sides, pixels of one surface move apart: small Gaussians leave gaps, large ones
 blur. Lattice points between pixels are interpolated, cubic in colour and linear in inverse depth,
 in which planes are planes. Across a depth edge they have depth and colour of the far side: in
-between, they would be an outline of their own from other sides.
+between, they would be an outline of their own from other sides. At the outline of what moves there
+are none.
 """
 
 from dataclasses import replace
@@ -24,12 +25,13 @@ SLOPE_FACTOR = 2.0
 
 
 def subpixel_infill(image: ImageLayer) -> ImageLayer:
-    """The lattice without the pixels themselves; each point moves as the nearest pixel."""
+    """The lattice without pixels and outlines; each point moves as the nearest pixel."""
     depth, rgb = _lattice_maps(image)
     rows, columns = _nearest(image, depth)
     between = torch.ones_like(depth, dtype=torch.bool)
     between[::2, ::2] = False
     displacement = image.displacement
+    between &= ~_between_moving_and_static(moving_mask(image.depth, displacement))
     if displacement is not None:
         ratio = depth / image.depth[rows, columns]
         displacement = displacement[:, rows, columns] * ratio[..., None]
@@ -61,6 +63,15 @@ def _lattice_maps(image: ImageLayer) -> tuple[Float[Tensor, "hh ww"], Float[Tens
     farthest = _farthest_neighbour(depth)
     colors = torch.where(far_side, rgb.flatten(1)[:, farthest], colors).clamp(0, 1)
     return torch.where(far_side, depth.flatten()[farthest], even), colors.movedim(0, -1)
+
+
+def _between_moving_and_static(moving: Bool[Tensor, "h w"]) -> Bool[Tensor, "hh ww"]:
+    """Lattice points of mixed colour at the outline of what moves.
+
+    They would draw it wherever they are: along with the object, or where it was.
+    """
+    value = moving.float()
+    return _largest_neighbour(value) != -_largest_neighbour(-value)
 
 
 def _edges(log_depth: Float[Tensor, "h w"]) -> Bool[Tensor, "hh ww"]:

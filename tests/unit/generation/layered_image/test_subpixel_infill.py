@@ -120,12 +120,25 @@ def test_a_step_below_the_threshold_is_bridged() -> None:
     assert float(between.min()) > 2.0 and float(between.max()) < float(depth.max())
 
 
-def test_across_the_edge_of_what_moves_points_are_in_between() -> None:
-    depth, displacement = torch.full(SIZE_PX, 2.0), torch.zeros(2, *SIZE_PX, 3)
+def test_across_an_edge_within_what_moves_points_are_in_between() -> None:
+    depth, displacement = torch.full(SIZE_PX, 2.0), torch.full((2, *SIZE_PX, 3), 0.5)
     depth[:, 3:] = 6.0
-    displacement[1, :, :3] = 0.5
     between = subpixel_infill(pixels(depth, displacement=displacement)).depth[:, 5]
     torch.testing.assert_close(between, torch.full_like(between, 3.0))
+
+
+@pytest.mark.parametrize("moves", [(slice(None), slice(0, 3)), (slice(2, 4), slice(1, 2))])
+def test_the_outline_of_what_moves_has_no_points(moves: tuple[slice, slice]) -> None:
+    displacement = torch.zeros(2, *SIZE_PX, 3)
+    displacement[1][moves] = 0.5
+    moving = displacement[1, ..., 0] != 0
+    infill = subpixel_infill(pixels(torch.full(SIZE_PX, 2.0), displacement=displacement))
+    for row in range(LATTICE[0]):
+        for column in range(LATTICE[1]):
+            around = moving[row // 2 : (row + 1) // 2 + 1, column // 2 : (column + 1) // 2 + 1]
+            is_pixel = row % 2 == 0 and column % 2 == 0
+            one_side = bool(around.all()) or not bool(around.any())
+            assert bool(infill.mask[row, column]) is (one_side and not is_pixel)
 
 
 @pytest.mark.parametrize("limits", FAR_RANGES)
