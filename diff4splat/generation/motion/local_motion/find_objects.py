@@ -44,6 +44,9 @@ class MovingMaps:
 LEAST_SIDE_PX = 24
 """Of the image: objects that are less wide or high do not turn, which a few cells cannot show."""
 
+LEAST_DISPLACEMENT = 1e-6
+"""Over depth: marks what is at rest at the times of latent frames, but moves between them."""
+
 
 def with_moving_objects(
     maps: MovingMaps, requests: Sequence[MotionRequest], *, round_bodies: bool
@@ -54,24 +57,27 @@ def with_moving_objects(
     """
     number, objects = torch.zeros_like(maps.event), []
     for event, request in enumerate(requests, 1):
-        local = LOCAL_MOTIONS.get(request.local_motion)
-        if local is None:
-            continue
         component = connected_components(maps.event == event)
         for each in range(1, int(component.max()) + 1):
             inside = component == each
-            travel = maps.displacement[:, inside][:, 0]
-            if request.local_motion in ROLLING and not travel.any():
-                continue
-            if local.shows_back and _least_side(inside) * maps.image_scale < LEAST_SIDE_PX:
-                continue
-            maps, one = _with_object(maps, inside, request, round_bodies=round_bodies)
-            objects.append(one)
-            number[inside] = len(objects)
+            if _moves_about_itself(maps, inside, request.local_motion):
+                maps, one = _with_object(maps, inside, request, round_bodies=round_bodies)
+                objects.append(one)
+                number[inside] = len(objects)
     if not objects:
         return maps, None
     nearest = number.flatten()[nearest_inside(maps.displacement.any(-1).any(0))]
     return maps, MovingObjects(camera=maps.camera, number=nearest, objects=tuple(objects))
+
+
+def _moves_about_itself(maps: MovingMaps, inside: Bool[Tensor, "y x"], motion: str) -> bool:
+    """Whether the component does: it rolls only if it travels, and turns only if it is large."""
+    if motion not in LOCAL_MOTIONS:
+        return False
+    if motion in ROLLING and not maps.displacement[:, inside].any():
+        return False
+    is_large = _least_side(inside) * maps.image_scale >= LEAST_SIDE_PX
+    return is_large or not LOCAL_MOTIONS[motion].shows_back
 
 
 def _with_object(
@@ -96,6 +102,8 @@ def _with_object(
     displacement = maps.displacement.clone()
     for frame, progress in enumerate(torch.linspace(0, 1, len(displacement)).tolist()):
         displacement[frame, inside] = one.positions(points[inside], progress) - points[inside]
+    at_rest = inside & ~displacement.any(-1).any(0)
+    displacement[-1, at_rest, 2] = LEAST_DISPLACEMENT * depth[at_rest]
     return replace(maps, depth=depth, displacement=displacement), one
 
 

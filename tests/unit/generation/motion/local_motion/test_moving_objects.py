@@ -118,6 +118,21 @@ def test_half_a_turn_shows_the_back() -> None:
     assert float(z[count:][middle[count:]].min()) < float(z[:count][middle[:count]].min())
 
 
+@pytest.mark.parametrize("seconds", [10 / 3, 1e-3])
+def test_what_is_at_rest_at_all_latent_frames_moves_between_them(seconds: float) -> None:
+    times_s = torch.linspace(0, seconds, 17)
+    asked = replace(request("sways"), key_times_s=tuple(times_s.tolist()))
+    moved, objects = with_moving_objects(maps(), [asked], round_bodies=True)
+    assert bool(moved.displacement.any(-1).any(0)[maps().event > 0].all())
+    assert float(moved.displacement.abs().max()) < 0.5
+    pixels = layer(moved.depth, displacement=moved.displacement, in_image=True)
+    image = layered(pixels)
+    found, _ = with_local_motion(image_gaussians(image, times_s), image, objects)
+    assert len(found.motion.moving_index) == (LAST - FIRST) ** 2
+    moves = float(found.motion.offsets.abs().max())
+    assert moves > 0.02 if seconds > 1 else moves < 0.02
+
+
 def test_without_travel_nothing_rolls() -> None:
     assert with_moving_objects(maps(), [request("rolls")], round_bodies=True)[1] is None
     found, objects = with_moving_objects(maps(travel=1.0), [request("rolls")], round_bodies=True)
