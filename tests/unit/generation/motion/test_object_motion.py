@@ -10,6 +10,8 @@ from torch import Tensor
 from diff4splat.generation.inputs.copies import Copies
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.motion.object_motion import ObjectMotion
+from diff4splat.generation.motion.sampling import MotionRequest
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.hub.model import Model
 from diff4splat.progress.run_log import RunLog
@@ -46,3 +48,26 @@ def test_background_in_the_edge_of_what_moves_moves_as_far_in_the_image(
     # Unbounded, the last column would move by a third.
     assert float(in_image.min()) > 0.8 * float(in_image.max())
     assert float(maps.depth[6, 9]) < 4 and float(maps.depth[6, 12]) == 9.0
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+def test_maps_have_the_body_of_what_turns(monkeypatch: pytest.MonkeyPatch, scale: int) -> None:
+    side = 64
+    event = torch.zeros(scale * side, scale * side, dtype=torch.long)
+    event[scale * 16 : scale * 48, scale * 16 : scale * 48] = 1
+    monkeypatch.setattr(ObjectMotion, "_events", lambda *_: event)
+    request = MotionRequest(
+        text=None, seed=0, settings=GenerationSettings(), local_motion="spins", in_place=True
+    )
+    small = size_by_name("small")
+    unet = replace(small.motion_unet, input_scale=scale)
+    model = Model(config=replace(small, motion_unet=unet))
+    image = input_image(random_rgb(side, side))
+    motion = ObjectMotion(model=model, frames=3, requests=(request,), log=RunLog())
+    given = ImageMaps(depth=torch.full((side, side), 9.0), displacement=None)
+    maps = motion.added_to(given, Copies(image=image, small=image))
+    assert len(maps.objects.objects) == 1
+    middle, outline = float(maps.depth[32, 32]), float(maps.depth[32, 17])
+    assert middle < 8.9 and outline > 9.1
+    assert bool((maps.depth[:10] == 9.0).all())
+    assert bool(maps.displacement.any(-1).any(0)[20:44, 20:44].all())

@@ -84,3 +84,10 @@ def test_colours_of_the_other_side_are_those_within_the_outline() -> None:
     assert float(pure.std()) < 1e-5 < float(mixed.std())
     # Nothing is as far from the outline: the colours as they are.
     assert torch.equal(hidden_side(pixels, inside, DEPTH, SIDE).sh, mixed)
+
+
+def test_the_rim_is_as_far_as_the_pixels_next_to_it() -> None:
+    inside = box(8, 40)
+    body, _ = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
+    row = body[SIDE // 2, 8:14]
+    assert bool((row[: RIM_PX + 1] == row[RIM_PX]).all()) and float(row[RIM_PX + 1]) < float(row[0])
