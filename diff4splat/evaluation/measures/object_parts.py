@@ -1,9 +1,10 @@
 """Parts into which the motion of a scene tears an object, in its first image.
 
 Axes: ``h w`` pixels, ``n`` pixels of one object. Neighbouring pixels belong to one part if their
-displacements differ by at most ``MAX_STRETCH_PX``: what turns by up to 29 degrees, or bends, stays
+displacements differ by at most ``MAX_STRETCH_PX``: what bends, or turns by up to 29 degrees, stays
 whole. Parts with the displacement of the largest one count as that part, so an object that
-something hides in the middle is not torn.
+something hides in the middle is not torn. What turns farther or grows is whole if its pixels hold
+together beside the affine map that fits it best.
 """
 
 import torch
@@ -23,9 +24,33 @@ def is_torn(displacement_px: Float[Tensor, "h w 2"], mask: Bool[Tensor, "h w"]) 
 
 def largest_part_share(displacement_px: Float[Tensor, "h w 2"], mask: Bool[Tensor, "h w"]) -> float:
     """Share of the object's pixels in its largest part; 1 for an empty mask."""
-    labels = part_labels(displacement_px, mask)[mask]
-    if not len(labels):
+    if not bool(mask.any()):
         return 1.0
+    share = _share_by_displacement(displacement_px, mask)
+    if share >= TORN_SHARE:
+        return share
+    beside = torch.zeros_like(displacement_px)
+    beside[mask] = _beside_affine(displacement_px, mask)
+    linked = part_labels(beside, mask)[mask].unique(return_counts=True)[1]
+    return max(share, int(linked.max()) / len(beside[mask]))
+
+
+def _beside_affine(
+    displacement_px: Float[Tensor, "h w 2"], mask: Bool[Tensor, "h w"]
+) -> Float[Tensor, "n 2"]:
+    """What the affine map that fits best leaves of the displacements."""
+    row, column = mask.nonzero().double().unbind(-1)
+    terms = torch.stack([row, column, torch.ones_like(row)], -1)
+    found = displacement_px[mask].double()
+    fit = torch.linalg.lstsq(terms, found, driver="gelsd").solution
+    return (found - terms @ fit).to(displacement_px)
+
+
+def _share_by_displacement(
+    displacement_px: Float[Tensor, "h w 2"], mask: Bool[Tensor, "h w"]
+) -> float:
+    """Share of the largest part, with all parts that move as it does."""
+    labels = part_labels(displacement_px, mask)[mask]
     names, sizes = labels.unique(return_counts=True)
     displacements = displacement_px[mask]
     typical = torch.stack([displacements[labels == name].median(0).values for name in names])

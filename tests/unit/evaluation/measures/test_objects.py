@@ -109,7 +109,7 @@ def turned(angle: float) -> torch.Tensor:
     return offsets @ torch.stack([torch.stack([cos, sin]), torch.stack([-sin, cos])]) - offsets
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.2, 0.45])
+@pytest.mark.parametrize("angle", [0.0, 0.2, 0.45, 1.0, 3.0])
 def test_what_turns_stays_whole(angle: float) -> None:
     assert not is_torn(turned(angle), disc())
 
@@ -120,6 +120,32 @@ def test_two_halves_that_move_apart_are_torn() -> None:
     displacement[:, :16, 0] = -2
     assert largest_part_share(displacement, disc()) == pytest.approx(0.5, abs=0.05)
     assert is_torn(displacement, disc())
+
+
+@pytest.mark.parametrize("apart", [0.6, 1.0, 2.0, 4.0, 20.0])
+@pytest.mark.parametrize("angle", [0.0, 1.0])
+def test_what_turns_and_moves_apart_is_torn(angle: float, apart: float) -> None:
+    displacement = turned(angle)
+    displacement[:, 16:, 0] += apart
+    assert is_torn(displacement, disc())
+    displacement[:, :8, 1] += 30
+    assert is_torn(displacement, disc())
+
+
+@pytest.mark.parametrize("factor", [0.2, 1.0])
+def test_what_grows_or_is_sheared_stays_whole(factor: float) -> None:
+    rows, columns = torch.meshgrid(torch.arange(32.0), torch.arange(32.0), indexing="ij")
+    grown = factor * torch.stack([columns - 16, rows - 28], -1)
+    assert not is_torn(grown, disc())
+    assert not is_torn(torch.stack([factor * rows, 0 * rows], -1), disc())
+
+
+def test_one_pixel_and_one_row_have_an_affine_map() -> None:
+    for size in (1, 6):
+        mask = torch.zeros(8, 8, dtype=torch.bool)
+        mask[2, :size] = True
+        displacement = 3 * torch.arange(8.0)[None, :, None].expand(8, 8, 2)
+        assert largest_part_share(displacement, mask) == 1
 
 
 def test_a_small_rest_is_no_tear() -> None:
