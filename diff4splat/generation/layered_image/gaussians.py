@@ -83,10 +83,7 @@ def offset_motion(
 ) -> KeyframeMotion:
     """Translation alone, at key times spread evenly over the latent frames."""
     at_keys = torch.stack(
-        [
-            _between(offsets, fraction)
-            for fraction in torch.linspace(0, 1, len(key_times_s)).tolist()
-        ]
+        [between(offsets, fraction) for fraction in torch.linspace(0, 1, len(key_times_s)).tolist()]
     )
     identity = offsets.new_tensor([1.0, 0.0, 0.0, 0.0])
     return KeyframeMotion(
@@ -98,8 +95,8 @@ def offset_motion(
     )
 
 
-def _between(offsets: Float[Tensor, "t m 3"], fraction: float) -> Float[Tensor, "m 3"]:
-    """Offsets at a fraction of the clip."""
+def between(offsets: Float[Tensor, "t *m 3"], fraction: float) -> Float[Tensor, "*m 3"]:
+    """Offsets at a fraction of the clip, linear between latent frames."""
     place = fraction * (len(offsets) - 1)
     before = min(int(place), len(offsets) - 2)
     return torch.lerp(offsets[before], offsets[before + 1], place - before)

@@ -41,6 +41,12 @@ def rigid_component_offsets(
     return masked_offsets(relative, moving, place)
 
 
+def box_size_px(mask: Bool[Tensor, "h w"]) -> tuple[int, int]:
+    """Height and width of the box around a mask, which must not be empty."""
+    rows, columns = (torch.where(mask.any(axis))[0] for axis in (1, 0))
+    return int(rows[-1] - rows[0]) + 1, int(columns[-1] - columns[0]) + 1
+
+
 def connected_components(mask: Bool[Tensor, "h w"]) -> Int[Tensor, "h w"]:
     """Number of the component that a pixel belongs to, 0 outside the mask; corners connect."""
     array = mask.to(device="cpu", dtype=torch.uint8).numpy()

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
-from diff4splat.generation.layered_image.rigid_components import connected_components
+from diff4splat.generation.layered_image.rigid_components import box_size_px, connected_components
 from diff4splat.generation.motion.displacement_maps import mean_of_moving
 
 RELIEF_SHARE = 0.25
@@ -57,13 +57,7 @@ def bounded_relief(
     bounded, component = depth.clone(), connected_components(moving)
     for number in range(1, int(component.max()) + 1):
         inside = component == number
-        limit = RELIEF_SHARE * _extent_px(inside) / focal_px
+        limit = RELIEF_SHARE * max(box_size_px(inside)) / focal_px
         median = depth[inside].median()
         bounded[inside] = median * (depth[inside] / median).log().clamp(-limit, limit).exp()
     return bounded
-
-
-def _extent_px(inside: Bool[Tensor, "y x"]) -> int:
-    """Of the longer side of a mask's box."""
-    sides = (torch.where(inside.any(axis))[0] for axis in (0, 1))
-    return max(int(side[-1] - side[0]) + 1 for side in sides)

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from diff4splat.captions.vocabulary import ROLLING
 from diff4splat.generation.layered_image.mask_rim import nearest_inside
-from diff4splat.generation.layered_image.rigid_components import connected_components
+from diff4splat.generation.layered_image.rigid_components import box_size_px, connected_components
 from diff4splat.generation.motion.local_motion.body import rounded
 from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX
 from diff4splat.generation.motion.local_motion.motions import LOCAL_MOTIONS
@@ -76,7 +76,7 @@ def _moves_about_itself(maps: MovingMaps, inside: Bool[Tensor, "y x"], motion: s
         return False
     if motion in ROLLING and not maps.displacement[:, inside].any():
         return False
-    is_large = _least_side(inside) * maps.image_scale >= LEAST_SIDE_PX
+    is_large = min(box_size_px(inside)) * maps.image_scale >= LEAST_SIDE_PX
     return is_large or not LOCAL_MOTIONS[motion].shows_back
 
 
@@ -105,9 +105,3 @@ def _with_object(
     at_rest = inside & ~displacement.any(-1).any(0)
     displacement[-1, at_rest, 2] = LEAST_DISPLACEMENT * depth[at_rest]
     return replace(maps, depth=depth, displacement=displacement), one
-
-
-def _least_side(inside: Bool[Tensor, "y x"]) -> int:
-    """Of the mask's box."""
-    sides = (torch.where(inside.any(axis))[0] for axis in (0, 1))
-    return min(int(side[-1] - side[0]) + 1 for side in sides)

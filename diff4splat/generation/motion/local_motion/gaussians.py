@@ -4,13 +4,14 @@ Axes: ``k`` key times, ``m`` moving Gaussians of one object, ``n`` all.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from diff4splat.generation.layered_image.gaussians import GaussianSet
+from diff4splat.generation.layered_image.gaussians import GaussianSet, offset_motion
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
 from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX, hidden_side
 from diff4splat.generation.motion.local_motion.moving_object import MovingObject, MovingObjects
@@ -33,15 +34,15 @@ def with_local_motion(
     if not isinstance(gaussian_set.motion, KeyframeMotion):
         return gaussian_set, visible_count
     kept = ~_does_not_follow(gaussian_set, visible_count, objects)
-    gaussian_set, visible_count = gaussian_set.select(kept), int(kept[:visible_count].sum())
-    motion = gaussian_set.motion
-    number = object_number(gaussian_set.gaussians.means, objects)[motion.moving_index]
-    for index, one in enumerate(objects.objects, 1):
-        motion = _with_object(motion, number == index, gaussian_set.gaussians, one)
-    result = replace(gaussian_set, motion=motion)
-    for index, one in enumerate(objects.objects, 1):
+    result, visible_count = gaussian_set.select(kept), int(kept[:visible_count].sum())
+    index = result.motion.moving_index
+    number = object_number(result.gaussians.means[index], objects)
+    chosen = [(number == each, one) for each, one in enumerate(objects.objects, 1)]
+    result = replace(result, motion=_following(result.motion, result.gaussians, chosen))
+    key_times_s = result.motion.key_times_s
+    for each, one in enumerate(objects.objects, 1):
         if one.local.shows_back:
-            result = joined(result, _hidden_side(layered.layers[0], index, objects, motion))
+            result = joined(result, _hidden_side(layered.layers[0], each, objects, key_times_s))
     return result, visible_count
 
 
@@ -73,42 +74,39 @@ def _does_not_follow(
     return dropped
 
 
-def _with_object(
-    motion: KeyframeMotion, chosen: Bool[Tensor, " m"], gaussians: Gaussians, one: MovingObject
+def _following(
+    motion: KeyframeMotion,
+    gaussians: Gaussians,
+    chosen: Sequence[tuple[Bool[Tensor, " m"], MovingObject]],
 ) -> KeyframeMotion:
-    """The motion in which the ``chosen`` moving Gaussians follow the object."""
-    means = gaussians.means[motion.moving_index[chosen]]
+    """The motion in which the chosen moving Gaussians follow each object."""
     offsets, growth = motion.offsets.clone(), motion.log_scale_offsets.clone()
     shares = torch.linspace(0, 1, len(motion.key_times_s)).tolist()
-    for key, progress in enumerate(shares):
-        offsets[key, chosen] = one.positions(means, progress) - means
-        growth[key, chosen] = math.log(one.growth(progress))
+    for rows, one in chosen:
+        means = gaussians.means[motion.moving_index[rows]]
+        for key, progress in enumerate(shares):
+            offsets[key, rows] = one.positions(means, progress) - means
+            growth[key, rows] = math.log(one.growth(progress))
     return replace(motion, offsets=offsets, log_scale_offsets=growth)
 
 
 def _hidden_side(
-    pixels: ImageLayer, index: int, objects: MovingObjects, motion: KeyframeMotion
+    pixels: ImageLayer, number: int, objects: MovingObjects, key_times_s: Float[Tensor, " k"]
 ) -> GaussianSet:
     """What the image hides of an object, with its motion."""
     points = unproject(pixels.camera, pixels.depth)
-    number = object_number(points.flatten(0, 1), objects).view_as(pixels.mask)
-    inside = (number == index) & pixels.displacement.any(-1).any(0)
-    one = objects.objects[index - 1]
+    numbers = object_number(points.flatten(0, 1), objects).view_as(pixels.mask)
+    inside = (numbers == number) & pixels.displacement.any(-1).any(0)
+    one = objects.objects[number - 1]
     # The mask is known to a pixel of the copy.
     cell_px = math.ceil(len(pixels.rgb) / len(objects.number))
     gaussians = hidden_side(pixels, inside, float(one.frame.foot[2]), RIM_PX + 2 * cell_px)
-    count, keys = len(gaussians), len(motion.key_times_s)
-    everything = torch.arange(count, device=inside.device)
-    zero = gaussians.means.new_zeros(keys, count, 3)
-    still = KeyframeMotion(
-        key_times_s=motion.key_times_s,
-        moving_index=everything,
-        offsets=zero,
-        rotations=gaussians.quats.expand(keys, -1, -1).clone(),
-        log_scale_offsets=zero,
-    )
+    index = torch.arange(len(gaussians), device=inside.device)
+    at_rest = gaussians.means.new_zeros(2, len(index), 3)
+    motion = offset_motion(index, at_rest, key_times_s)
+    everything = torch.ones_like(index, dtype=torch.bool)
     return GaussianSet(
         gaussians=gaussians,
-        motion=_with_object(still, torch.ones_like(everything, dtype=torch.bool), gaussians, one),
-        pixel_index=torch.full_like(everything, NO_PIXEL),
+        motion=_following(motion, gaussians, [(everything, one)]),
+        pixel_index=torch.full_like(index, NO_PIXEL),
     )

@@ -1,8 +1,9 @@
 """Motions of an object about itself, as the words of a prompt name them (ours, ADR 47).
 
 Axes: ``m`` points. Points are in the object's own frame: x to the right, y up from its foot, z to
-the camera, in units of its height. All start at rest. Sizes and rates are the means of those that
-procedural worlds draw (``data_prep.synthetic.motions``), which no image shows.
+the camera, in units of its height. All start at rest. Growth, turns and rates are the means of
+those that procedural worlds draw (``data_prep.synthetic.motions``), which no image shows. What goes
+to and fro has half of the mean size: where it is in its period is unknown, too.
 """
 
 import math
@@ -12,6 +13,9 @@ from dataclasses import dataclass
 import torch
 from jaxtyping import Float
 from torch import Tensor
+
+from diff4splat.geometry import quaternion
+from diff4splat.paths.easing import ease
 
 Points = Float[Tensor, "m 3"]
 GROWTH = 0.375
@@ -25,6 +29,7 @@ SWAY, SWAY_HZ = 0.0475, 0.6
 WOBBLE, WOBBLE_HZ, WOBBLE_DECAY_HZ = 0.14, 1.7, 0.6
 RADIUS = 0.5
 """Of what rolls."""
+UPRIGHT = (0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +54,7 @@ class Moment:
     @property
     def eased(self) -> float:
         """Progress that starts and ends slowly."""
-        return self.progress**2 * (3 - 2 * self.progress)
+        return float(ease(torch.tensor([self.progress], dtype=torch.float64), "smooth"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,20 +90,13 @@ def _squashed(points: Points, moment: Moment) -> Points:
 def _spun(points: Points, moment: Moment) -> Points:
     u = moment.progress
     turns = TURNS * (u + TURN_GAIN * u * u) / (1 + TURN_GAIN)
-    return turned_upright(points, points.new_tensor(2 * math.pi * turns * moment.sense))
+    return _rotated(points, UPRIGHT, points.new_tensor(2 * math.pi * turns * moment.sense))
 
 
 def _twisted(points: Points, moment: Moment) -> Points:
     """The top turns against the foot, to and fro."""
     angle = TWIST_RAD * math.sin(moment.phase(TWIST_HZ)) * moment.sense
-    return turned_upright(points, angle * _share(points))
-
-
-def turned_upright(points: Points, angle_rad: Float[Tensor, "*m"]) -> Points:
-    """Rotated about the vertical axis."""
-    x, y, z = points.unbind(-1)
-    cosine, sine = angle_rad.cos(), angle_rad.sin()
-    return torch.stack([cosine * x + sine * z, y, cosine * z - sine * x], -1)
+    return _rotated(points, UPRIGHT, angle * _share(points))
 
 
 def _bent(points: Points, moment: Moment) -> Points:
@@ -136,9 +134,8 @@ def _rolled(points: Points, moment: Moment) -> Points:
     distance = math.hypot(right, toward)
     if distance == 0:
         return points
-    axis = points.new_tensor([toward, 0.0, -right]) / distance
-    centre = points.new_tensor([0.0, RADIUS, 0.0])
-    return _rotated(points - centre, axis, distance / RADIUS) + centre
+    centre, angle = points.new_tensor([0.0, RADIUS, 0.0]), points.new_tensor(distance / RADIUS)
+    return _rotated(points - centre, (toward, 0.0, -right), angle) + centre
 
 
 def _tumbled(points: Points, moment: Moment) -> Points:
@@ -148,11 +145,12 @@ def _tumbled(points: Points, moment: Moment) -> Points:
     return _rolled(points, moment) + points.new_tensor([0.0, lift, 0.0])
 
 
-def _rotated(points: Points, axis: Float[Tensor, "3"], angle_rad: float) -> Points:
-    """About a unit axis (Rodrigues)."""
-    along = (points @ axis)[:, None] * axis
-    across = torch.linalg.cross(axis.expand_as(points), points)
-    return along + math.cos(angle_rad) * (points - along) + math.sin(angle_rad) * across
+def _rotated(
+    points: Points, axis: tuple[float, float, float], angle_rad: Float[Tensor, "*m"]
+) -> Points:
+    """About an axis through the origin, by one angle or by one for each point."""
+    axes, angles = points.new_tensor(axis).expand_as(points), angle_rad.expand(len(points))
+    return quaternion.rotate(quaternion.from_axis_angle(axes, angles), points)
 
 
 def _share(points: Points) -> Float[Tensor, " m"]:

@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from diff4splat.generation.layered_image.gaussians import between
 from diff4splat.generation.motion.local_motion.motions import LOCAL_MOTIONS, LocalMotion, Moment
 from diff4splat.geometry.camera import Camera
 
@@ -85,7 +86,7 @@ class MovingObject:
         """Where ``points`` of the first frame are."""
         moment = self._moment(progress)
         moved = self.local.positions(self.frame.to_local(points), moment)
-        return self.frame.from_local(moved) + self._travel(progress)
+        return self.frame.from_local(moved) + between(self.displacement, progress)
 
     def growth(self, progress: float) -> float:
         """Size over that of the first frame."""
@@ -96,14 +97,9 @@ class MovingObject:
             time_s=progress * self.timing.duration_s,
             progress=progress,
             highest_hz=self.timing.highest_hz,
-            travel=self.frame.vector(self._travel(progress)),
+            travel=self.frame.vector(between(self.displacement, progress)),
             sense=self.timing.sense,
         )
-
-    def _travel(self, progress: float) -> Float[Tensor, "3"]:
-        place = progress * (len(self.displacement) - 1)
-        before = min(int(place), len(self.displacement) - 2)
-        return torch.lerp(*self.displacement[before : before + 2], place - before)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
