@@ -20,10 +20,12 @@ from diff4splat.generation.layered_image.background_layer import (
     background_layer,
     farther_than_pixels,
 )
-from diff4splat.generation.layered_image.border_extension import (
+from diff4splat.generation.layered_image.border.extension import (
     border_extension,
+    push_behind_rings,
     push_behind_surface,
 )
+from diff4splat.generation.layered_image.border.fine_border import NEAR, PHOTOGRAPH, fine_border
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
 from diff4splat.generation.layered_image.disocclusion import (
@@ -31,7 +33,6 @@ from diff4splat.generation.layered_image.disocclusion import (
     inpaint_border,
     without_disoccluded,
 )
-from diff4splat.generation.layered_image.fine_border import fine_border
 from diff4splat.generation.layered_image.pixel_maps.image_maps import (
     ImageMaps,
     finest_copy,
@@ -52,8 +53,11 @@ def build_layered_image(
 
     Without ``infill`` between the pixels, theirs are twice as wide.
     """
-    pixels = pixel_layer(small, image, maps)
-    hidden, reduced = hidden_layers(small, maps, pixels, border_cells), is_reduced(small, image)
+    pixels, reduced = pixel_layer(small, image, maps), is_reduced(small, image)
+    rings = (NEAR,) if finest_copy(small, maps).shape == image.rgb.shape else PHOTOGRAPH
+    hidden = hidden_layers(small, maps, pixels, border_cells)
+    if border_cells and rings is PHOTOGRAPH:  # In small images its blur is the better guess.
+        hidden[-1] = push_behind_rings(hidden[-1], border_cells, rings[-1].reach[1])
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
     if (disoccluded := disoccluded_layer(pixels)) is not None:
@@ -62,8 +66,7 @@ def build_layered_image(
     if reduced and (occluded := occluded_layer(pixels)) is not None:
         hidden.append(occluded)
     if border_cells:
-        texture = finest_copy(small, maps).shape != image.rgb.shape
-        hidden.append(fine_border(pixels, disoccluded, texture))
+        hidden += [fine_border(pixels, disoccluded, ring) for ring in rings]
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from diff4splat.errors import ConfigError
-from diff4splat.generation.layered_image.border_extension import border_extension
+from diff4splat.generation.layered_image.border.extension import border_extension
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.visibility import visible_in_earlier_frame
 from diff4splat.generation.video.keyframe_borders import keyframe_borders

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.fine_border import fine_border
+from diff4splat.generation.layered_image.border.fine_border import fine_border
 from diff4splat.generation.layered_image.pixel_maps.pixel_layer import PIXEL_FOOTPRINT_PX
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera, stack_cameras

@@ -7,7 +7,7 @@ import torch
 from image_layers import input_image, layer
 from torch import Tensor
 
-from diff4splat.generation.layered_image.border_extension import border_extension
+from diff4splat.generation.layered_image.border.extension import border_extension
 from diff4splat.generation.layered_image.disocclusion import (
     GROWN_PX,
     fill_from_neighbours,

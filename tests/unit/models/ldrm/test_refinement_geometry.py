@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from diff4splat.errors import ShapeError
-from diff4splat.generation.layered_image.border_extension import BEHIND, border_extension
+from diff4splat.generation.layered_image.border.extension import BEHIND, border_extension
 from diff4splat.generation.layered_image.visibility import visible_in_earlier_frame
 from diff4splat.geometry.camera import Camera, pinhole, project, stack_cameras
 from diff4splat.geometry.depth import distance_from_depth, unproject

@@ -9,8 +9,12 @@ from image_layers import FAR_RANGES, input_image, is_finite, layer, random_depth
 from torch import Tensor
 
 from diff4splat.generation.layered_image.background_layer import BEHIND
+from diff4splat.generation.layered_image.border.fine_border import (
+    NEAR,
+    PHOTOGRAPH,
+    fine_border,
+)
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
-from diff4splat.generation.layered_image.fine_border import MAX_SIDE, fine_border
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera
 
@@ -73,17 +77,39 @@ def test_what_moves_at_the_border_is_not_continued() -> None:
 def test_large_images_have_larger_cells(size_px: tuple[int, int], cells: tuple[int, int]) -> None:
     found = fine_border(_pixels(torch.ones(size_px)), None)
     margin = math.ceil(max(cells) / 8)
-    assert max(cells) <= MAX_SIDE
+    assert max(cells) <= NEAR.max_side
     assert found.mask.shape == tuple(side + 2 * margin for side in cells)
 
 
-def test_texture_goes_on_beside_the_border_and_nothing_else_changes() -> None:
+def test_a_photograph_is_reflected_and_nothing_else_changes() -> None:
     pixels = _pixels(torch.full(SIZE_PX, 4.0))
-    plain, textured = (fine_border(pixels, None, texture) for texture in (False, True))
-    assert float(textured.rgb[textured.mask].std()) > 1.5 * float(plain.rgb[plain.mask].std())
-    assert bool(((textured.rgb >= 0) & (textured.rgb <= 1)).all())
-    assert torch.equal(textured.rgb[_inner()], plain.rgb[_inner()])
-    assert torch.equal(textured.depth, plain.depth) and torch.equal(textured.mask, plain.mask)
+    plain, reflected = (fine_border(pixels, None, ring) for ring in (NEAR, PHOTOGRAPH[0]))
+    assert torch.equal(reflected.rgb[MARGIN + 5, :MARGIN], pixels.rgb[5, :MARGIN].flip(0))
+    assert torch.equal(reflected.rgb[_inner()], plain.rgb[_inner()])
+    assert torch.equal(reflected.depth, plain.depth) and torch.equal(reflected.mask, plain.mask)
+
+
+@pytest.mark.parametrize("size_px", [(256, 256), (192, 320), (200, 248), (64, 64)])
+def test_rings_of_a_photograph_meet(size_px: tuple[int, int]) -> None:
+    """Every pixel out to half of the longer side has a cell, and no farther one nor one inside."""
+    pixels, reach = _pixels(torch.ones(size_px)), max(size_px) // 2
+    y, x = (torch.arange(-reach, side + reach) + 0.5 for side in size_px)
+    covered = torch.zeros(len(y), len(x), dtype=torch.bool)
+    for ring in PHOTOGRAPH:
+        found = fine_border(pixels, None, ring)
+        step = pixels.camera.focal_px / found.camera.focal_px
+        column, row = (found.camera.center_px - pixels.camera.center_px / step).unbind()
+        cells = ((y / step[1] + row).floor().long(), (x / step[0] + column).floor().long())
+        inside = [(at >= 0) & (at < side) for at, side in zip(cells, found.mask.shape, strict=True)]
+        rows, columns = (
+            at.clamp(0, side - 1) for at, side in zip(cells, found.mask.shape, strict=True)
+        )
+        covered |= found.mask[rows][:, columns] & inside[0][:, None] & inside[1]
+        far = (found.camera.size_px[0] * float(step[1]) - size_px[0]) / 2
+    outside = torch.ones_like(covered)
+    outside[reach:-reach, reach:-reach] = False
+    assert torch.equal(covered, outside)
+    assert reach <= far < reach + 8
 
 
 @pytest.mark.parametrize("limits", FAR_RANGES)
@@ -91,4 +117,5 @@ def test_it_never_holds_nan(limits: tuple[float, float]) -> None:
     pixels = _pixels(random_depth(*SIZE_PX, limits))
     everything = replace(pixels, displacement=torch.ones(3, *SIZE_PX, 3))
     for each in (pixels, everything):
-        assert is_finite(fine_border(each, disoccluded_layer(each)))
+        for ring in (NEAR, *PHOTOGRAPH):
+            assert is_finite(fine_border(each, disoccluded_layer(each), ring))

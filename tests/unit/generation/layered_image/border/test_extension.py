@@ -19,7 +19,7 @@ from image_layers import (
 )
 from torch import Tensor
 
-from diff4splat.generation.layered_image.border_extension import (
+from diff4splat.generation.layered_image.border.extension import (
     BEHIND,
     FOOTPRINT_CELLS,
     OPACITY,
@@ -27,6 +27,7 @@ from diff4splat.generation.layered_image.border_extension import (
     border_extension,
     extended_camera,
     farthest_covered,
+    push_behind_rings,
     push_behind_surface,
 )
 from diff4splat.generation.layered_image.build import build_layered_image
@@ -115,6 +116,22 @@ def test_cells_move_back_only() -> None:
     after = push_behind_surface(before, depth, MARGIN)
     assert bool((after.depth >= before.depth).all()) and not torch.equal(after.depth, before.depth)
     assert torch.equal(after.rgb, before.rgb)
+
+
+def test_behind_rings_cells_keep_the_depth_of_the_border() -> None:
+    """At one distance they would lie before it, more so the farther off the axis."""
+    wide, depth = (64, 64), torch.full((64, 64), 4.0)
+    before = border_extension(random_rgb(*wide), depth, pinhole(32.0, wide), 12)
+    after = push_behind_rings(before, 12, 1 / 4)
+    row, covered = 12 + 8, 4 + 1
+    assert float(before.depth[row, 12 - covered]) < 0.8 * float(before.depth[row, 12])
+    torch.testing.assert_close(
+        after.depth[row, 12 - covered : 12], after.depth[row, 12].expand(covered)
+    )
+    far = slice(0, 12 - covered)
+    assert torch.equal(after.depth[:, far], before.depth[:, far])
+    assert torch.equal(after.depth[12:-12, 12:-12], before.depth[12:-12, 12:-12])
+    assert bool((after.depth >= before.depth).all()) and torch.equal(after.rgb, before.rgb)
 
 
 def change_of_input_view(hidden: ImageLayer, rgb: Tensor, depth: Tensor) -> float:

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from diff4splat.generation.layered_image.border_colors import DECAY, continue_colors
+from diff4splat.generation.layered_image.border.mixed_colors import DECAY, continue_colors
 
 
 def test_each_cell_against_the_formula() -> None:

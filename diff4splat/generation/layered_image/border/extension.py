@@ -3,16 +3,18 @@
 Axes: ``h w`` pixels of the image, ``hs ws`` cells of 4 pixels with a margin on every side. Where
 the camera looks past the border or behind an edge it sees a plausible blur instead of black. The
 layer is static. ``push_behind_surface`` moves every cell behind all pixels that its footprint
-covers: from the input camera a guess must not hide what the image shows.
+covers: from the input camera a guess must not hide what the image shows. Nor may it hide the finer
+guess of ``fine_border``, which ``push_behind_rings`` is for.
 """
 
+import math
 from dataclasses import replace
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
-from diff4splat.generation.layered_image.border_colors import continue_colors
+from diff4splat.generation.layered_image.border.mixed_colors import continue_colors
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.geometry.camera import Camera, stack_cameras
@@ -51,6 +53,27 @@ def push_behind_surface(layer: ImageLayer, depth: Float[Tensor, "h w"], margin: 
     """The layer of an image of depth z ``depth``, with no cell in front of a pixel it covers."""
     farthest = BEHIND * farthest_covered(depth, margin)
     return replace(layer, depth=torch.maximum(layer.depth, farthest))
+
+
+def push_behind_rings(layer: ImageLayer, margin: int, reach: float) -> ImageLayer:
+    """The layer, with no cell in front of fine rings out to ``reach`` over the longer side.
+
+    Rings keep the depth z of the border; at one distance z falls with the angle off the axis.
+    """
+    height, width = sides = [side - 2 * margin for side in layer.depth.shape]
+    inner = layer.depth[margin : margin + height, margin : margin + width]
+    of_border = replicate_border(inner[None, None], margin)[0, 0]
+    down, across = (cells_outside(side, margin, inner.device) for side in sides)
+    # One cell more: its footprint reaches into the rings.
+    covered = torch.maximum(down[:, None], across) <= math.ceil(reach * max(sides)) + 1
+    depth = torch.where(covered, torch.maximum(layer.depth, of_border), layer.depth)
+    return replace(layer, depth=depth)
+
+
+def cells_outside(side: int, margin: int, device: torch.device) -> Int[Tensor, " s"]:
+    """How far beyond the border each cell along a side lies; 0 inside."""
+    cells = torch.arange(-margin, side + margin, device=device)
+    return torch.maximum(-cells, cells - (side - 1)).clamp_min(0)
 
 
 def extended_camera(camera: Camera, margin: int, cell_px: int = CELL_PX) -> Camera:
