@@ -20,7 +20,7 @@ def neighbourhood(maps: Float[Tensor, "c h w"], side: int) -> Float[Tensor, "c k
     """The 3×3 cells centred on the cell of every pixel; the border is replicated."""
     padded = torch.nn.functional.pad(maps[None], (1, 1, 1, 1), mode="replicate")
     patches = torch.nn.functional.unfold(padded, WINDOW)
-    patches = patches.view(len(maps), WINDOW**2, *maps.shape[1:])
+    patches = patches.view(maps.shape[0], WINDOW**2, *maps.shape[1:])
     return patches.repeat_interleave(side, -1).repeat_interleave(side, -2)
 
 

@@ -122,7 +122,9 @@ class RefinedDeformation(nn.Module):
         query = fourier_embedding(time, self.time_frequencies)[:, None].expand(
             -1, len(key_times), -1
         )
-        source = fourier_embedding(key_times, self.time_frequencies)[None].expand(len(time), -1, -1)
+        source = fourier_embedding(key_times, self.time_frequencies)[None].expand(
+            time.shape[0], -1, -1
+        )
         return self.time_mlp(torch.cat([query, source], -1)).flatten(0, 1)
 
 

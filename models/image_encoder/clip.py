@@ -73,7 +73,7 @@ class ClipImageEncoder(nn.Module):
         """States of images that are scaled, cut and normalised."""
         patches = torch.nn.functional.pixel_unshuffle(pixels, self.config.patch_px)
         tokens = self.patch_embedding(patches.flatten(2).mT)
-        first = self.class_embedding.expand(len(tokens), 1, -1).to(tokens.dtype)
+        first = self.class_embedding.expand(tokens.shape[0], 1, -1).to(tokens.dtype)
         states = self.norm_in(torch.cat([first, tokens], 1) + self.position_embedding)
         for block in self.blocks:
             states = block(states)

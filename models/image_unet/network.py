@@ -68,4 +68,4 @@ def pixel_coordinates(image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 2 h w
         (2 * torch.arange(size, device=image.device, dtype=image.dtype) + 1) / size - 1
         for size in image.shape[2:]
     )
-    return torch.stack(torch.meshgrid(x, y, indexing="xy")).expand(len(image), -1, -1, -1)
+    return torch.stack(torch.meshgrid(x, y, indexing="xy")).expand(image.shape[0], -1, -1, -1)

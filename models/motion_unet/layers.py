@@ -72,15 +72,15 @@ class TextCrossAttention(nn.Module):
     def added_to_random(self, text: TextTokens, generator: torch.Generator) -> Float[Tensor, "b r"]:
         """What a text adds to the same random features of every sample."""
         gain = self.norm.gain
-        features = torch.randn(len(gain), RANDOM_CELLS, 1, generator=generator).to(gain)
-        added = self._added(features.expand(len(text.states), -1, -1, -1), text)
+        features = torch.randn(gain.shape[0], RANDOM_CELLS, 1, generator=generator).to(gain)
+        added = self._added(features.expand(text.states.shape[0], -1, -1, -1), text)
         return added.flatten(1)
 
     def _added(
         self, features: Float[Tensor, "n c h w"], text: TextTokens
     ) -> Float[Tensor, "n c h w"]:
         has_text = text.has_text.to(features)[:, None, None]
-        by_frame = self.norm(features).unflatten(0, (len(has_text), -1)).movedim(2, -1)
+        by_frame = self.norm(features).unflatten(0, (has_text.shape[0], -1)).movedim(2, -1)
         update = self.attention(by_frame.flatten(1, 3), text.states, mask=text.attention_mask)
         update = (update * has_text).unflatten(1, by_frame.shape[1:4])
         return update.movedim(-1, 2).flatten(0, 1)

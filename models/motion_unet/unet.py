@@ -115,7 +115,7 @@ class MotionUNet(nn.Module):
             ShapeError: as ``forward``.
         """
         features = self.features(image, noisy, level, text, text_mask, object_mask)
-        pooled = features.unflatten(0, (len(noisy), noisy.shape[2])).mean(1)
+        pooled = features.unflatten(0, (noisy.shape[0], noisy.shape[2])).mean(1)
         mask = torch.nn.functional.pixel_shuffle(self.mask_head(pooled), CELL_PX)[:, 0]
         if self.mask_refiner is not None:
             mask = mask + self.mask_refiner(image, pooled)
@@ -132,7 +132,7 @@ class MotionUNet(nn.Module):
     ) -> Float[Tensor, "n c hc wc"]:
         """Input of both heads."""
         _require_sizes(image, noisy)
-        samples, frames = len(noisy), noisy.shape[2]
+        samples, frames = noisy.shape[0], noisy.shape[2]
         tokens = None if text is None else self._adapt(text_tokens(text, text_mask))
         condition = self._condition(level, frames, tokens)
         features = self._input_features(image, noisy, object_mask)
@@ -166,7 +166,7 @@ class MotionUNet(nn.Module):
         self, features: Float[Tensor, "n c hc wc"], noisy: Float[Tensor, "b 3 t hc wc"]
     ) -> Float[Tensor, "b 3 t hc wc"]:
         motion = self.motion_head(features)
-        return motion.unflatten(0, (len(noisy), noisy.shape[2])).transpose(1, 2)
+        return motion.unflatten(0, (noisy.shape[0], noisy.shape[2])).transpose(1, 2)
 
     def _adapt(self, tokens: TextTokens) -> TextTokens:
         return replace(tokens, states=self.text_adapter(tokens))
@@ -192,7 +192,7 @@ class MotionUNet(nn.Module):
         if self.input_mask is not None and object_mask is not None:
             features = features + self.input_mask(cells(object_mask[:, None]))
         motion = self.input_motion(noisy.transpose(1, 2).flatten(0, 1))
-        return (motion.unflatten(0, (len(noisy), -1)) + features[:, None]).flatten(0, 1)
+        return (motion.unflatten(0, (noisy.shape[0], -1)) + features[:, None]).flatten(0, 1)
 
 
 def widths(width: int, heads: int) -> tuple[int, int, int]:
@@ -212,7 +212,7 @@ def cell_coordinates(noisy: Float[Tensor, "b 3 t hc wc"]) -> Float[Tensor, "b 2 
         for size in noisy.shape[3:]
     )
     grid = torch.stack(torch.meshgrid(x, y, indexing="xy"))
-    return grid.expand(len(noisy), -1, -1, -1)
+    return grid.expand(noisy.shape[0], -1, -1, -1)
 
 
 def _upsample(maps: Float[Tensor, "n c h w"]) -> Float[Tensor, "n c2 h2 w2"]:

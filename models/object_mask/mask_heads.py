@@ -93,8 +93,8 @@ class MaskHeads(nn.Module):
     ) -> Float[Tensor, "b r h w"]:
         """Of the prompts of every image; those of one image follow each other in ``text``."""
         queries, biases = self.queries(text)
-        queries = queries.unflatten(0, (len(features), -1)) / math.sqrt(self.embedding_width)
-        biases = biases.unflatten(0, (len(features), -1))
+        queries = queries.unflatten(0, (features.shape[0], -1)) / math.sqrt(self.embedding_width)
+        biases = biases.unflatten(0, (features.shape[0], -1))
         weight, bias = self._pixel_embedding()
         of_features = torch.einsum("brqe,epc->brqpc", queries, weight)
         constant = torch.einsum("brqe,ep->brqp", queries, bias) + biases[..., None]

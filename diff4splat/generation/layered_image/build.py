@@ -22,8 +22,8 @@ from diff4splat.generation.layered_image.background_layer import (
 )
 from diff4splat.generation.layered_image.border.extension import (
     border_extension,
-    push_behind_rings,
     push_behind_surface,
+    push_farther_than_rings,
 )
 from diff4splat.generation.layered_image.border.fine_border import NEAR, PHOTOGRAPH, fine_border
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
@@ -57,7 +57,7 @@ def build_layered_image(
     rings = (NEAR,) if finest_copy(small, maps).shape == image.rgb.shape else PHOTOGRAPH
     hidden = hidden_layers(small, maps, pixels, border_cells)
     if border_cells and rings is PHOTOGRAPH:  # In small images its blur is the better guess.
-        hidden[-1] = push_behind_rings(hidden[-1], border_cells, rings[-1].reach[1])
+        hidden[-1] = push_farther_than_rings(hidden[-1], border_cells, rings[-1].reach[1])
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
     if (disoccluded := disoccluded_layer(pixels)) is not None:

@@ -70,7 +70,7 @@ class BorderHead(nn.Module):
         height, width = extended.shape[-2:]
         axes = [self._beyond(size).to(extended) for size in (height, width)]
         y, x = torch.meshgrid(*axes, indexing="ij")
-        return torch.stack([x, y]).expand(len(extended), -1, -1, -1)
+        return torch.stack([x, y]).expand(extended.shape[0], -1, -1, -1)
 
     def _beyond(self, size: int) -> Float[Tensor, " s"]:
         index = torch.arange(size, dtype=torch.float32)

@@ -4,7 +4,7 @@ Axes: ``h w`` pixels of the image, ``hs ws`` cells of 4 pixels with a margin on 
 the camera looks past the border or behind an edge it sees a plausible blur instead of black. The
 layer is static. ``push_behind_surface`` moves every cell behind all pixels that its footprint
 covers: from the input camera a guess must not hide what the image shows. Nor may it hide the finer
-guess of ``fine_border``, which ``push_behind_rings`` is for.
+guess of ``fine_border``, which ``push_farther_than_rings`` is for.
 """
 
 import math
@@ -55,7 +55,7 @@ def push_behind_surface(layer: ImageLayer, depth: Float[Tensor, "h w"], margin: 
     return replace(layer, depth=torch.maximum(layer.depth, farthest))
 
 
-def push_behind_rings(layer: ImageLayer, margin: int, reach: float) -> ImageLayer:
+def push_farther_than_rings(layer: ImageLayer, margin: int, reach: float) -> ImageLayer:
     """The layer, with no cell in front of fine rings out to ``reach`` over the longer side.
 
     Rings keep the depth z of the border; at one distance z falls with the angle off the axis.

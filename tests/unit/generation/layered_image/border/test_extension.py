@@ -27,8 +27,8 @@ from diff4splat.generation.layered_image.border.extension import (
     border_extension,
     extended_camera,
     farthest_covered,
-    push_behind_rings,
     push_behind_surface,
+    push_farther_than_rings,
 )
 from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import image_gaussians, layer_gaussians
@@ -122,7 +122,7 @@ def test_behind_rings_cells_keep_the_depth_of_the_border() -> None:
     """At one distance they would lie before it, more so the farther off the axis."""
     wide, depth = (64, 64), torch.full((64, 64), 4.0)
     before = border_extension(random_rgb(*wide), depth, pinhole(32.0, wide), 12)
-    after = push_behind_rings(before, 12, 1 / 4)
+    after = push_farther_than_rings(before, 12, 1 / 4)
     row, covered = 12 + 8, 4 + 1
     assert float(before.depth[row, 12 - covered]) < 0.8 * float(before.depth[row, 12])
     torch.testing.assert_close(
