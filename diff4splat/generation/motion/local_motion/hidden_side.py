@@ -1,7 +1,8 @@
 """The side of an object that the image hides, which comes to the front as it turns (ours, ADR 47).
 
 Axes: ``h w`` pixels of the image, ``m`` new Gaussians. The back mirrors the front at the object's
-middle, along the rays: the input view does not see it. Where the front falls back from a pixel to
+middle. It is as wide as the front, so it is seen under a smaller angle: the front hides it in the
+input view, and the object keeps its size as it turns. Where the front falls back from a pixel to
 the next, and at the outline, cells along the ray close the surface.
 """
 
@@ -40,8 +41,11 @@ def hidden_side(
     rays = unproject(pixels.camera, torch.ones_like(pixels.depth))[core]
     footprint_px = torch.full_like(z, WALL_FOOTPRINT_PX)
     footprint_px[: len(rays)] = FOOTPRINT_PX
-    scale = footprint_px * z / pixels.camera.focal_px[0]
-    return _isotropic(rays[row] * z[:, None], scale, _colors(pixels, inside, mixed_px)[core][row])
+    of_front = torch.minimum(z, 2 * middle_z - z)
+    scale = footprint_px * of_front / pixels.camera.focal_px[0]
+    center = rays.mean(0)
+    means = center * z[:, None] + (rays[row] - center) * of_front[:, None]
+    return _isotropic(means, scale, _colors(pixels, inside, mixed_px)[core][row])
 
 
 def _colors(

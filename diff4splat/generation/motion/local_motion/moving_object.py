@@ -118,11 +118,12 @@ def object_frame(
 ) -> ObjectFrame:
     """The frame of the pixels ``inside``; ``middle_z`` is half way between front and back."""
     # As far as the middle, so that the extent is that of the outline.
-    rays = points[inside] / points[inside][:, 2:]
-    x, y = (rays[:, :2] * middle_z).unbind(-1)
+    at = points / points[..., 2:] * middle_z
+    x, y = at[inside][:, :2].unbind(-1)
     left, right = (torch.quantile(x, share) for share in (EDGE_QUANTILE, 1 - EDGE_QUANTILE))
+    center = _middle_of_rows(at[..., 0], inside)
     top, bottom = (torch.quantile(y, share) for share in (EDGE_QUANTILE, 1 - EDGE_QUANTILE))
-    foot = torch.stack([(left + right) / 2, bottom, torch.full_like(bottom, middle_z)])
+    foot = torch.stack([center, bottom, torch.full_like(bottom, middle_z)])
     near, far = points[inside][:, 2].aminmax()
     margin = MARGIN * float(torch.maximum(right - left, bottom - top))
     return ObjectFrame(
@@ -130,3 +131,11 @@ def object_frame(
         height=max(float(bottom - top), 1e-6 * middle_z),
         depth_range=(float(near) - margin, float(far) + margin),
     )
+
+
+def _middle_of_rows(x: Float[Tensor, "y x"], inside: Bool[Tensor, "y x"]) -> Float[Tensor, ""]:
+    """The axis that most rows are about: what hides a part of them does not shift it."""
+    rows = inside.any(1)
+    left = torch.where(inside, x, torch.inf).amin(1)[rows]
+    right = torch.where(inside, x, -torch.inf).amax(1)[rows]
+    return ((left + right) / 2).median()

@@ -5,9 +5,11 @@ import torch
 from image_layers import layer
 from torch import Tensor
 
+from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.motion.local_motion.body import rounded
 from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX, hidden_side
 from diff4splat.geometry.camera import project
+from diff4splat.geometry.depth import unproject
 
 SIDE, FOCAL_PX, DEPTH = 48, 48.0, 6.0
 
@@ -43,19 +45,52 @@ def test_bodies_of_a_whole_image_or_of_a_pixel_are_before_the_camera(first: int)
     assert bool((body > 0).all()) and bool(body.isfinite().all()) and middle > 0
 
 
-def test_the_back_mirrors_the_front_on_the_same_rays() -> None:
+def cone() -> Tensor:
+    """16 px high, as wide as high."""
+    row, column = torch.meshgrid(*[torch.arange(SIDE) + 0.5] * 2, indexing="ij")
+    return (row > 16) & (row < 32) & ((column - SIDE / 2).abs() < (row - 16) / 2)
+
+
+def test_rows_of_a_cone_are_as_deep_as_wide_up_to_the_largest_circle() -> None:
+    body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), cone(), FOCAL_PX, 0)
+    before_px = (middle - body) / middle * FOCAL_PX
+    deepest = torch.where(cone(), before_px, 0).amax(1)[16:32]
+    half_width = cone().sum(1)[16:32] / 2
+    torch.testing.assert_close(deepest[2:8], half_width[2:8], atol=0.15, rtol=0)
+    assert float(deepest.max()) < 5.5 < float(half_width.max())
+
+
+def test_a_block_is_as_deep_at_its_top_as_in_its_middle() -> None:
+    body, _ = rounded(torch.full((SIDE, SIDE), DEPTH), box(16, 32), FOCAL_PX, RIM_PX)
+    assert torch.equal(body[16], body[24])
+
+
+def test_the_back_mirrors_the_front_and_the_front_hides_it() -> None:
+    """Each of its points has the height and width of one of the front."""
     inside = disc(16.0)
     body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
     pixels = layer(body)
     back = hidden_side(pixels, inside, middle)
     at, z = project(pixels.camera, back.means)
-    column, row = (at - 0.5).round().long().unbind(-1)
-    torch.testing.assert_close(at, torch.stack([column, row], -1) + 0.5)
+    column, row = at.floor().long().unbind(-1)
     assert bool(inside[row, column].all())
     # Nothing lies before the front, and the farthest cell is as far behind the middle.
-    assert bool((z >= body[row, column] - 1e-4).all())
+    assert bool((z >= body[row, column] - 0.05).all())
     farthest = 2 * middle - float(body[inside].min())
     assert float(z.max()) == pytest.approx(farthest, rel=1e-4)
+    front = unproject(pixels.camera, body)[~grown(~inside, RIM_PX)]
+    mirrored = back.means[: len(front)]
+    torch.testing.assert_close(mirrored[:, 2], 2 * middle - front[:, 2])
+    torch.testing.assert_close(mirrored[:, :2], front[:, :2], atol=1e-4, rtol=0)
+
+
+def test_off_the_axis_too_the_back_stays_within_the_outline() -> None:
+    inside = box(2, 20)
+    body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
+    pixels = layer(body)
+    at, _ = project(pixels.camera, hidden_side(pixels, inside, middle).means)
+    column, row = at.floor().long().unbind(-1)
+    assert bool(inside[row, column].all())
 
 
 def test_the_surface_is_closed() -> None:

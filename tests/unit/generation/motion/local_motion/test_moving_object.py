@@ -48,6 +48,15 @@ def test_the_frame_stands_on_the_lower_end() -> None:
     assert frame.depth_range[0] < DEPTH < frame.depth_range[1]
 
 
+def test_what_hides_a_part_does_not_shift_the_axis() -> None:
+    points = unproject(pinhole(FOCAL_PX, (SIDE, SIDE)), torch.full((SIDE, SIDE), DEPTH))
+    hidden, beside = box(12, 36), box(12, 36)
+    hidden[28:, :28] = False
+    beside[30:, 36:46] = True
+    for inside in (hidden, beside):
+        assert float(object_frame(points, inside, DEPTH).foot[0]) == pytest.approx(0, abs=1e-5)
+
+
 def test_local_points_are_upright_and_face_the_camera() -> None:
     frame = replace(flat_frame(), foot=torch.tensor([1.0, 2.0, 6.0]), height=2.0)
     top_front = torch.tensor([[1.0, 0.0, 5.0]])
