@@ -30,6 +30,7 @@ from diff4splat.generation.motion.local_motion.find_objects import (
 from diff4splat.generation.motion.motion_mask import event_of_pixels, motion_probability
 from diff4splat.generation.motion.networks import motion_prior
 from diff4splat.generation.motion.object_relief import (
+    as_far_in_image,
     has_given_depth,
     with_bounded_relief,
     with_changed_depth,
@@ -94,6 +95,11 @@ class ObjectMotion:
             self.log.record_skipped("motion in place", TOO_SMALL, "the other side of objects")
         if found.depth is not depth:
             maps = with_changed_depth(maps, found.depth / depth, moving)
+        if not has_given_depth(maps):
+            as_one = moving if objects is None else moving & (objects.number == 0)
+            found = replace(
+                found, displacement=as_far_in_image(found.displacement, found.depth, as_one)
+            )
         return replace(maps, objects=objects), found
 
     def _in_place(self, event: Int[Tensor, "y x"]) -> Bool[Tensor, "y x"]:

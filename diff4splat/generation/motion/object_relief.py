@@ -35,6 +35,23 @@ def with_bounded_relief(
     return with_changed_depth(maps, bounded / depth, moving), bounded
 
 
+def as_far_in_image(
+    displacement: Float[Tensor, "t y x 3"],
+    depth: Float[Tensor, "y x"],
+    moving: Bool[Tensor, "y x"],
+) -> Float[Tensor, "t y x 3"]:
+    """Displacement of each component in proportion to depth: no pixel leaves its neighbour.
+
+    One displacement in space moves what is nearer farther in the image. Of predicted relief that
+    is mostly error, and opens gaps where it is steep.
+    """
+    share, component = torch.ones_like(depth), connected_components(moving)
+    for number in range(1, int(component.max()) + 1):
+        inside = component == number
+        share[inside] = depth[inside] / depth[inside].median()
+    return displacement * share[..., None]
+
+
 def has_given_depth(maps: ImageMaps) -> bool:
     """Whether depth is no prediction."""
     return maps.fine is not None and not maps.fine.smooth

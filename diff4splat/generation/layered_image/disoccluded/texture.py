@@ -13,6 +13,7 @@ from torch.nn.functional import avg_pool2d, interpolate
 from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
 from diff4splat.generation.layered_image.disoccluded.shift_map import shift_map, source_pixels
 from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.windows import mean_around
 
 DETAIL_SHARE = 1 / 16
 """Of the image's longer side: the window over whose mean detail is what remains."""
@@ -22,6 +23,8 @@ BLUR_PX = 2.5
 """Deviation of that blur, which texture does not survive."""
 LIMIT = 2.0
 """Standard deviations of the detail beside the hole."""
+LIKE_SIGMA = 0.12
+"""Difference of mean colours with which a patch gives six tenths of its detail."""
 CONTEXT = (0.1, 1.0)
 """Where patches are sought above and below the hole, and beside it, over its longer side: what
 stands on a ground stands there on either side."""
@@ -49,9 +52,24 @@ def with_detail(
     rows, columns = _window(~known)
     detail = _bounded(torch.where(known[..., None], rgb - means, 0.0), known)
     shifts = _shifts(*(image[rows, columns] for image in (rgb, even, means, known)))
-    result = even.clone()
-    result[rows, columns] += shifted(detail[rows, columns], known[rows, columns], shifts)
+    result, around = even.clone(), _means_around(rgb)
+    detail, of_patch = (
+        shifted(each[rows, columns], known[rows, columns], shifts) for each in (detail, around)
+    )
+    result[rows, columns] += detail * _likeness(around[rows, columns], of_patch)
     return torch.where(known[..., None], rgb, result.clamp(0, 1))
+
+
+def _likeness(one: Float[Tensor, "h w 3"], other: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 1"]:
+    """1 where mean colours are of one surface, 0 where they are of two."""
+    difference = (one - other).square().mean(-1, keepdim=True)
+    return torch.exp(-difference / (2 * LIKE_SIGMA**2))
+
+
+def _means_around(rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
+    """Of twice that window, whatever it shows: a pattern's is even."""
+    reach = math.ceil(DETAIL_SHARE * max(rgb.shape[:2]))
+    return torch.stack([mean_around(channel, reach) for channel in rgb.unbind(-1)], -1)
 
 
 def _shifts(

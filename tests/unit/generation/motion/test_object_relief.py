@@ -6,15 +6,19 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from image_layers import random_depth
 from torch import Tensor
 
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.rigid_components import connected_components
 from diff4splat.generation.motion.object_relief import (
     RELIEF_SHARE,
+    as_far_in_image,
     bounded_relief,
     with_bounded_relief,
 )
+from diff4splat.geometry.camera import pinhole, project
+from diff4splat.geometry.depth import unproject
 
 SIDE, FOCAL_PX = 16, 16.0
 
@@ -49,6 +53,32 @@ def test_every_component_has_its_own_median() -> None:
     left, right = box(slice(2, 6), slice(1, 4)), box(slice(9, 14), slice(10, 15))
     depth = torch.where(left, 2.0, 8.0)
     assert torch.equal(bounded_relief(depth, left | right, FOCAL_PX), depth)
+
+
+@pytest.mark.parametrize("offset", [(1.0, 0.0, 0.0), (0.0, -0.5, 0.0), (0.3, 0.2, 1.5)])
+def test_neighbours_stay_neighbours_in_the_image(offset: tuple[float, float, float]) -> None:
+    """What is displaced is an enlarged and shifted image of itself, whatever its relief."""
+    moving = box(slice(4, 12), slice(4, 10))
+    camera = pinhole(FOCAL_PX, (SIDE, SIDE))
+    depth = random_depth(SIDE, SIDE, (3.0, 6.0))
+    points = unproject(camera, depth)
+    displacement = torch.tensor(offset).expand(1, SIDE, SIDE, 3) * moving[None, ..., None]
+    found = as_far_in_image(displacement, depth, moving)
+    before, after = (project(camera, each[moving])[0] for each in (points, points + found[0]))
+    scale = 1 / (1 + offset[2] / float(depth[moving].median()))
+    center = camera.center_px
+    moved = after - (center + scale * (before - center))
+    torch.testing.assert_close(moved, moved[:1].expand_as(moved), atol=1e-4, rtol=0)
+    assert torch.equal(found[:, ~moving], displacement[:, ~moving])
+    plain = project(camera, (points + displacement[0])[moving])[0]
+    assert float((plain - (center + scale * (before - center))).std(0).max()) > 0.1
+
+
+def test_every_component_moves_as_its_median_does() -> None:
+    left, right = box(slice(2, 6), slice(1, 4)), box(slice(9, 14), slice(10, 15))
+    depth = torch.where(left, 2.0, 8.0)
+    displacement = torch.ones(2, SIDE, SIDE, 3)
+    assert torch.equal(as_far_in_image(displacement, depth, left | right), displacement)
 
 
 @pytest.mark.parametrize(("pixels", "changes"), [(3, False), (8, True), (16, True)])
