@@ -8,7 +8,7 @@ from image_layers import input_image, random_rgb
 from torch import Tensor
 
 from diff4splat.generation.inputs.copies import Copies
-from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.motion.object_motion import ObjectMotion
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.settings import GenerationSettings
@@ -20,7 +20,9 @@ SIDE = 16
 MOVING = (slice(4, 10), slice(4, 10))
 
 
-def moved(monkeypatch: pytest.MonkeyPatch, depth: Tensor, scale: int = 2) -> ImageMaps:
+def moved(
+    monkeypatch: pytest.MonkeyPatch, depth: Tensor, scale: int = 2, *, given: bool = False
+) -> ImageMaps:
     """Maps of an image of which a box moves by one unit to the right."""
     event = torch.zeros(scale * SIDE, scale * SIDE, dtype=torch.long)
     rows, columns = (slice(scale * one.start, scale * one.stop) for one in MOVING)
@@ -33,7 +35,8 @@ def moved(monkeypatch: pytest.MonkeyPatch, depth: Tensor, scale: int = 2) -> Ima
     model = Model(config=replace(small, motion_unet=unet))
     image = input_image(random_rgb(SIDE, SIDE))
     motion = ObjectMotion(model=model, frames=1, requests=(), log=RunLog())
-    maps = ImageMaps(depth=depth, displacement=None)
+    fine = FineMaps(rgb=image.rgb, depth=depth, smooth=False) if given else None
+    maps = ImageMaps(depth=depth, displacement=None, fine=fine)
     return motion.added_to(maps, Copies(image=image, small=image))
 
 
@@ -45,9 +48,16 @@ def test_background_in_the_edge_of_what_moves_moves_as_far_in_the_image(
     depth[4:10, 4:9] = 3.0
     maps = moved(monkeypatch, depth, scale)
     in_image = (maps.displacement[0, ..., 0] / maps.depth)[MOVING]
-    # Unbounded, the last column would move by a third.
-    assert float(in_image.min()) > 0.8 * float(in_image.max())
+    # At one displacement in space the last column would move by a third less.
+    assert float(in_image.min()) > 0.99 * float(in_image.max())
     assert float(maps.depth[6, 9]) < 4 and float(maps.depth[6, 12]) == 9.0
+
+
+def test_at_given_depth_it_moves_as_far_in_space(monkeypatch: pytest.MonkeyPatch) -> None:
+    depth = torch.full((SIDE, SIDE), 9.0)
+    depth[4:10, 4:9] = 3.0
+    offsets = moved(monkeypatch, depth, 1, given=True).displacement[0, ..., 0][MOVING]
+    torch.testing.assert_close(offsets, torch.ones_like(offsets))
 
 
 @pytest.mark.parametrize("scale", [1, 2])
