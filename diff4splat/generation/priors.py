@@ -15,6 +15,7 @@ from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.inputs.copies import Copies, larger_copy
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.upright_strips import straightened
 from diff4splat.generation.motion.object_motion import ObjectMotion
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.models.hub.model import Model
@@ -55,7 +56,9 @@ def _depths(
     log.depth.update(found.record())
     if larger is images.small:
         return found.depth, None
-    fine = FineMaps(rgb=larger.rgb, depth=found.depth)
+    # Small images are no photographs: the prior knows their towers.
+    depth = straightened(found.depth) if larger.reduction > 1 else found.depth
+    fine = FineMaps(rgb=larger.rgb, depth=depth)
     return reduced_depth(fine.depth, images.small.camera.size_px), fine
 
 

@@ -8,6 +8,7 @@ import pytest
 import torch
 from image_layers import input_image, random_rgb
 
+from diff4splat.generation import priors
 from diff4splat.generation.depth_prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.input_image import InputImage, downsample
@@ -100,6 +101,19 @@ def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
     torch.testing.assert_close(1 / maps.depth, inverse.mean((1, 3)))
     whole = Copies(image=copies.small, small=replace(copies.small, reduction=1))
     assert image_maps(replace(model, config=config), whole, 2, [request], RunLog()).fine is None
+
+
+@pytest.mark.parametrize("size", [2, 4])
+def test_towers_of_photographs_are_straightened(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    """Of an image that the depth prior sees whole they are as predicted."""
+    monkeypatch.setattr(priors, "straightened", lambda depth: torch.full_like(depth, 7.0))
+    model = model_of("monocular_depth")
+    config = replace(model.config, monocular_depth=MonocularDepthConfig(channels=8, photo_scale=2))
+    image = input_image(random_rgb(size * SIDE_PX, size * SIDE_PX))
+    copies = Copies(image=image, small=downsample(image, size))
+    request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
+    maps = image_maps(replace(model, config=config), copies, 2, [request], RunLog())
+    assert bool((maps.fine.depth == 7.0).all()) == (size == 4)
 
 
 @torch.no_grad()
