@@ -86,7 +86,7 @@ def turned_views(
         views[turn] = Turned(
             found=render(scene, camera).rgb.clamp(0, 1),
             truth=_prepared(replace(ahead, yaw_deg=yaw_deg + turn)).rgb,
-            outside=~_shown(picture.camera, turn),
+            outside=~shown_by_first(picture.camera, turn),
         )
     return views
 
@@ -122,7 +122,7 @@ def _prepared(view: Photograph) -> InputImage:
     return prepare_image(rgb, focal, *find_image_size("small", SIDE_PX))
 
 
-def _shown(camera: Camera, right_deg: float) -> Bool[Tensor, "h w"]:
+def shown_by_first(camera: Camera, right_deg: float) -> Bool[Tensor, "h w"]:
     """Which pixels of the turned view the first one shows."""
     angle = math.radians(right_deg)
     x, y, z = camera_rays(camera).unbind(-1)
