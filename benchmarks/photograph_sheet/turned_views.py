@@ -18,9 +18,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load
-from diff4splat.generation.inputs.image_size import find_image_size
-from diff4splat.generation.inputs.input_image import InputImage, choose_focal, prepare_image
+from benchmarks.photograph_sheet.__main__ import prepared
+from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
@@ -31,7 +30,7 @@ from diff4splat.metrics.features.gradient_pyramid import GradientPyramidFeatures
 from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.render.api import render
 
-SIDE_PX = 256
+MODEL = "small"
 YAWS_DEG = tuple(range(0, 360, 45))
 TURNS_DEG = (-20.0, -10.0, 10.0, 20.0)
 Image = Float[Tensor, "h w 3"]
@@ -58,9 +57,8 @@ class Turned:
 
 def main() -> None:
     """One row of Markdown for each angle."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--model", default="small")
-    pipeline = Diff4SplatPipeline.from_pretrained(parser.parse_args().model)
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    pipeline = Diff4SplatPipeline.from_pretrained(MODEL)
     panoramas = [each for each in PHOTOGRAPHS if each.yaw_deg is not None]
     views: dict[float, list[Turned]] = {turn: [] for turn in TURNS_DEG}
     for panorama in panoramas:
@@ -78,14 +76,14 @@ def turned_views(
 ) -> dict[float, Turned]:
     """Of the view at ``yaw_deg``, by the angle to the right."""
     ahead = replace(panorama, yaw_deg=yaw_deg, pitch_deg=0.0)
-    picture = _prepared(ahead)
+    picture = prepared(ahead, MODEL)
     scene = pipeline(picture, "static")
     views = {}
     for turn in TURNS_DEG:
         camera = turned(picture.camera, turn)
         views[turn] = Turned(
             found=render(scene, camera).rgb.clamp(0, 1),
-            truth=_prepared(replace(ahead, yaw_deg=yaw_deg + turn)).rgb,
+            truth=prepared(replace(ahead, yaw_deg=yaw_deg + turn), MODEL).rgb,
             outside=~shown_by_first(picture.camera, turn),
         )
     return views
@@ -112,14 +110,6 @@ def row(name: str, views: list[Turned]) -> str:
         f"| {name} | {sum(psnr) / len(psnr):.2f} | {float(distance):.4f} "
         f"| {frechet_distance(*sets):.3f} | {detail:.2f} |"
     )
-
-
-def _prepared(view: Photograph) -> InputImage:
-    """As ``generate --size 256`` takes it."""
-    pixels = load(view)
-    focal = choose_focal(pixels.shape[:2], view.fov_deg, None)
-    rgb = torch.from_numpy(pixels).float() / 255
-    return prepare_image(rgb, focal, *find_image_size("small", SIDE_PX))
 
 
 def shown_by_first(camera: Camera, right_deg: float) -> Bool[Tensor, "h w"]:

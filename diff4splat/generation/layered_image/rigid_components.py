@@ -6,6 +6,8 @@ exactly with itself: an object would tear as it moves. A component that turns or
 mean displacement, which is no sign of translation, and stays static.
 """
 
+from collections.abc import Iterator
+
 import cv2
 import torch
 from jaxtyping import Bool, Float, Int
@@ -30,9 +32,7 @@ def rigid_component_offsets(
     """
     relative, place = upsample_to_pixels(field), depth.clone()
     typical = relative.clone() if mean_field is None else upsample_to_pixels(mean_field)
-    component = connected_components(moving)
-    for number in range(1, int(component.max()) + 1):
-        inside = component == number
+    for inside in each_component(moving):
         mean = relative[:, :, inside].mean(-1, keepdim=True)
         expected = typical[:, :, inside].mean(-1, keepdim=True)
         moves = expected.norm(dim=1).max() * UNIT >= MIN_RELATIVE_DISPLACEMENT
@@ -45,6 +45,12 @@ def box_size_px(mask: Bool[Tensor, "h w"]) -> tuple[int, int]:
     """Height and width of the box around a mask, which must not be empty."""
     rows, columns = (torch.where(mask.any(axis))[0] for axis in (1, 0))
     return int(rows[-1] - rows[0]) + 1, int(columns[-1] - columns[0]) + 1
+
+
+def each_component(mask: Bool[Tensor, "h w"]) -> Iterator[Bool[Tensor, "h w"]]:
+    """The mask of every connected component, one after the other."""
+    component = connected_components(mask)
+    return (component == number for number in range(1, int(component.max()) + 1))
 
 
 def connected_components(mask: Bool[Tensor, "h w"]) -> Int[Tensor, "h w"]:

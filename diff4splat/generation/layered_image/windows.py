@@ -23,4 +23,5 @@ def smallest_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tenso
 def mean_around(values: Float[Tensor, "h w"], radius_px: int) -> Float[Tensor, "h w"]:
     """Of the same square."""
     padded = pad(values[None, None], (radius_px,) * 4, mode="replicate")
-    return avg_pool2d(padded, 2 * radius_px + 1, 1)[0, 0]
+    rows = avg_pool2d(padded, (2 * radius_px + 1, 1), 1)
+    return avg_pool2d(rows, (1, 2 * radius_px + 1), 1)[0, 0]

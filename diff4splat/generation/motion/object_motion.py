@@ -88,14 +88,13 @@ class ObjectMotion:
             return maps, copy
         maps, depth = with_bounded_relief(maps, copy.depth, moving, float(copy.camera.focal_px[0]))
         copy = replace(copy, depth=depth)
-        found, objects = with_moving_objects(
-            copy, self.requests, round_bodies=not has_given_depth(maps)
-        )
+        predicted = not has_given_depth(maps)
+        found, objects = with_moving_objects(copy, self.requests, round_bodies=predicted)
         if in_place.any() and objects is None:
             self.log.record_skipped("motion in place", TOO_SMALL, "the other side of objects")
         if found.depth is not depth:
             maps = with_changed_depth(maps, found.depth / depth, moving)
-        if not has_given_depth(maps):
+        if predicted:
             as_one = moving if objects is None else moving & (objects.number == 0)
             found = replace(
                 found, displacement=as_far_in_image(found.displacement, found.depth, as_one)

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
-from diff4splat.generation.layered_image.rigid_components import box_size_px, connected_components
+from diff4splat.generation.layered_image.rigid_components import box_size_px, each_component
 from diff4splat.generation.motion.displacement_maps import mean_of_moving
 
 RELIEF_SHARE = 0.25
@@ -45,9 +45,8 @@ def as_far_in_image(
     One displacement in space moves what is nearer farther in the image. Of predicted relief that
     is mostly error, and opens gaps where it is steep.
     """
-    share, component = torch.ones_like(depth), connected_components(moving)
-    for number in range(1, int(component.max()) + 1):
-        inside = component == number
+    share = torch.ones_like(depth)
+    for inside in each_component(moving):
         share[inside] = depth[inside] / depth[inside].median()
     return displacement * share[..., None]
 
@@ -71,9 +70,8 @@ def bounded_relief(
     depth: Float[Tensor, "y x"], moving: Bool[Tensor, "y x"], focal_px: float
 ) -> Float[Tensor, "y x"]:
     """Depth whose logarithm is near the median over each connected component of ``moving``."""
-    bounded, component = depth.clone(), connected_components(moving)
-    for number in range(1, int(component.max()) + 1):
-        inside = component == number
+    bounded = depth.clone()
+    for inside in each_component(moving):
         limit = RELIEF_SHARE * max(box_size_px(inside)) / focal_px
         median = depth[inside].median()
         bounded[inside] = median * (depth[inside] / median).log().clamp(-limit, limit).exp()

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from diff4splat.captions.vocabulary import ROLLING
 from diff4splat.generation.layered_image.mask_rim import nearest_inside
-from diff4splat.generation.layered_image.rigid_components import box_size_px, connected_components
+from diff4splat.generation.layered_image.rigid_components import box_size_px, each_component
 from diff4splat.generation.motion.local_motion.body import rounded
 from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX
 from diff4splat.generation.motion.local_motion.motions import LOCAL_MOTIONS
@@ -57,9 +57,7 @@ def with_moving_objects(
     """
     number, objects = torch.zeros_like(maps.event), []
     for event, request in enumerate(requests, 1):
-        component = connected_components(maps.event == event)
-        for each in range(1, int(component.max()) + 1):
-            inside = component == each
+        for inside in each_component(maps.event == event):
             if _moves_about_itself(maps, inside, request.local_motion):
                 maps, one = _with_object(maps, inside, request, round_bodies=round_bodies)
                 objects.append(one)
