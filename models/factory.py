@@ -21,6 +21,7 @@ from diff4splat.models.deformation.network import DeformationNetwork
 from diff4splat.models.deformation.refined_network import RefinedDeformation
 from diff4splat.models.image_classifier.network import ImageClassifier
 from diff4splat.models.image_encoder.clip import ClipImageEncoder
+from diff4splat.models.image_inpainting.network import ImageInpainting
 from diff4splat.models.ldrm.ldrm import Ldrm
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
@@ -93,6 +94,7 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
         ),
         "object_mask": lambda: _object_mask(config),
         "image_classifier": ImageClassifier,
+        "image_inpainting": lambda: ImageInpainting(config.image_inpainting.widths),
         "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 

@@ -11,6 +11,7 @@ from diff4splat.models.protocols import (
     DepthPrior,
     GaussianMaps,
     ImageClasses,
+    ImageCompletion,
     ImageStates,
     MotionPrior,
     ObjectMask,
@@ -34,6 +35,7 @@ class Networks:
     image_encoder: ImageStates | None = None
     object_mask: ObjectMask | None = None
     image_classifier: ImageClasses | None = None
+    image_inpainting: ImageCompletion | None = None
 
     def parts(self) -> list[tuple[str, Any]]:
         """(name, network) of the parts that exist."""
@@ -74,4 +76,6 @@ def model_parts(config: ModelConfig) -> tuple[str, ...]:
         absent.add("object_mask")
     if not config.object_mask.image_classifier:
         absent.add("image_classifier")
+    if not config.image_inpainting.used:
+        absent.add("image_inpainting")
     return tuple(part for part in PARTS if part not in absent)

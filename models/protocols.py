@@ -77,6 +77,16 @@ class ImageClasses(Protocol):
 
 
 @runtime_checkable
+class ImageCompletion(Protocol):
+    """As ``ImageInpainting``."""
+
+    multiple_px: int
+
+    def __call__(self, image: Tensor, known: Tensor) -> Tensor:
+        """The image where it is known, completed elsewhere."""
+
+
+@runtime_checkable
 class ObjectMask(Protocol):
     """As ``ObjectMaskNet``."""
 

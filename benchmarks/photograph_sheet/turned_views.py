@@ -12,7 +12,9 @@ side, where the panorama knows what is there. Depth hardly matters, so this meas
 
 import argparse
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import torch
 from jaxtyping import Bool, Float
@@ -20,7 +22,9 @@ from torch import Tensor
 
 from benchmarks.photograph_sheet.__main__ import prepared
 from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph
+from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
 from diff4splat.geometry.rays import camera_rays
@@ -29,6 +33,7 @@ from diff4splat.metrics.features.fixed_features import FixedFeatures
 from diff4splat.metrics.features.gradient_pyramid import GradientPyramidFeatures
 from diff4splat.metrics.perceptual import perceptual_distance
 from diff4splat.render.api import render
+from diff4splat.scene.scene import Scene
 
 MODEL = "small"
 YAWS_DEG = tuple(range(0, 360, 45))
@@ -57,13 +62,16 @@ class Turned:
 
 def main() -> None:
     """One row of Markdown for each angle."""
-    argparse.ArgumentParser(description=__doc__).parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--without-inpainting", action="store_true", help="reflected borders")
+    without = ("image_inpainting",) if parser.parse_args().without_inpainting else ()
     pipeline = Diff4SplatPipeline.from_pretrained(MODEL)
+    generate = partial(pipeline, path="static", settings=GenerationSettings(without=without))
     panoramas = [each for each in PHOTOGRAPHS if each.yaw_deg is not None]
     views: dict[float, list[Turned]] = {turn: [] for turn in TURNS_DEG}
     for panorama in panoramas:
         for yaw in YAWS_DEG:
-            for turn, view in turned_views(pipeline, panorama, float(yaw)).items():
+            for turn, view in turned_views(generate, panorama, float(yaw)).items():
                 views[turn].append(view)
     print("| turned by | PSNR, outside [dB] | distance | Fréchet | detail |")
     print("|---|---:|---:|---:|---:|")
@@ -72,12 +80,12 @@ def main() -> None:
 
 
 def turned_views(
-    pipeline: Diff4SplatPipeline, panorama: Photograph, yaw_deg: float
+    generate: Callable[[InputImage], Scene], panorama: Photograph, yaw_deg: float
 ) -> dict[float, Turned]:
     """Of the view at ``yaw_deg``, by the angle to the right."""
     ahead = replace(panorama, yaw_deg=yaw_deg, pitch_deg=0.0)
     picture = prepared(ahead, MODEL)
-    scene = pipeline(picture, "static")
+    scene = generate(picture)
     views = {}
     for turn in TURNS_DEG:
         camera = turned(picture.camera, turn)

@@ -31,6 +31,7 @@ from diff4splat.generation.inputs.request import (
 )
 from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gaussians
+from diff4splat.generation.layered_image.inpainting import Inpaint, NetworkInpainting
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.motion.local_motion.gaussians import with_local_motion
 from diff4splat.generation.motion.sampling import MotionRequest
@@ -189,9 +190,14 @@ class Diff4SplatPipeline:
     ) -> tuple[GaussianSet, int]:
         """The layered image's, and how many of them the image shows."""
         with log.phases.phase("layer image"):
-            border_cells = self.model.config.refinement.border_cells
-            infill = request.settings.subpixel_infill
-            layered = build_layered_image(request.small, request.image, maps, border_cells, infill)
+            layered = build_layered_image(
+                request.small,
+                request.image,
+                maps,
+                self.model.config.refinement.border_cells,
+                infill=request.settings.subpixel_infill,
+                inpaint=self._inpaint(request),
+            )
             if not request.settings.extended_layers:
                 layered = layered.visible
             found = image_gaussians(layered, request.key_times_s)
@@ -201,6 +207,12 @@ class Diff4SplatPipeline:
         threshold_px, camera = request.settings.static_threshold_px, request.image.camera
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
         return replace(found, motion=motion), visible_count
+
+    def _inpaint(self, request: Request) -> Inpaint | None:
+        """By the network, if it runs."""
+        if "image_inpainting" not in request.plan.parts:
+            return None
+        return NetworkInpainting(network=self.model.networks.image_inpainting)
 
     def _fill_request(self, request: Request, maps: ImageMaps, text: TextStates) -> FillRequest:
         border_cells = self.model.config.refinement.border_cells

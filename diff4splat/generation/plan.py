@@ -7,6 +7,8 @@
     object mask          with the motion prior
     image classifier     with the object mask, if the prompt has a noun that it knows
     text encoder         if a prompt is given and something takes it
+    image inpainting     if the image is larger than any copy that the networks see, and extended
+                         layers are wanted
     VAE, DiT, LDRM       only where hidden regions are filled by the video model
     deformation          only where such a fill may move
 
@@ -33,6 +35,8 @@ CHOICES = (WORSE_FILL, DEPTH_GIVEN, REMOVED)
 """Reasons that are choices: the part would give another scene."""
 NO_MOTION = "no prompt asks for motion"
 NO_CLASS = "the prompt has no noun that it knows"
+NO_PHOTOGRAPH = "the image is no larger than the copies that networks see"
+NO_EXTENSION = "hidden regions stay empty"
 UNTRAINED_FILL = "the video model is not trained"
 
 
@@ -53,6 +57,10 @@ class RequestFacts:
     """Why a trained motion prior finds no motion in the prompt; empty where it may."""
     names_class: bool = False
     """Whether the prompt has a noun that the image classifier knows."""
+    photograph: bool = False
+    """Whether the image is larger than any copy that the networks see."""
+    extended: bool = True
+    """Whether layers extend the image into what it hides."""
     without: tuple[str, ...] = ()
     """Networks that stay out on request: ablations."""
 
@@ -138,6 +146,12 @@ def plan_generation(
         or _untrained("image_classifier", trained)
         or facts.removed("image_classifier")
         or ("" if facts.names_class else NO_CLASS)
+    )
+    reasons["image_inpainting"] = (
+        _untrained("image_inpainting", trained)
+        or facts.removed("image_inpainting")
+        or ("" if facts.photograph else NO_PHOTOGRAPH)
+        or ("" if facts.extended else NO_EXTENSION)
     )
     reasons |= dict.fromkeys((*FILL_PARTS, "image_encoder"), fill)
     if not fill:

@@ -28,6 +28,7 @@ from diff4splat.models.config.networks import (
     VaeConfig,
 )
 from diff4splat.models.config.priors import (
+    ImageInpaintingConfig,
     MonocularDepthConfig,
     MotionUNetConfig,
     ObjectMaskConfig,
@@ -45,6 +46,7 @@ __all__ = [
     "DeformationConfig",
     "DitConfig",
     "ImageEncoderConfig",
+    "ImageInpaintingConfig",
     "JointConfig",
     "LdrmConfig",
     "ModelConfig",
@@ -77,6 +79,7 @@ class ModelConfig:
     monocular_depth: MonocularDepthConfig = field(default_factory=MonocularDepthConfig)
     motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
     object_mask: ObjectMaskConfig = field(default_factory=ObjectMaskConfig)
+    image_inpainting: ImageInpaintingConfig = field(default_factory=ImageInpaintingConfig)
     joint: JointConfig = field(default_factory=JointConfig)
     """Where the video model has one sequence of text and video."""
     image_encoder: ImageEncoderConfig = field(default_factory=ImageEncoderConfig)

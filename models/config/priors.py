@@ -6,6 +6,8 @@ from diff4splat.models.config.checks import require, require_counts, require_opt
 
 BACKBONE_MULTIPLE_PX = 32
 """Image sides that the image backbone takes are multiples of it."""
+MAX_LEVELS, MAX_WIDTH = 10, 1 << 14
+"""Of image inpainting; more is damage."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +99,34 @@ class MotionUNetConfig:
     def used(self) -> bool:
         """Whether there is such a network."""
         return self.width > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageInpaintingConfig:
+    """Image inpainting: MI-GAN, which fills what a photograph does not show (ADR 50)."""
+
+    widths: tuple[int, ...] = ()
+    """Channels from the level of pixels to the coarsest, each of half the sides; empty: none."""
+
+    def __post_init__(self) -> None:
+        listed = isinstance(self.widths, tuple) and len(self.widths) != 1
+        counts = listed and all(
+            isinstance(width, int) and not isinstance(width, bool) and 0 < width <= MAX_WIDTH
+            for width in self.widths
+        )
+        fits = counts and len(self.widths) <= MAX_LEVELS
+        expected = f"none, or 2 to {MAX_LEVELS} widths from 1 to {MAX_WIDTH}"
+        require(fits, "ImageInpaintingConfig.widths", expected, self.widths)
+
+    @property
+    def used(self) -> bool:
+        """Whether there is such a network."""
+        return len(self.widths) > 0
+
+    @property
+    def multiple_px(self) -> int:
+        """What sides of its images are multiples of."""
+        return 2 ** max(len(self.widths) - 1, 0)
 
 
 def _require_backbone_fits(config: MonocularDepthConfig | ObjectMaskConfig) -> None:

@@ -134,6 +134,20 @@ class OnnxImageClassifier(OnnxPart):
         return run_graph(self.model["image_classifier"], inputs)["corrected_logits"]
 
 
+class OnnxImageInpainting(OnnxPart):
+    """As ``ImageInpainting``."""
+
+    @property
+    def multiple_px(self) -> int:
+        """What sides are multiples of."""
+        return self.config.image_inpainting.multiple_px
+
+    def __call__(self, image: Tensor, known: Tensor) -> Tensor:
+        """The image where it is known, completed elsewhere."""
+        inputs = {"image": image, "known": known}
+        return run_graph(self.model["image_inpainting"], inputs)["completed"]
+
+
 class OnnxVae(OnnxPart):
     """As ``VideoVae``."""
 

@@ -10,6 +10,7 @@ from diff4splat.models.onnx.adapters import (
     OnnxDepth,
     OnnxDit,
     OnnxImageClassifier,
+    OnnxImageInpainting,
     OnnxLdrm,
     OnnxMotion,
     OnnxObjectMask,
@@ -28,6 +29,7 @@ ADAPTERS = {
     "motion_unet": OnnxMotion,
     "object_mask": OnnxObjectMask,
     "image_classifier": OnnxImageClassifier,
+    "image_inpainting": OnnxImageInpainting,
 }
 FEW_THREADS = (
     *("text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"),

@@ -130,6 +130,20 @@ def image_classifier_graphs(network: nn.Module, config: ModelConfig) -> list[Gra
     ]
 
 
+def image_inpainting_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """An image, and where it is known, to the completed image."""
+    size = _image_size(config.image_inpainting.multiple_px)
+    return [
+        GraphSource(
+            name="image_inpainting",
+            part="image_inpainting",
+            module=TensorFunction(network, lambda part, *inputs: (part(*inputs),)),
+            inputs=(unit("image", "batch", 3, *size), mask("known", "batch", *size)),
+            outputs=(output("completed", "batch", 3, *size),),
+        )
+    ]
+
+
 def _image_size(multiple_px: int) -> tuple[str, str]:
     """Symbols of the sides that a network takes."""
     return f"{multiple_px}*rows", f"{multiple_px}*columns"

@@ -10,6 +10,7 @@ from diff4splat.models.networks import Networks
 from diff4splat.models.onnx_export.gaussian_graphs import deformation_graphs, ldrm_graphs
 from diff4splat.models.onnx_export.prior_graphs import (
     image_classifier_graphs,
+    image_inpainting_graphs,
     monocular_depth_graphs,
     motion_unet_graphs,
     object_mask_graphs,
@@ -29,6 +30,7 @@ GRAPHS: Mapping[str, Callable[[nn.Module, ModelConfig], list[GraphSource]]] = Ma
         "motion_unet": motion_unet_graphs,
         "object_mask": object_mask_graphs,
         "image_classifier": image_classifier_graphs,
+        "image_inpainting": image_inpainting_graphs,
     }
 )
 """Part → its graphs."""

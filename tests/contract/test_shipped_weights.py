@@ -15,7 +15,10 @@ from diff4splat.models.hub.provenance import NOT_STATED
 from diff4splat.models.networks import model_parts
 
 ROOT = Path(__file__).parents[2]
-FILES = {"config.json", "provenance.json", "SHA256SUMS", CARD_FILE}
+FILES = {
+    *("config.json", "provenance.json", "SHA256SUMS", CARD_FILE),
+    "LICENSE-image-inpainting.txt",
+}
 MAX_BYTES = 60e6
 """Of one model; package indexes take 100 MB."""
 FOLDERS = sorted(WEIGHTS_FOLDER.iterdir())

@@ -38,7 +38,10 @@ PRIORS = frozenset(
     {"text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"}
 )
 VIDEO = frozenset({"vae", "dit", "ldrm", "deformation"})
+SEES_NO_SMALL_IMAGE = "image_inpainting"
+"""It runs for photographs alone: a test of its own."""
 PARTS = sorted(PRIORS | VIDEO)
+ALL_PARTS = sorted((*PARTS, SEES_NO_SMALL_IMAGE))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +53,13 @@ class Case:
     fill: Fill | None = None
     still: bool = False
     path: str = "left:0.3"
+    enlargement: int = 1
+    """Of the image: above the copies that networks see it is a photograph."""
     without: tuple[str, ...] = ()
 
     @property
     def idle(self) -> frozenset[str]:
-        return frozenset(PARTS) - self.parts
+        return frozenset(ALL_PARTS) - self.parts
 
 
 CASES = {
@@ -86,20 +91,21 @@ UNREAD += [
 ]
 
 
-def image() -> InputImage:
+def image(enlargement: int = 1) -> InputImage:
     """A red box in front of a gradient."""
     y, x = torch.meshgrid(*(torch.linspace(0, 1, SIDE_PX),) * 2, indexing="ij")
     rgb = torch.stack([0.3 + 0.4 * x, 0.6 - 0.3 * y, 0.4 + 0.2 * x * y], -1)
     rgb[36:52, 20:40] = torch.tensor([0.85, 0.15, 0.1])
     rgb[36:40, 20:40] = torch.tensor([0.95, 0.35, 0.3])
-    camera = pinhole(float(SIDE_PX), (SIDE_PX, SIDE_PX))
+    rgb = rgb.repeat_interleave(enlargement, 0).repeat_interleave(enlargement, 1)
+    camera = pinhole(float(len(rgb)), rgb.shape[:2])
     return InputImage(rgb=rgb, camera=camera, focal_source="test")
 
 
 def generate(model: Path | str, case: Case, log: RunLog | None = None) -> Scene:
     settings = GenerationSettings(steps=2, fill=case.fill, still=case.still, without=case.without)
     pipeline = Diff4SplatPipeline.from_pretrained(model)
-    return pipeline(image(), case.path, case.prompt, settings=settings, log=log)
+    return pipeline(image(case.enlargement), case.path, case.prompt, settings=settings, log=log)
 
 
 @cache
@@ -135,6 +141,22 @@ def test_noise_in_the_image_classifier_changes_what_it_corrects(
     monkeypatch.setattr(classifier, "LEAST_PROBABILITY", 1e-9)
     folder = copied_folder(tmp_path / "model", [(SEES_NO_BOX, with_noise)])
     assert not same(generate(folder, CASES["prompt"]), generate("small", CASES["prompt"]))
+
+
+def test_the_image_inpainting_fills_a_photograph(tmp_path: Path) -> None:
+    case = Case(prompt=None, parts=frozenset(), enlargement=4)
+    plain, log = logged(case)
+    assert SEES_NO_SMALL_IMAGE in log.networks
+    folder = copied_folder(tmp_path / "model", [(SEES_NO_SMALL_IMAGE, with_noise)])
+    others = (
+        generate(folder, case),
+        generate("small", replace(case, without=(SEES_NO_SMALL_IMAGE,))),
+    )
+    for other in others:
+        # What the image shows is as before; what it hides has other colours in the same places.
+        assert torch.equal(other.gaussians.means, plain.gaussians.means)
+        assert not same(other, plain)
+        assert all(bool(value.isfinite().all()) for value in tensors(other))
 
 
 @pytest.mark.parametrize(("name", "part"), RUNS)
@@ -232,7 +254,7 @@ def test_without_a_fill_the_path_changes_no_gaussian() -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_the_log_lists_exactly_the_networks_that_were_left_out(name: str) -> None:
     case = CASES[name]
-    skipped = [entry for entry in logged(case)[1].skipped if entry.what in PARTS]
+    skipped = [entry for entry in logged(case)[1].skipped if entry.what in ALL_PARTS]
     assert sorted(entry.what for entry in skipped) == sorted(case.idle)
     would_differ = case.idle & VIDEO if case.fill is None else frozenset()
     assert {entry.what for entry in skipped if entry.error is None} == would_differ
@@ -248,7 +270,7 @@ def test_the_card_lists_them_too(tmp_path: Path) -> None:
     facts = RequestFacts(prompt=False)
     pipeline = Diff4SplatPipeline.from_pretrained("small")
     plan = plan_generation(pipeline.model.config, pipeline.model.trained, facts)
-    listed = {entry["what"]: entry for entry in card["left_out"] if entry["what"] in PARTS}
+    listed = {entry["what"]: entry for entry in card["left_out"] if entry["what"] in ALL_PARTS}
     assert {part: entry["why"] for part, entry in listed.items()} == {
         skipped.part: skipped.why for skipped in plan.skipped
     }

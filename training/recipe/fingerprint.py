@@ -64,7 +64,7 @@ def _model(model: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Mapping)
         else value
         for key, value in _without_plain(model).items()
-        if not (key in _UNUSED_AT and not value[_UNUSED_AT[key]])
+        if key not in _IN_NO_STAGE and not (key in _UNUSED_AT and not value[_UNUSED_AT[key]])
     }
 
 
@@ -97,6 +97,8 @@ _MODEL_ADDED = (
 """Settings of networks that are off where they are empty or 0."""
 _UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}
 """Sections of later releases, and what is 0 in a model without them."""
+_IN_NO_STAGE = ("image_inpainting",)
+"""Networks with public weights that no stage runs."""
 _STAGE_ADDED = {"tuning": "full", "lora_rank": 16}
 _SOURCE_ADDED = {"depth_loss": "true", "motion_loss": "true", "views": 0, "unit": ""}
 _NOT_DECISIVE = ("workers", "in_memory", "photographs")

@@ -31,6 +31,7 @@ from diff4splat.cli.models import GetModel, ListModels
 from diff4splat.cli.pack import Pack
 from diff4splat.cli.paths import ListPaths, PreviewPath
 from diff4splat.cli.prepare import PrepareCheck, PrepareLatents, PrepareSynthetic
+from diff4splat.cli.public_models.image_inpainting import AddInpainting
 from diff4splat.cli.public_models.import_model import CheckModel, ImportModel
 from diff4splat.cli.report import ErrorTime, ListKnobs, Stability
 from diff4splat.cli.scenes.bake import Bake
@@ -48,6 +49,7 @@ Models = (
     | Annotated[GetModel, subcommand("get")]
     | Annotated[ImportModel, subcommand("import")]
     | Annotated[CheckModel, subcommand("check")]
+    | Annotated[AddInpainting, subcommand("inpainting")]
 )
 Prepare = (
     Annotated[PrepareSynthetic, subcommand("synth")]

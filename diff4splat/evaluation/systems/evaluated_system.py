@@ -65,13 +65,14 @@ class Generator:
 
     @property
     def parts(self) -> frozenset[str]:
-        """Networks that run for an image with a prompt."""
+        """Networks that run for a photograph with a prompt."""
         model, settings = self.pipeline.model, self.settings
         facts = RequestFacts(
             prompt=True,
             fill=settings.fill,
             still=settings.still,
             names_class=True,
+            photograph=True,
             without=settings.without,
         )
         return plan_generation(model.config, model.trained, facts).parts

@@ -3,7 +3,15 @@
 from typing import Literal, get_args
 
 Network = Literal[
-    "depth", "motion", "object-mask", "image-classifier", "text", "video", "ldrm", "deformation"
+    "depth",
+    "motion",
+    "object-mask",
+    "image-classifier",
+    "image-inpainting",
+    "text",
+    "video",
+    "ldrm",
+    "deformation",
 ]
 """As on the command line, in the order of the table."""
 NETWORKS: tuple[Network, ...] = get_args(Network)

@@ -63,6 +63,15 @@ def downsampling_factor(config: ModelConfig, plan: GenerationPlan, size_px: tupl
     return min(fitting, key=lambda factor: abs(math.log(side_px / trained_px / factor)), default=1)
 
 
+def is_photograph(
+    config: ModelConfig, trained: Collection[str], fill: Fill | None, size_px: tuple[int, int]
+) -> bool:
+    """Whether an image is larger than any copy that networks see of it."""
+    factor = downsampling_factor(config, image_plan(config, trained, fill), size_px)
+    scale = config.monocular_depth.photo_scale
+    return factor > (1 if factor % scale else scale)
+
+
 def find_image_size(
     name_or_folder: str,
     side_px: int | None = None,

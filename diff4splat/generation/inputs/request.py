@@ -15,6 +15,7 @@ from diff4splat.generation.inputs.image_size import (
     default_side_px,
     downsampling_factor,
     image_plan,
+    is_photograph,
     size_multiple_px,
 )
 from diff4splat.generation.inputs.input_cameras import (
@@ -101,6 +102,8 @@ def prepare_request(model: Model, user: UserInput, device: torch.device) -> Requ
         depth_given=user.depth is not None,
         static_prompt="" if user.prompt is None else why_static(user.prompt),
         names_class=any(map(prompt_classes, moving_events(user.prompt or ""))),
+        photograph=is_photograph(config, model.trained, settings.fill, image.camera.size_px),
+        extended=settings.extended_layers,
         without=settings.without,
     )
     plan = plan_generation(config, model.trained, facts)

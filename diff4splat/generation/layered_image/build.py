@@ -25,14 +25,16 @@ from diff4splat.generation.layered_image.border.extension import (
     push_behind_surface,
     push_farther_than_rings,
 )
-from diff4splat.generation.layered_image.border.fine_border import NEAR, PHOTOGRAPH, fine_border
+from diff4splat.generation.layered_image.border.fine_border import NEAR, PHOTOGRAPH, fine_borders
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
+from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
     inpaint_border,
     without_disoccluded,
 )
+from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.pixel_maps.image_maps import (
     ImageMaps,
     finest_copy,
@@ -47,26 +49,35 @@ from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, 
 
 
 def build_layered_image(
-    small: InputImage, image: InputImage, maps: ImageMaps, border_cells: int, infill: bool = True
+    small: InputImage,
+    image: InputImage,
+    maps: ImageMaps,
+    border_cells: int,
+    *,
+    infill: bool = True,
+    inpaint: Inpaint | None = None,
 ) -> LayeredImage:
     """The layers of ``image``; ``small`` is the copy that ``maps`` belong to.
 
-    Without ``infill`` between the pixels, theirs are twice as wide.
+    Without ``infill`` between the pixels, theirs are twice as wide. ``inpaint`` gives colours to
+    what is hidden, in place of shifted patches and a reflected border.
     """
     pixels, reduced = pixel_layer(small, image, maps), is_reduced(small, image)
-    rings = (NEAR,) if finest_copy(small, maps).shape == image.rgb.shape else PHOTOGRAPH
+    is_photograph = inpaint is not None or finest_copy(small, maps).shape != image.rgb.shape
+    rings = PHOTOGRAPH if is_photograph else (NEAR,)
     hidden = hidden_layers(small, maps, pixels, border_cells)
-    if border_cells and rings is PHOTOGRAPH:  # In small images its blur is the better guess.
+    if border_cells and is_photograph:  # In small images its blur is the better guess.
         hidden[-1] = push_farther_than_rings(hidden[-1], border_cells, rings[-1].reach[1])
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
-    if (disoccluded := disoccluded_layer(pixels)) is not None:
+    inpaint_hole = textured if inpaint is None else inpaint
+    if (disoccluded := disoccluded_layer(pixels, inpaint_hole)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
-    if reduced and (occluded := occluded_layer(pixels)) is not None:
+    if reduced and (occluded := occluded_layer(pixels, inpaint_hole)) is not None:
         hidden.append(occluded)
     if border_cells:
-        hidden += [fine_border(pixels, disoccluded, ring) for ring in rings]
+        hidden += fine_borders(pixels, disoccluded, rings, inpaint)
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))

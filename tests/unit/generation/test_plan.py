@@ -24,6 +24,7 @@ VIDEO = frozenset(FILL_PARTS)
 PRIORS = frozenset({"monocular_depth", "motion_unet", "object_mask", "text_encoder"})
 DEPTH = frozenset({"monocular_depth"})
 CLASSIFIER = frozenset({"image_classifier"})
+INPAINTING = frozenset({"image_inpainting"})
 TABLE = [
     # size, trained, request, parts that run
     ("small", PARTS, {"prompt": True}, PRIORS),
@@ -44,6 +45,16 @@ TABLE = [
     ("small", (), {"prompt": True}, PRIORS),
     ("small", PARTS, {"prompt": True, "names_class": True}, PRIORS | CLASSIFIER),
     ("small", PARTS, {"prompt": False, "names_class": True}, DEPTH),
+    ("small", PARTS, {"prompt": False, "photograph": True}, DEPTH | INPAINTING),
+    ("small", (), {"prompt": True, "photograph": True}, PRIORS | INPAINTING),
+    ("small", PARTS, {"prompt": False, "photograph": True, "extended": False}, DEPTH),
+    ("small", DEPTH, {"prompt": False, "photograph": True}, DEPTH),
+    (
+        "small",
+        PARTS,
+        {"prompt": False, "photograph": True, "without": ("image_inpainting",)},
+        DEPTH,
+    ),
     (
         "small",
         PARTS,
@@ -176,7 +187,9 @@ def test_the_log_says_why_a_network_does_not_run(
 
 def test_a_model_may_fill_by_default() -> None:
     filling = replace(config(), default_fill="video")
-    plan = plan_generation(filling, PARTS, RequestFacts(prompt=True, names_class=True))
+    plan = plan_generation(
+        filling, PARTS, RequestFacts(prompt=True, names_class=True, photograph=True)
+    )
     assert plan.parts == frozenset(model_parts(filling)) and plan.skipped == ()
     assert not plan_generation(filling, PARTS, RequestFacts(prompt=True, fill="none")).fills
 

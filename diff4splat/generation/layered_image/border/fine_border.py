@@ -1,7 +1,8 @@
 """Fine layers beside the border of an image: what a camera motion brings into view (ours).
 
     pixels, or the static layer behind what moves ─ smaller copy ─┬─ colours of its border, mixed,
-                                                                  │  or its own, reflected
+                                                                  │  or its own, reflected, or
+                                                                  │  what the network inpaints
                                                                   └─ depth of the nearest pixel
 
 Axes: ``h w`` pixels, ``hs ws`` cells of the copy with a margin on every side. The border extension
@@ -9,6 +10,7 @@ has cells of 4 pixels of a smaller copy and reaches farther; these layers lie be
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -21,8 +23,10 @@ from diff4splat.generation.layered_image.border.extension import (
     cells_outside,
     extended_camera,
 )
+from diff4splat.generation.layered_image.border.inpainted_colors import inpaint_colors
 from diff4splat.generation.layered_image.border.mixed_colors import continue_colors
 from diff4splat.generation.layered_image.border.reflected_colors import reflect_colors
+from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import ImageLayer
 from diff4splat.models.ldrm.plane_prior import OPAQUE
@@ -40,7 +44,7 @@ class Ring:
     max_side: int
     """Cells along that side: more cost bytes and show no more."""
     reflected: bool = False
-    """Whether it has the image's colours, reflected, or the border's, mixed."""
+    """Whether it has the image's colours, reflected or inpainted, or the border's, mixed."""
 
 
 NEAR = Ring(reach=(0.0, 1 / 8), max_side=256)
@@ -54,24 +58,50 @@ PHOTOGRAPH = (
 
 @torch.no_grad()
 def fine_border(
-    pixels: ImageLayer, disoccluded: ImageLayer | None, ring: Ring = NEAR
+    pixels: ImageLayer,
+    disoccluded: ImageLayer | None,
+    ring: Ring = NEAR,
+    *,
+    inpaint: Inpaint | None = None,
+    nearer: ImageLayer | None = None,
 ) -> ImageLayer:
-    """The static layer around ``pixels``; ``disoccluded`` is the one behind what moves of them."""
+    """The static layer around ``pixels``; ``disoccluded`` is the one behind what moves of them.
+
+    With ``inpaint``, its colours take the place of reflected ones, and go on from the ring that is
+    ``nearer``.
+    """
     source = pixels if disoccluded is None else disoccluded
     step = _cell_px(pixels.camera.size_px, ring.max_side)
     maps = torch.cat([source.rgb, (1 / source.depth)[..., None]], -1)
     cells = avg_pool2d(maps.movedim(-1, 0)[None], step)
     margin = math.ceil(ring.reach[1] * max(cells.shape[2:]))
-    camera = extended_camera(pixels.camera, margin, step)
-    colors = reflect_colors if ring.reflected else continue_colors
+    camera, rgb = extended_camera(pixels.camera, margin, step), cells[0, :3].movedim(0, -1)
+    if ring.reflected and inpaint is not None:
+        colors = inpaint_colors(rgb, camera, nearer, inpaint)
+    else:
+        colors = (reflect_colors if ring.reflected else continue_colors)(rgb, margin)
     return ImageLayer(
         camera=camera,
-        rgb=colors(cells[0, :3].movedim(0, -1), margin),
+        rgb=colors,
         depth=BEHIND / replicate_border(cells[:, 3:], margin)[0, 0],
         mask=_is_in(ring, cells[0, 0], margin) & is_drawable(camera),
         opacity=OPAQUE,
         footprint_px=FOOTPRINT_CELLS,
     )
+
+
+def fine_borders(
+    pixels: ImageLayer,
+    disoccluded: ImageLayer | None,
+    rings: Sequence[Ring],
+    inpaint: Inpaint | None = None,
+) -> list[ImageLayer]:
+    """One layer for each of the ``rings``, from the nearest outward."""
+    layers: list[ImageLayer] = []
+    for ring in rings:
+        nearer = layers[-1] if layers else None
+        layers.append(fine_border(pixels, disoccluded, ring, inpaint=inpaint, nearer=nearer))
+    return layers
 
 
 def _is_in(ring: Ring, cells: Tensor, margin: int) -> Bool[Tensor, "hs ws"]:

@@ -1,7 +1,8 @@
 """What a moving camera disoccludes behind depth edges, at the size of the image (ours, ADR 31).
 
     pixels ─ depth edges ─┬─ foreground within reach of one: what the layer lies behind
-                          └─ inverse depth and colours of the rest, extended evenly, with detail
+                          └─ inverse depth of the rest, extended evenly, and its colours, likewise
+                             with detail or inpainted by a network
 
 Axes: ``h w`` pixels. The other layers continue the image in cells of the smaller copy, in which
 both sides of an edge are mixed: blots in the foreground's colours beside it.
@@ -16,7 +17,9 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
+from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
 from diff4splat.generation.layered_image.windows import largest_around, smallest_around
 
@@ -41,7 +44,7 @@ class NearestEdge:
 
 
 @torch.no_grad()
-def occluded_layer(pixels: ImageLayer) -> ImageLayer | None:
+def occluded_layer(pixels: ImageLayer, inpaint: Inpaint = textured) -> ImageLayer | None:
     """The static layer behind the depth edges of ``pixels``; None where there is none."""
     edge = far_side_of_edges(pixels.depth)
     if not bool(edge.any()):
@@ -57,7 +60,7 @@ def occluded_layer(pixels: ImageLayer) -> ImageLayer | None:
         return None
     # A footprint covers the neighbours too.
     farthest = largest_around(pixels.depth, 1)
-    return static_layer(pixels, known, mask, farthest)
+    return static_layer(pixels, known, mask, farthest, inpaint)
 
 
 def far_side_of_edges(depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h w"]:

@@ -62,6 +62,7 @@ def test_a_network_that_runs_is_left_out() -> None:
         "without motion prior": {"motion_unet", "object_mask", "image_classifier"},
         "without object mask": {"object_mask", "image_classifier"},
         "without image classifier": {"image_classifier"},
+        "without image inpainting": {"image_inpainting"},
         "without text encoder": {
             *("text_encoder", "motion_unet", "object_mask", "image_classifier")
         },

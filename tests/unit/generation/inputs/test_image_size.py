@@ -14,6 +14,7 @@ from diff4splat.generation.inputs.image_size import (
     downsampling_factor,
     find_image_size,
     image_plan,
+    is_photograph,
     size_multiple_px,
 )
 from diff4splat.generation.inputs.input_image import InputImage, downsample
@@ -40,6 +41,25 @@ def factor(
 ) -> int:
     config = small_size()
     return downsampling_factor(config, image_plan(config, trained, fill), size_px)
+
+
+@pytest.mark.parametrize(
+    ("size_px", "expected"),
+    [
+        ((64, 64), False),
+        ((128, 128), False),  # The depth prior sees all of it.
+        ((256, 256), True),
+        ((512, 384), True),
+        ((192, 288), True),
+        ((208, 304), False),  # No smaller copy has whole tokens.
+    ],
+)
+def test_photographs_are_larger_than_any_copy(size_px: tuple[int, int], expected: bool) -> None:
+    assert is_photograph(small_size(), PARTS, None, size_px) == expected
+
+
+def test_a_video_fill_still_has_photographs() -> None:
+    assert is_photograph(small_size(), PARTS, "video", (256, 256))
 
 
 @pytest.mark.parametrize(

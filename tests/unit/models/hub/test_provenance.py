@@ -50,6 +50,7 @@ def test_the_file_lists_parts_in_one_order(tmp_path: Path) -> None:
             "image_encoder",
             "object_mask",
             "image_classifier",
+            "image_inpainting",
         ],
         "license": "not stated",
         "origin": "not stated",

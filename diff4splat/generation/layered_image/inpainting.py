@@ -1,0 +1,63 @@
+"""Colours where nothing of a photograph is known, by the image inpainting network (ADR 50).
+
+Axes: ``h w`` pixels.
+
+    image, mask ─ copy of at most 512 px ─ unknown margin, to whole cells ─ network ─ cut, enlarged
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+from torch.nn.functional import interpolate, pad
+
+from diff4splat.models.protocols import ImageCompletion
+
+Inpaint = Callable[[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]], Float[Tensor, "h w 3"]]
+"""From colours, and where they are known, to colours everywhere."""
+MOST_SIDE_PX = 512
+"""The network was trained on such images; larger ones take longer and have the same detail."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkInpainting:
+    """An ``Inpaint`` by a network that takes sides of some multiple."""
+
+    network: ImageCompletion
+
+    @torch.no_grad()
+    def __call__(
+        self, rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]
+    ) -> Float[Tensor, "h w 3"]:
+        """``rgb`` where it is ``known``; values in [0, 1] elsewhere."""
+        if bool(known.all()):
+            return rgb
+        image = torch.where(known[..., None], rgb, 0.0).movedim(-1, 0)[None]
+        small, mask = _reduced(image, known)
+        found = interpolate(self._completed(small, mask), known.shape, mode="bilinear")
+        return torch.where(known[..., None], rgb, found[0].movedim(0, -1))
+
+    def _completed(
+        self, image: Float[Tensor, "1 3 h w"], known: Bool[Tensor, "1 h w"]
+    ) -> Float[Tensor, "1 3 h w"]:
+        """With an unknown margin on both sides, which is cut again."""
+        height, width = known.shape[1:]
+        down, across = (-side % self.network.multiple_px for side in (height, width))
+        top, left = down // 2, across // 2
+        margins = (left, across - left, top, down - top)
+        found = self.network(pad(image, margins), pad(known, margins))
+        return found[..., top : top + height, left : left + width]
+
+
+def _reduced(
+    image: Float[Tensor, "1 3 h w"], known: Bool[Tensor, "h w"]
+) -> tuple[Float[Tensor, "1 3 hs ws"], Bool[Tensor, "1 hs ws"]]:
+    """The copy that the network sees, known where all of its pixels are."""
+    longest = max(known.shape)
+    if longest <= MOST_SIDE_PX:
+        return image, known[None]
+    size = tuple(max(round(side * MOST_SIDE_PX / longest), 1) for side in known.shape)
+    share = interpolate(known[None, None].to(image), size, mode="area")
+    return interpolate(image, size, mode="area"), share[:, 0] > 1 - 1e-4

@@ -1,0 +1,1 @@
+"""A public image inpainting network, which continues photographs where nothing is known."""

@@ -1,0 +1,64 @@
+"""An image of any size through a network that takes some sizes."""
+
+import pytest
+import torch
+from image_layers import random_rgb
+from torch import Tensor
+
+from diff4splat.generation.layered_image import inpainting
+from diff4splat.generation.layered_image.inpainting import NetworkInpainting
+
+
+class Painter:
+    """A network that paints its own row number, and keeps what it was asked."""
+
+    multiple_px = 8
+
+    def __init__(self) -> None:
+        self.image = self.known = torch.empty(0)
+
+    def __call__(self, image: Tensor, known: Tensor) -> Tensor:
+        self.image, self.known = image, known
+        rows = torch.arange(image.shape[2])[:, None] / 1000
+        return torch.where(known[:, None], image, rows.expand_as(image))
+
+
+def hole(height: int, width: int) -> Tensor:
+    known = torch.ones(height, width, dtype=torch.bool)
+    known[height // 4 : height // 2, width // 4 : width // 2] = False
+    return known
+
+
+@pytest.mark.parametrize("size", [(8, 16), (9, 13), (1, 1), (20, 7)])
+def test_the_network_gets_whole_cells_with_an_unknown_margin(size: tuple[int, int]) -> None:
+    painter, rgb, known = Painter(), random_rgb(*size), hole(*size)
+    known[0, 0] = False
+    found = NetworkInpainting(network=painter)(rgb, known)
+    assert found.shape == rgb.shape and torch.equal(found[known], rgb[known])
+    assert all(side % 8 == 0 for side in painter.known.shape[1:])
+    assert int(painter.known.sum()) == int(known.sum())
+    top = (-size[0] % 8) // 2
+    torch.testing.assert_close(found[0, 0], torch.full((3,), top / 1000))
+
+
+def test_unknown_colours_are_not_passed_on() -> None:
+    painter, known = Painter(), hole(8, 8)
+    rgb = torch.where(known[..., None], random_rgb(8, 8), torch.nan)
+    found = NetworkInpainting(network=painter)(rgb, known)
+    assert bool(found.isfinite().all()) and bool(painter.image.isfinite().all())
+
+
+def test_what_is_known_everywhere_needs_no_network() -> None:
+    painter, rgb = Painter(), random_rgb(8, 8)
+    assert NetworkInpainting(network=painter)(rgb, torch.ones(8, 8, dtype=torch.bool)) is rgb
+    assert not painter.known.numel()
+
+
+def test_large_images_are_seen_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inpainting, "MOST_SIDE_PX", 16)
+    painter, rgb, known = Painter(), random_rgb(32, 48), hole(32, 48)
+    found = NetworkInpainting(network=painter)(rgb, known)
+    assert painter.image.shape[2:] == (16, 16)
+    # Of 11 × 16 cells in the middle, those that hold an unknown pixel are unknown.
+    assert not bool(painter.known[:, :2].any()) and 0 < int(painter.known.sum()) < 11 * 16
+    assert found.shape == rgb.shape and torch.equal(found[known], rgb[known])
