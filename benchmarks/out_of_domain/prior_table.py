@@ -18,6 +18,7 @@ import torch
 
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.geometry.camera import focal_from_fov, pinhole
 from diff4splat.io.atomic import write_text
 from diff4splat.io.photos.images import write_png
@@ -29,6 +30,8 @@ from diff4splat.render.api import render
 
 Item = dict[str, np.ndarray]
 Distort = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+REFLECTED = ("true depth, size of the image", "the model's own")
+"""Ways that are also measured without image inpainting."""
 HEADER = (
     "| depth | PSNR [dB] | mean difference | median difference | worst scene |\n"
     "|---|---:|---:|---:|---:|\n"
@@ -105,8 +108,12 @@ def write_prior_table(arguments: argparse.Namespace) -> None:
     for index, file in enumerate(files):
         with np.load(file, allow_pickle=False) as arrays:
             item = dict(arrays)
-        for name, source in sources(item, index).items():
+        given = sources(item, index)
+        for name, source in given.items():
             rows.setdefault(name, []).append(path_psnr(pipeline, item, source))
+        for name in REFLECTED:
+            psnr_db = path_psnr(pipeline, item, given[name], without=("image_inpainting",))
+            rows.setdefault(f"{name}, without image inpainting", []).append(psnr_db)
         print(
             f"{file.name}: {', '.join(f'{values[-1]:.2f}' for values in rows.values())}", flush=True
         )
@@ -130,19 +137,27 @@ def sources(item: Item, index: int) -> dict[str, ArrayDepth | None]:
     return found | {"the model's own": None}
 
 
-def path_psnr(pipeline: Diff4SplatPipeline, item: Item, source: ArrayDepth | None) -> float:
+def path_psnr(
+    pipeline: Diff4SplatPipeline,
+    item: Item,
+    source: ArrayDepth | None,
+    without: tuple[str, ...] = (),
+) -> float:
     """Mean PSNR of the views along the path."""
     targets = torch.from_numpy(item["views"]).float() / 255
-    found = path_views(pipeline, item, source)
+    found = path_views(pipeline, item, source, without)
     return statistics.mean(
         float(psnr(view, target)) for view, target in zip(found, targets, strict=True)
     )
 
 
 def path_views(
-    pipeline: Diff4SplatPipeline, item: Item, source: ArrayDepth | None
+    pipeline: Diff4SplatPipeline,
+    item: Item,
+    source: ArrayDepth | None,
+    without: tuple[str, ...] = (),
 ) -> list[torch.Tensor]:
-    """The generated scene as the cameras of the path see it."""
+    """The scene as the cameras of the path see it, generated ``without`` some networks."""
     rgb = torch.from_numpy(item["rgb"]).float() / 255
     size_px = (rgb.shape[0], rgb.shape[1])
     camera = pinhole(focal_from_fov(float(item["fov_deg"]), size_px[1]), size_px).to(torch.float32)
@@ -150,7 +165,8 @@ def path_views(
     poses = torch.cat([torch.eye(4)[None], torch.from_numpy(item["world_from_camera"]).float()])
     times_s = torch.arange(len(poses)) / 24
     path = CameraPath(cameras=camera.with_pose(poses), times_s=times_s)
-    scene = pipeline(image, path, log=RunLog(), depth=source)
+    settings = GenerationSettings(without=without)
+    scene = pipeline(image, path, settings=settings, log=RunLog(), depth=source)
     cameras = scene.path.cameras
     with torch.no_grad():
         return [render(scene, cameras[number], 0.0).rgb for number in range(1, len(cameras))]

@@ -42,7 +42,7 @@ test_size.__test__ = False
 
 
 def small_size() -> ModelConfig:
-    """Under 34 million weights: runs on two CPU cores in seconds, and can be trained there."""
+    """Under 40 million weights: runs on two CPU cores in seconds, and can be trained there."""
     return ModelConfig(
         name="small",
         frames=9,

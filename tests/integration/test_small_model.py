@@ -17,12 +17,16 @@ from diff4splat.render.api import render
 EXAMPLE = Path(__file__).parents[2] / "examples" / "make_world_picture.py"
 
 
-@pytest.mark.parametrize("side_px", [64, 256])
-def test_an_image_without_a_prompt_needs_its_depth_alone(side_px: int) -> None:
+@pytest.mark.parametrize(
+    ("side_px", "parts"),
+    [(64, {"monocular_depth"}), (256, {"monocular_depth", "image_inpainting"})],
+)
+def test_an_image_without_a_prompt_needs_its_depth_alone(side_px: int, parts: set[str]) -> None:
+    """And a photograph what inpaints it."""
     image, pipeline = waves(side_px), Diff4SplatPipeline.from_pretrained("small")
     scene = pipeline(image, "arc:0.1")
-    assert pipeline.model.loaded == {"monocular_depth"}
-    assert scene.provenance.weights_sha256 == pipeline.model.weights_sha256({"monocular_depth"})
+    assert pipeline.model.loaded == parts
+    assert scene.provenance.weights_sha256 == pipeline.model.weights_sha256(parts)
     assert not scene.provenance.untrained
     assert scene.dilation_px2 == 0
     assert len(scene.gaussians) > 3 * side_px**2
@@ -33,7 +37,7 @@ def test_every_network_runs_where_the_video_model_fills() -> None:
     image, pipeline = waves(64), Diff4SplatPipeline.from_pretrained("small")
     settings = GenerationSettings(fill="video", steps=1)
     scene = pipeline(image, "arc:0.1", "the blue ball moves to the left", settings=settings)
-    assert pipeline.model.loaded == set(pipeline.model.parts)
+    assert pipeline.model.loaded == set(pipeline.model.parts) - {"image_inpainting"}
     assert not scene.provenance.untrained
     assert float(psnr(render(scene, image.camera).rgb.clamp(0, 1), image.rgb)) >= 50
 

@@ -10,7 +10,12 @@ from diff4splat.stability.checks.network_checks import model_of
 from diff4splat.stability.compare import psnr_db, rms_error
 from diff4splat.stability.plots import Thumbnail
 from diff4splat.stability.subjects.drawn_images import Image, drawn_images, objects
-from diff4splat.stability.subjects.generated_scenes import GeneratedScene, as_file, generate
+from diff4splat.stability.subjects.generated_scenes import (
+    SIDE_PX,
+    GeneratedScene,
+    as_file,
+    generate,
+)
 
 GROUP = "images"
 LIMIT = 1e-3
@@ -19,19 +24,16 @@ FIELDS_OF_VIEW_DEG = (1.0, 60.0, 120.0, 150.0, 170.0)
 FIRST_VIEW_LIMIT = 0.1
 """RMS of RGB, 20 dB: the first view shows the image itself."""
 QUICK = ("constant", "1:40")
+PHOTOGRAPH_PX = 256
+"""Larger than any copy that networks see, so that image inpainting runs."""
+PHOTOGRAPHS = ("two objects", "black", "1:8", "checkerboard of pixels")
 
 
 def image_checks(model: str) -> Iterator[Check]:
-    """Each drawn image with a prompt, and one with extreme lenses."""
-    for name, draw in drawn_images().items():
-        yield Check(
-            group=GROUP,
-            name=name,
-            run=partial(measure_image, model, draw),
-            limit=LIMIT,
-            error_unit="RMS of RGB, view from the side, networks in float32 against float64",
-            quick=name in QUICK,
-        )
+    """Each drawn image with a prompt, some large, and one with extreme lenses."""
+    drawn = drawn_images()
+    yield from (_scene_check(model, name, drawn[name], SIDE_PX) for name in drawn)
+    yield from (_scene_check(model, name, drawn[name], PHOTOGRAPH_PX) for name in PHOTOGRAPHS)
     for fov_deg in FIELDS_OF_VIEW_DEG:
         yield Check(
             group=GROUP,
@@ -42,9 +44,21 @@ def image_checks(model: str) -> Iterator[Check]:
         )
 
 
-def measure_image(model: str, draw: Callable[[], Image]) -> Outcome:
+def _scene_check(model: str, name: str, draw: Callable[[], Image], side_px: int) -> Check:
+    is_small = side_px == SIDE_PX
+    return Check(
+        group=GROUP,
+        name=name if is_small else f"{name}, {side_px} px",
+        run=partial(measure_image, model, draw, side_px),
+        limit=LIMIT,
+        error_unit="RMS of RGB, view from the side, networks in float32 against float64",
+        quick=is_small and name in QUICK,
+    )
+
+
+def measure_image(model: str, draw: Callable[[], Image], side_px: int = SIDE_PX) -> Outcome:
     """The scene of float32 networks against that of float64 networks."""
-    image, networks = as_file(draw()), model_of(model)
+    image, networks = as_file(draw(), side_px=side_px), model_of(model)
     exact = generate(networks, torch.float64, image)
     got = generate(networks, torch.float32, image)
     error = rms_error(got.side_view, exact.side_view)

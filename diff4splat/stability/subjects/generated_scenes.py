@@ -39,8 +39,10 @@ class GeneratedScene:
     """Of the side view, in all parameters of the Gaussians."""
 
 
-def as_file(rgb: Float[Tensor, "h w 3"], fov_deg: float | None = None) -> InputImage:
-    """The image written and read again, as users' images are.
+def as_file(
+    rgb: Float[Tensor, "h w 3"], fov_deg: float | None = None, side_px: int = SIDE_PX
+) -> InputImage:
+    """The image written and read again, as users' images are, at about ``side_px``.
 
     Raises:
         InputError: it is no image that can be used.
@@ -49,7 +51,7 @@ def as_file(rgb: Float[Tensor, "h w 3"], fov_deg: float | None = None) -> InputI
         file = Path(folder) / "image.png"
         write_png(rgb, file)
         try:
-            return load_image(file, SIDE_PX, fov_deg)
+            return load_image(file, side_px, fov_deg)
         except InputError as error:
             # The folder is of no interest to a reader.
             raise InputError(str(error).replace(f"{folder}/", "")) from error

@@ -74,6 +74,7 @@ def since(old: ModelConfig, new: ModelConfig) -> ModelConfig:
         monocular_depth=prior,
         motion_unet=replace(old.motion_unet, input_scale=2),
         object_mask=new.object_mask,
+        image_inpainting=new.image_inpainting,
         refinement=replace(old.refinement, depth_prior=True),
         default_guidance=new.default_guidance,
     )
