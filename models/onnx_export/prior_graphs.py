@@ -140,6 +140,7 @@ def image_inpainting_graphs(network: nn.Module, config: ModelConfig) -> list[Gra
             module=TensorFunction(network, lambda part, *inputs: (part(*inputs),)),
             inputs=(unit("image", "batch", 3, *size), mask("known", "batch", *size)),
             outputs=(output("completed", "batch", 3, *size),),
+            sizes=(("rows", 2), ("columns", 3)),  # Of many pixels each.
         )
     ]
 

@@ -33,6 +33,8 @@ class GraphSource:
     module: nn.Module
     inputs: tuple[InputSource, ...]
     outputs: tuple[TensorSpec, ...]
+    sizes: tuple[tuple[str, int], ...] = ()
+    """Of names whose usual sizes would take long."""
 
     @property
     def size_names(self) -> list[str]:
@@ -42,7 +44,7 @@ class GraphSource:
 
     def traced_sizes(self) -> dict[str, int]:
         """The sizes that the graph is traced with."""
-        sizes = dict(TRACED_SIZES)
+        sizes = {**TRACED_SIZES, **dict(self.sizes)}
         for name in self.size_names:
             sizes.setdefault(name, FIRST_OTHER_SIZE + len(sizes) - len(TRACED_SIZES))
         return {name: sizes[name] for name in self.size_names}

@@ -231,6 +231,7 @@ def fill_of(case: Case) -> torch.Tensor:
     return means[added]
 
 
+@pytest.mark.slow
 def test_the_fill_follows_the_camera_path_and_the_prompt() -> None:
     case = CASES["video"]
     paths = [

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import torch
 from onnx_parts import exported_part
 
@@ -19,6 +20,7 @@ CONFIG = replace(
 )
 
 
+@pytest.mark.slow
 def test_corrected_logits_are_those_of_the_network(tmp_path: Path) -> None:
     networks = create_networks(CONFIG)
     torch.nn.init.normal_(networks.image_classifier.output.weight, std=0.5)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import torch
 from onnx_parts import exported_part
 
@@ -15,6 +16,7 @@ from diff4splat.models.hub.model import Model
 CONFIG = replace(tiny_size(), image_inpainting=ImageInpaintingConfig(widths=(4, 6, 8, 8)))
 
 
+@pytest.mark.slow
 def test_completed_images_are_those_of_the_network(tmp_path: Path) -> None:
     networks = create_networks(CONFIG)
     model = Model(config=CONFIG, networks=networks)

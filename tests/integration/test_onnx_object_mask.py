@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import torch
 from onnx_parts import exported_part
 
@@ -21,6 +22,7 @@ def config() -> ModelConfig:
     return replace(tiny_size(), motion_unet=motion, object_mask=mask)
 
 
+@pytest.mark.slow
 def test_mask_and_instances_are_those_of_the_network(tmp_path: Path) -> None:
     model = Model(config=config(), networks=create_networks(config()))
     image, text = torch.rand(1, 3, 32, 48), torch.randn(1, 4, config().text.width)

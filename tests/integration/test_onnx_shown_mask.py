@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import torch
 from onnx_parts import exported_part
 
@@ -18,6 +19,7 @@ def config() -> ModelConfig:
     return replace(tiny_size(), motion_unet=motion)
 
 
+@pytest.mark.slow
 def test_motion_is_that_of_the_network_with_a_mask_and_without(tmp_path: Path) -> None:
     networks = create_networks(config())
     for parameter in networks.motion_unet.parameters():
