@@ -33,8 +33,9 @@ ADAPTERS = {
 }
 FEW_THREADS = (
     *("text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"),
+    "image_inpainting",
 )
-"""One thread: these decide about a scene by thresholds, and must not depend on the machine."""
+"""One thread: scenes without a video fill are the same, bit for bit, on any number of cores."""
 
 
 def onnx_networks(folder: Path, parts: Collection[str]) -> Networks:

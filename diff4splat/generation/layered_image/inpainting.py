@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn.functional import interpolate, pad
 
+from diff4splat.generation.one_thread import one_thread
 from diff4splat.models.protocols import ImageCompletion
 
 Inpaint = Callable[[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]], Float[Tensor, "h w 3"]]
@@ -47,7 +48,8 @@ class NetworkInpainting:
         down, across = (-side % self.network.multiple_px for side in (height, width))
         top, left = down // 2, across // 2
         margins = (left, across - left, top, down - top)
-        found = self.network(pad(image, margins), pad(known, margins))
+        with one_thread():
+            found = self.network(pad(image, margins), pad(known, margins))
         return found[..., top : top + height, left : left + width]
 
 

@@ -16,9 +16,10 @@ class Painter:
 
     def __init__(self) -> None:
         self.image = self.known = torch.empty(0)
+        self.threads = 0
 
     def __call__(self, image: Tensor, known: Tensor) -> Tensor:
-        self.image, self.known = image, known
+        self.image, self.known, self.threads = image, known, torch.get_num_threads()
         rows = torch.arange(image.shape[2])[:, None] / 1000
         return torch.where(known[:, None], image, rows.expand_as(image))
 
@@ -52,6 +53,15 @@ def test_what_is_known_everywhere_needs_no_network() -> None:
     painter, rgb = Painter(), random_rgb(8, 8)
     assert NetworkInpainting(network=painter)(rgb, torch.ones(8, 8, dtype=torch.bool)) is rgb
     assert not painter.known.numel()
+
+
+def test_the_network_runs_in_one_thread() -> None:
+    """So that a scene has the same bits on any number of cores."""
+    before, painter = torch.get_num_threads(), Painter()
+    torch.set_num_threads(2)
+    NetworkInpainting(network=painter)(random_rgb(8, 8), hole(8, 8))
+    assert (painter.threads, torch.get_num_threads()) == (1, 2)
+    torch.set_num_threads(before)
 
 
 def test_large_images_are_seen_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
