@@ -190,3 +190,23 @@ def test_no_layer_ever_holds_nan(limits: tuple[float, float], motion: str) -> No
     state = gathered.motion.state_at(gathered.gaussians, 0.6)
     for name in ("means", "scales", "quats", "opacities", "sh"):
         assert bool(getattr(state, name).isfinite().all()), name
+
+
+def test_a_network_colours_every_layer_of_what_is_hidden_at_the_size_of_the_image() -> None:
+    """Disoccluded and occluded layer and both rings; all else is as without it."""
+    image = input_image(random_rgb(*SIZE_PX))
+    depth = random_depth(*SMALL, (2.0, 9.0))
+    maps = ImageMaps(depth=depth, displacement=moving_block())
+
+    def grey(rgb: Tensor, known: Tensor) -> Tensor:
+        return torch.where(known[..., None], rgb, 0.5)
+
+    small = downsample(image, FACTOR)
+    plain = build_layered_image(small, image, maps, MARGIN).layers
+    found = build_layered_image(small, image, maps, MARGIN, inpaint=grey).layers
+    changed = [not torch.equal(a.rgb, b.rgb) for a, b in zip(plain, found, strict=True)]
+    assert changed == [False, False, True, False, False, True, True, True]
+    for one, other in zip(plain, found, strict=True):
+        assert torch.equal(one.depth, other.depth) and torch.equal(one.mask, other.mask)
+    for hidden in (found[5], *found[6:]):
+        assert bool((hidden.rgb[hidden.mask] == 0.5).all(-1).any())
