@@ -72,3 +72,11 @@ def test_large_images_are_seen_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
     # Of 11 × 16 cells in the middle, those that hold an unknown pixel are unknown.
     assert not bool(painter.known[:, :2].any()) and 0 < int(painter.known.sum()) < 11 * 16
     assert found.shape == rgb.shape and torch.equal(found[known], rgb[known])
+
+
+def test_a_cell_with_one_unknown_pixel_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inpainting, "MOST_SIDE_PX", 16)
+    painter, known = Painter(), torch.ones(32, 32, dtype=torch.bool)
+    known[10, 20] = False
+    NetworkInpainting(network=painter)(random_rgb(32, 32), known)
+    assert (~painter.known[0]).nonzero().tolist() == [[5, 10]]

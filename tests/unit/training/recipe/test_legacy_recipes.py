@@ -13,7 +13,7 @@ from stage_fixtures import SquaredDifference, make_batch, make_stage, shake_head
 from diff4splat.configs.recipes import recipe_by_name, with_clips
 from diff4splat.errors import CheckpointError, ConfigError
 from diff4splat.metrics.features.load import load_features
-from diff4splat.models.config.model import ModelConfig
+from diff4splat.models.config.model import ImageInpaintingConfig, ModelConfig
 from diff4splat.models.factory import create_networks
 from diff4splat.training.earlier_release import earlier_fingerprint
 from diff4splat.training.recipe.fingerprint import fingerprint, fingerprint_of
@@ -136,6 +136,15 @@ def test_every_key_of_the_first_release_has_a_successor() -> None:
     assert set(STAGE_KEYS) <= set(stages[0]) and set(DATA_KEYS) <= set(stages[0]["data"])
     assert set(LOSS_DEFAULTS) == set(stages[0]["losses"])
     assert {stage["kind"] for stage in stages} <= {*KINDS, *REMOVED_KINDS, *LOSS_KEYS}
+
+
+def test_a_network_that_no_stage_runs_changes_no_fingerprint() -> None:
+    """Runs from before image inpainting go on."""
+    small = recipe_by_name("small")
+    before = replace(small, model=replace(small.model, image_inpainting=ImageInpaintingConfig()))
+    assert before.model != small.model
+    for stage in small.stages:
+        assert fingerprint(before, stage.name) == fingerprint(small, stage.name)
 
 
 @pytest.mark.parametrize("stage", FINGERPRINTS)
