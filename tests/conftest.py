@@ -30,6 +30,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_sessionstart() -> None:
+    """On a machine without compiled kernels, each process compiles some of them first."""
+    # The kernels' compiler takes a second to load, which a single process may not need.
+    from kernel_shares import compile_share
+
+    compile_share()
+
+
 @pytest.fixture(autouse=True)
 def _seeded() -> None:
     torch.manual_seed(0)

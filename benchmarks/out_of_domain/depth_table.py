@@ -16,7 +16,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_prediction import predict_depth
+from diff4splat.generation.depth.prediction import predict_depth
 from diff4splat.io.atomic import write_text
 from diff4splat.models.hub.model import load_model
 from diff4splat.training.batches.random_images.photographs import middle_square

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_prediction import SCALES, PredictedDepth, predict_depth
+from diff4splat.generation.depth.prediction import SCALES, PredictedDepth, predict_depth
 from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.inputs.copies import Copies, larger_copy
 from diff4splat.generation.inputs.input_image import InputImage

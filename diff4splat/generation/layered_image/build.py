@@ -1,7 +1,7 @@
 """From an image, its depth and its displacement to all layers.
 
     image and maps ─ upsample ─ smooth, align edges ─ grow foreground ─ pixels ─ infill  these show
-    pixels ─┬─ occluded layer                                    the image; all others extend
+    pixels ─┬─ occluded layer ─ infill                           the image; all others extend
             └─ disoccluded layer ─ fine border                       it into what it hides
     smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving
                            └─ border extension ─┘  objects disocclude
@@ -75,7 +75,8 @@ def build_layered_image(
         moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
     if reduced and (occluded := occluded_layer(pixels, inpaint_hole)) is not None:
-        hidden.append(occluded)
+        # Its depth is steep beside a foreground: cells alone would part into stripes.
+        hidden += [occluded, subpixel_infill(occluded)]
     if border_cells:
         hidden += fine_borders(pixels, disoccluded, rings, inpaint)
     if not infill:

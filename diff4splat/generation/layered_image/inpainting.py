@@ -21,6 +21,9 @@ Inpaint = Callable[[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]], Float[Tensor, 
 MOST_SIDE_PX = 512
 """The network was trained on such images; larger ones take longer and have the same detail."""
 
+GREY = 2 / 255
+"""Difference of a pixel's channels up to which it has no colour."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkInpainting:
@@ -38,6 +41,8 @@ class NetworkInpainting:
         image = torch.where(known[..., None], rgb, 0.0).movedim(-1, 0)[None]
         small, mask = _reduced(image, known)
         found = interpolate(self._completed(small, mask), known.shape, mode="bilinear")
+        if _is_grey(rgb[known]):
+            found = found.mean(1, keepdim=True).expand_as(found)
         return torch.where(known[..., None], rgb, found[0].movedim(0, -1))
 
     def _completed(
@@ -51,6 +56,11 @@ class NetworkInpainting:
         with one_thread():
             found = self.network(pad(image, margins), pad(known, margins))
         return found[..., top : top + height, left : left + width]
+
+
+def _is_grey(rgb: Float[Tensor, "n 3"]) -> bool:
+    """A photograph without colours stays one; the network knows hardly any, and adds some."""
+    return bool((rgb.amax(-1) - rgb.amin(-1) < GREY).all())
 
 
 def _reduced(

@@ -1,4 +1,4 @@
-"""Cells half a pixel apart, between the image's pixels (ours, ADR 24).
+"""Cells half a pixel apart, between the cells of a layer at the size of the image (ours, ADR 24).
 
 Axes: ``h w`` pixels, ``hh ww`` = 2 h − 1, 2 w − 1 lattice points, ``v`` = w − 1, ``t`` latent
 frames. From other sides, pixels of one surface move apart: small Gaussians leave gaps, large ones
@@ -25,11 +25,15 @@ SLOPE_FACTOR = 2.0
 
 
 def subpixel_infill(image: ImageLayer) -> ImageLayer:
-    """The lattice without pixels and outlines; each point moves as the nearest pixel."""
+    """The lattice without pixels and outlines; each point moves as the nearest pixel.
+
+    Where the layer has no cells, neither has the lattice.
+    """
     depth, rgb = _lattice_maps(image)
     rows, columns = _nearest(image, depth)
     between = torch.ones_like(depth, dtype=torch.bool)
     between[::2, ::2] = False
+    between &= -_largest_neighbour(-image.mask.to(depth)) > 0
     displacement = image.displacement
     between &= ~_between_moving_and_static(moving_mask(image.depth, displacement))
     if displacement is not None:
@@ -43,7 +47,7 @@ def subpixel_infill(image: ImageLayer) -> ImageLayer:
         opacity=image.opacity,
         footprint_px=2 * image.footprint_px,
         displacement=displacement,
-        in_image=True,
+        in_image=image.in_image,
     )
 
 

@@ -10,8 +10,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_fusion import fused, out_of_domain_score
-from diff4splat.generation.depth_shrinkage import shrunk
+from diff4splat.generation.depth.fusion import fused, out_of_domain_score
+from diff4splat.generation.depth.shrinkage import shrunk
 from diff4splat.models.monocular_depth.uncertainty import LOG_LIMITS
 from diff4splat.stability.check import Check, Outcome
 from diff4splat.stability.compare import all_finite, relative_error
@@ -50,7 +50,14 @@ def _log_depth(maps: Maps) -> Float[Tensor, "h w"]:
     log_scale = torch.full_like(maps[0, 0], LOG_LIMITS[0])
     log_scale[::2, ::2] = LOG_LIMITS[1]
     score = out_of_domain_score(maps)
-    return shrunk(fused(maps, score), log_scale.exp(), score)
+    return shrunk(fused(maps, score), log_scale.exp(), score, _two_colors(maps))
+
+
+def _two_colors(maps: Maps) -> Float[Tensor, "h w 3"]:
+    """An edge through the middle, which depth knows nothing of."""
+    rgb = maps.new_zeros(*maps.shape[2:], 3)
+    rgb[:, rgb.shape[1] // 2 :] = 1.0
+    return rgb
 
 
 def _kinds() -> dict[str, Maps]:

@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.depth_prediction import SCALES, predict_depth
+from diff4splat.generation.depth.prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.motion.motion_mask import MotionProbability, motion_probability
 from diff4splat.generation.motion.networks import motion_prior

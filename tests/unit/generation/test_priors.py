@@ -9,7 +9,7 @@ import torch
 from image_layers import input_image, random_rgb
 
 from diff4splat.generation import priors
-from diff4splat.generation.depth_prediction import SCALES, predict_depth
+from diff4splat.generation.depth.prediction import SCALES, predict_depth
 from diff4splat.generation.inputs.copies import Copies, motion_copy
 from diff4splat.generation.inputs.input_image import InputImage, downsample
 from diff4splat.generation.layered_image.disocclusion import grown

@@ -44,15 +44,16 @@ def moving_block() -> Tensor:
 
 
 def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
-    pixels, infill, background, border, occluded, near, far = built().layers
-    assert [layer.in_image for layer in built().layers] == [True, True, *[False] * 5]
+    pixels, infill, background, border, occluded, between, near, far = built().layers
+    assert [layer.in_image for layer in built().layers] == [True, True, *[False] * 6]
     assert torch.equal(pixels.rgb, random_rgb(*SIZE_PX))
     assert (pixels.opacity, pixels.footprint_px) == (OPAQUE, PIXEL_FOOTPRINT_PX)
     assert pixels.pixel_index.flatten().tolist() == list(range(16 * 24))
     assert infill.depth.shape == (31, 47)
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
-    assert occluded.depth.shape == SIZE_PX
+    assert occluded.depth.shape == SIZE_PX and between.depth.shape == (31, 47)
+    assert 2 * int(occluded.mask.sum()) < int(between.mask.sum()) < 3 * int(occluded.mask.sum())
     assert near.depth.shape == (16 + 2 * 3, 24 + 2 * 3)
     assert far.depth.shape == (16 + 2 * 12, 24 + 2 * 12)
     assert built().visible_count == 31 * 47
@@ -113,7 +114,7 @@ def test_the_foreground_grows_by_a_pixel(side: int) -> None:
 
 
 def test_without_border_cells_there_is_no_border_layer() -> None:
-    assert len(built(border_cells=0).layers) == 4
+    assert len(built(border_cells=0).layers) == 5
 
 
 def test_coarse_layers_match_no_pixel_of_a_larger_image() -> None:
@@ -205,7 +206,7 @@ def test_a_network_colours_every_layer_of_what_is_hidden_at_the_size_of_the_imag
     plain = build_layered_image(small, image, maps, MARGIN).layers
     found = build_layered_image(small, image, maps, MARGIN, inpaint=grey).layers
     changed = [not torch.equal(a.rgb, b.rgb) for a, b in zip(plain, found, strict=True)]
-    assert changed == [False, False, True, False, False, True, True, True]
+    assert changed == [False, False, True, False, False, True, True, True, True]
     for one, other in zip(plain, found, strict=True):
         assert torch.equal(one.depth, other.depth) and torch.equal(one.mask, other.mask)
     for hidden in (found[5], *found[6:]):

@@ -80,3 +80,22 @@ def test_a_cell_with_one_unknown_pixel_is_unknown(monkeypatch: pytest.MonkeyPatc
     known[10, 20] = False
     NetworkInpainting(network=painter)(random_rgb(32, 32), known)
     assert (~painter.known[0]).nonzero().tolist() == [[5, 10]]
+
+
+class Tinter:
+    """A network that paints orange."""
+
+    multiple_px = 8
+
+    def __call__(self, image: Tensor, known: Tensor) -> Tensor:
+        orange = torch.tensor([0.9, 0.5, 0.1])[:, None, None]
+        return torch.where(known[:, None], image, orange)
+
+
+@pytest.mark.parametrize("is_grey", [True, False])
+def test_a_photograph_without_colours_stays_one(is_grey: bool) -> None:
+    rgb, known = random_rgb(16, 16), hole(16, 16)
+    rgb = rgb.mean(-1, keepdim=True).expand_as(rgb) if is_grey else rgb
+    painted = NetworkInpainting(network=Tinter())(rgb, known)[~known]
+    wanted = torch.full((3,), 0.5) if is_grey else torch.tensor([0.9, 0.5, 0.1])
+    torch.testing.assert_close(painted, wanted.expand_as(painted))

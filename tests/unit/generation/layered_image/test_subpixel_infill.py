@@ -1,6 +1,7 @@
 """Between the pixels of an image: place, size, colour and displacement."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -174,3 +175,16 @@ def test_across_a_depth_edge_colours_are_those_of_the_far_side() -> None:
     assert bool((infill.rgb[:, 5] == 0.8).all())
     # No overshoot of the cubic kernel on either side: it would be an outline.
     assert bool(((infill.rgb >= 0.1) & (infill.rgb <= 0.8)).all())
+
+
+def test_a_layer_that_is_not_everywhere_is_filled_where_all_neighbours_are() -> None:
+    mask = torch.ones(SIZE_PX, dtype=torch.bool)
+    mask[:, 2] = False
+    occluded = replace(pixels(plane()), mask=mask, in_image=False)
+    infill = subpixel_infill(occluded)
+    _, columns = lattice()
+    assert not bool(infill.mask[(columns > 1) & (columns < 3)].any())
+    assert int(infill.mask.sum()) == int(subpixel_infill(pixels(plane())).mask[:, :3].sum()) + int(
+        subpixel_infill(pixels(plane())).mask[:, 6:].sum()
+    )
+    assert not infill.in_image

@@ -14,8 +14,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.generation.depth_fusion import fused, out_of_domain_score
-from diff4splat.generation.depth_shrinkage import shrunk
+from diff4splat.generation.depth.fusion import fused, out_of_domain_score
+from diff4splat.generation.depth.shrinkage import shrunk
 from diff4splat.models.blocks.resize import nearest_multiple
 from diff4splat.models.config.networks import ActivationConfig
 from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
@@ -60,7 +60,7 @@ def predict_depth(
     unsure = [_resized(one, rgb.shape[:2]) for _, one in passes if one is not None]
     uncertainty = torch.cat(unsure).exp().mean((0, 1)) if unsure else None
     if uncertainty is not None:
-        log_depth = shrunk(log_depth, uncertainty, score)
+        log_depth = shrunk(log_depth, uncertainty, score, rgb)
     depth = (unit + log_depth).exp()
     return PredictedDepth(depth=depth, uncertainty=uncertainty, out_of_domain=score)
 

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from diff4splat.generation.depth_fusion import (
+from diff4splat.generation.depth.fusion import (
     BACKBONE_SHARE,
     IN_DOMAIN,
     MOST_STRETCH,
+    NEAR_RELIEF,
     OUT_OF_DOMAIN,
     fused,
     out_of_domain_score,
@@ -42,10 +43,12 @@ def from_the_formula(maps: Tensor) -> Tensor:
     mean_spread = sum(map(sum, spreads)) / (2 * len(passes))
     difference = sum(float((a - b).abs().mean()) for a, b in passes) / len(passes)
     score = (difference / mean_spread - IN_DOMAIN) / (OUT_OF_DOMAIN - IN_DOMAIN)
-    share = 0.5 + (BACKBONE_SHARE - 0.5) * min(1, max(0, score))
+    score = min(1, max(0, score))
+    share = 0.5 + (BACKBONE_SHARE - 0.5) * score
     mean = sum(share * a + (1 - share) * b for a, b in passes) / len(passes)
     wanted = sum(share * a + (1 - share) * b for a, b in spreads) / len(passes)
-    return centred(mean) * min(MOST_STRETCH, wanted / spread(mean))
+    relief = centred(mean) * min(MOST_STRETCH, wanted / spread(mean))
+    return relief + relief.clamp_max(0) * score * (NEAR_RELIEF - 1)
 
 
 def alike(difference: float) -> Tensor:
@@ -87,6 +90,14 @@ def test_the_mean_of_different_maps_has_their_spread() -> None:
     maps = torch.stack([ramp, ramp.T])[:, None]
     assert spread(maps.mean((0, 1))) < 0.75 * spread(ramp)
     assert spread(fuse(maps)) == pytest.approx(spread(ramp))
+
+
+@pytest.mark.parametrize("score", [0.0, 0.5, 1.0])
+def test_what_is_near_has_more_relief_out_of_domain_and_the_rest_as_much(score: float) -> None:
+    symmetric = alike(1.8)
+    found = fused(symmetric, torch.tensor(score, dtype=torch.float64))
+    factor = 1 + (NEAR_RELIEF - 1) * score
+    assert -float(found.min()) == pytest.approx(factor * float(found.max()))
 
 
 def test_maps_that_contradict_each_other_are_not_blown_up() -> None:

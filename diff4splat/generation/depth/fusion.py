@@ -15,6 +15,9 @@ IN_DOMAIN, OUT_OF_DOMAIN = 0.8, 1.2
 it is out of it."""
 BACKBONE_SHARE = 0.65
 """Of the first encoder in the mean on an image out of domain; a half on one in domain."""
+NEAR_RELIEF = 1.3
+"""Out of domain, of what is nearer than the median: near objects are few pixels, which a map misses
+as a whole, and the mean with it. Relief beyond the median needs none."""
 MOST_STRETCH = 2.0
 """Maps that contradict each other have no spread to give back."""
 
@@ -24,7 +27,8 @@ def fused(maps: Float[Tensor, "p e h w"], out_of_domain: Float[Tensor, ""]) -> F
     share = _encoder_shares(maps, out_of_domain)[:, None, None]
     mean = (share * maps).sum(1).mean(0)
     spread = (share * _spread(maps)).sum(1).mean()
-    return (mean - _median(mean)) * _stretch(spread, _spread(mean))
+    relief = (mean - _median(mean)) * _stretch(spread, _spread(mean))
+    return torch.where(relief < 0, relief * (1 + (NEAR_RELIEF - 1) * out_of_domain), relief)
 
 
 def out_of_domain_score(maps: Float[Tensor, "p e h w"]) -> Float[Tensor, ""]:
