@@ -74,15 +74,26 @@ def build_layered_image(
     if (disoccluded := disoccluded_layer(pixels, inpaint_hole)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
-    if reduced and (occluded := occluded_layer(pixels, inpaint_hole)) is not None:
-        # Its depth is steep beside a foreground: cells alone would part into stripes.
-        hidden += [occluded, subpixel_infill(occluded)]
+    if reduced:
+        hidden += occluded_layers(pixels, maps, inpaint_hole)
     if border_cells:
         hidden += fine_borders(pixels, disoccluded, rings, inpaint)
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))
     return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
+
+
+def occluded_layers(pixels: ImageLayer, maps: ImageMaps, inpaint: Inpaint) -> list[ImageLayer]:
+    """What lies behind depth edges; with infill behind predicted ones.
+
+    Predicted depth is steep beside an edge: cells alone would part into stripes.
+    """
+    occluded = occluded_layer(pixels, inpaint)
+    if occluded is None:
+        return []
+    is_predicted = maps.fine is None or maps.fine.smooth
+    return [occluded, subpixel_infill(occluded)] if is_predicted else [occluded]
 
 
 def hidden_layers(

@@ -29,9 +29,8 @@ SLOPE_SHARE = 1 / 3
 """Of the step: what the far side may still slope beside it."""
 WINDOW_RADIUS_PX = 2
 """Of the window that an edge fits into: smoothed depth takes some pixels for it."""
-MARGIN_SHARE = 1 / 32
-"""Of the image's longer side: beside an edge, colours of the foreground are mixed in, and predicted
-depth is still on its way to that of the far side."""
+MARGIN_SHARE = 1 / 64
+"""Of the image's longer side: beside an edge, colours of the foreground are mixed in."""
 REACH_SHARE = 1 / 6
 """Of the image's longer side: what a camera path disoccludes behind an edge."""
 

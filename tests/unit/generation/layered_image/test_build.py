@@ -90,6 +90,18 @@ def test_the_farthest_pixel_decides() -> None:
     assert farthest_depth(small, pixels).tolist() == [[2.0, 5.0]]
 
 
+def test_behind_the_edges_of_given_depth_is_no_infill() -> None:
+    image = input_image(random_rgb(64, 96))
+    depth = torch.full((64, 96), 9.0)
+    depth[16:48, 32:64] = 2.0
+    counts = []
+    for smooth in (False, True):
+        fine = FineMaps(rgb=image.rgb, depth=depth, smooth=smooth)
+        maps = ImageMaps(depth=depth[::4, ::4], displacement=None, fine=fine)
+        counts.append(len(build_layered_image(downsample(image, 4), image, maps, 0).layers))
+    assert counts == [4, 5]
+
+
 def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:
     image = input_image(random_rgb(*SIZE_PX))
     depth = torch.full(SIZE_PX, 9.0)

@@ -59,9 +59,9 @@ def test_it_is_never_before_the_image() -> None:
 
 
 def test_it_reaches_as_far_as_a_path_looks() -> None:
-    half = SIDE // 2 - 4
+    half = SIDE // 2 - 2
     found = occluded_layer(_pixels(_box(half)))
-    assert bool(found.mask[4, SIDE // 2]) and not bool(found.mask[SIDE // 2, SIDE // 2])
+    assert bool(found.mask[2, SIDE // 2]) and not bool(found.mask[SIDE // 2, SIDE // 2])
     assert int(found.mask[: SIDE // 2, SIDE // 2].sum()) <= REACH_SHARE * SIDE + 2
 
 
