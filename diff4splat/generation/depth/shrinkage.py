@@ -35,6 +35,8 @@ def shrunk(
     rgb: Float[Tensor, "h w 3"],
 ) -> Float[Tensor, "h w"]:
     """The map with less relief where it is unsure; ``out_of_domain`` is 0 (as it was) to 1."""
+    if not bool(out_of_domain):
+        return log_depth
     around = mean_within_colors(log_depth, 1 / (uncertainty.double().square() + LEAST**2), rgb)
     kept = 1 / (1 + out_of_domain * (uncertainty / UNSURE).square())
     return around + kept * (log_depth - around)

@@ -8,6 +8,7 @@ from depth_priors import DistancePrior, TwoEncoders
 from image_layers import random_rgb
 from torch import Tensor
 
+from diff4splat.generation.depth import prediction
 from diff4splat.generation.depth.fusion import BACKBONE_SHARE, NEAR_RELIEF
 from diff4splat.generation.depth.prediction import SCALES, predict_depth
 from diff4splat.models.config.networks import ActivationConfig
@@ -106,6 +107,19 @@ def test_unsure_relief_is_shrunk_and_the_log_says_how_unsure() -> None:
     assert float(found.uncertainty[16, 22]) > 5 and float(found.uncertainty[16, 8]) < 0.01
     assert float(found.uncertainty[16, 41]) < 0.01
     assert found.record()["median_uncertainty"] == pytest.approx(0.002, abs=0.001)
+
+
+def test_relief_shrinks_within_the_colours_of_the_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def kept(log_depth: Tensor, uncertainty: Tensor, score: Tensor, rgb: Tensor) -> Tensor:
+        seen.append(rgb)
+        return log_depth
+
+    monkeypatch.setattr(prediction, "shrunk", kept)
+    rgb = random_rgb(32, 64)
+    predict_depth(unsure(), rgb, CONFIG, SCALES[:1])
+    assert len(seen) == 1 and torch.equal(seen[0], rgb)
 
 
 def test_out_of_domain_the_first_encoder_counts_more() -> None:

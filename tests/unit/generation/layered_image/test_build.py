@@ -6,8 +6,13 @@ from image_layers import FAR_RANGES, input_image, is_finite, layer, random_depth
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import downsample
-from diff4splat.generation.layered_image.build import build_layered_image, farthest_depth
+from diff4splat.generation.layered_image.build import (
+    build_layered_image,
+    farthest_depth,
+    occluded_layers,
+)
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
+from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
@@ -100,6 +105,18 @@ def test_behind_the_edges_of_given_depth_is_no_infill() -> None:
         maps = ImageMaps(depth=depth[::4, ::4], displacement=None, fine=fine)
         counts.append(len(build_layered_image(downsample(image, 4), image, maps, 0).layers))
     assert counts == [4, 5]
+
+
+def test_infill_behind_edges_is_where_the_layer_is_steep() -> None:
+    shares = []
+    for far in (torch.tensor(9.0), torch.linspace(2.2, 6.0, 96).exp()):
+        depth = torch.ones(64, 96) * far
+        depth[16:48, 32:64] = 2.0
+        pixels = layer(depth, pixel_index=torch.zeros(64, 96).long())
+        maps = ImageMaps(depth=depth, displacement=None)
+        occluded, infill = occluded_layers(pixels, maps, textured)
+        shares.append(int(infill.mask.sum()) / int(occluded.mask.sum()))
+    assert shares[0] < 0.5 and shares[1] > 1
 
 
 def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:
