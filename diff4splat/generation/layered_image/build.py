@@ -27,13 +27,17 @@ from diff4splat.generation.layered_image.border.extension import (
 )
 from diff4splat.generation.layered_image.border.fine_border import NEAR, PHOTOGRAPH, fine_borders
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
-from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layer
+from diff4splat.generation.layered_image.disoccluded.occluded_layer import (
+    OccludedLayers,
+    occluded_layers,
+)
 from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
     inpaint_border,
     without_disoccluded,
 )
+from diff4splat.generation.layered_image.ground_colors import with_ground_colors
 from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.pixel_maps.image_maps import (
     ImageMaps,
@@ -72,14 +76,16 @@ def build_layered_image(
     hidden = hidden_layers(small, maps, pixels, border_cells)
     if border_cells and is_photograph:  # In small images its blur is the better guess.
         hidden[-1] = push_farther_than_rings(hidden[-1], border_cells, rings[-1].reach[1])
+    inpaint_hole = textured if inpaint is None else inpaint
+    occluded = occluded_layers(pixels, inpaint_hole) if reduced else OccludedLayers()
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
-    inpaint_hole = textured if inpaint is None else inpaint
+    if occluded.ground is not None:
+        hidden = [with_ground_colors(layer, pixels, occluded.ground) for layer in hidden]
     if (disoccluded := disoccluded_layer(pixels, inpaint_hole)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
         hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
-    if reduced:
-        hidden += occluded_layers(pixels, maps, inpaint_hole)
+    hidden += with_infill(occluded.all, maps)
     if border_cells:
         hidden += fine_borders(pixels, disoccluded, rings, inpaint)
     if not infill:
@@ -88,18 +94,17 @@ def build_layered_image(
     return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
 
 
-def occluded_layers(pixels: ImageLayer, maps: ImageMaps, inpaint: Inpaint) -> list[ImageLayer]:
-    """What lies behind depth edges; with infill behind predicted ones.
+def with_infill(layers: list[ImageLayer], maps: ImageMaps) -> list[ImageLayer]:
+    """Layers behind depth edges, with infill where depth is predicted.
 
     Predicted depth is steep beside an edge: cells alone would part into stripes.
     """
-    occluded = occluded_layer(pixels, inpaint)
-    if occluded is None:
-        return []
     is_predicted = maps.fine is None or maps.fine.smooth
     if not is_predicted:
-        return [occluded]
-    return [occluded, subpixel_infill(occluded, STEEP_SHARE / max(occluded.depth.shape))]
+        return layers
+    steps = [STEEP_SHARE / max(layer.depth.shape) for layer in layers]
+    infill = [subpixel_infill(layer, step) for layer, step in zip(layers, steps, strict=True)]
+    return [*layers, *infill]
 
 
 def hidden_layers(

@@ -37,6 +37,11 @@ def extended_evenly(
     return filled
 
 
+def even_colors(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:
+    """The same for every channel of an image."""
+    return torch.stack([extended_evenly(channel, known) for channel in rgb.unbind(-1)], -1)
+
+
 def _pooled(values: Float[Tensor, "h w"]) -> Float[Tensor, "h2 w2"]:
     """Means of 2 × 2 cells; those at the border count what is there."""
     return torch.nn.functional.avg_pool2d(

@@ -35,4 +35,5 @@ def disoccluded_layer(pixels: ImageLayer, inpaint: Inpaint = textured) -> ImageL
     # a farther pixel of the object beside it, and stay there as a part of the object moves.
     farthest = largest_around(torch.where(moving, pixels.depth, 0.0), 1)
     covering = torch.maximum(pixels.depth, farthest)
-    return static_layer(pixels, known, grown(moving, 1), covering, inpaint)
+    rgb = inpaint(pixels.rgb, known)
+    return static_layer(pixels, known, grown(moving, 1), covering, rgb)

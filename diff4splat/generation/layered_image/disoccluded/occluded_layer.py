@@ -1,8 +1,10 @@
-"""What a moving camera disoccludes behind depth edges, at the size of the image (ours, ADR 31).
+"""What a moving camera disoccludes behind depth edges, at the size of the image (ours, ADR 31, 52).
 
-    pixels ─ depth edges ─┬─ foreground within reach of one: what the layer lies behind
-                          └─ inverse depth of the rest, extended evenly, and its colours, likewise
-                             with detail or inpainted by a network
+    pixels ─┬─ depth edges ─ cells within reach of one, behind what is nearer than its far side
+            └─ figure and ground
+    behind figures                       ground goes on: inverse depth evenly, colours inpainted
+    behind what is before a figure       that figure goes on, in a layer of its own
+    behind relief within one surface     its own colours go on evenly, in a third
 
 Axes: ``h w`` pixels. The other layers continue the image in cells of the smaller copy, in which
 both sides of an edge are mixed: blots in the foreground's colours beside it.
@@ -11,79 +13,105 @@ both sides of an edge are mixed: blots in the foreground's colours beside it.
 import math
 from dataclasses import dataclass
 
-import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from diff4splat.generation.layered_image.disoccluded.depth_edges import (
+    DEPTH_STEP,
+    NearestEdge,
+    far_side_of_edges,
+    nearest_edge,
+)
+from diff4splat.generation.layered_image.disoccluded.even_extension import even_colors
+from diff4splat.generation.layered_image.disoccluded.figure_ground import (
+    MOST_SIDE_PX,
+    FigureGround,
+    figure_ground,
+)
 from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
 from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
-from diff4splat.generation.layered_image.windows import largest_around, smallest_around
+from diff4splat.generation.layered_image.windows import largest_around
 
-DEPTH_STEP = 0.08
-"""Difference of log depth that makes an edge."""
-SLOPE_SHARE = 1 / 3
-"""Of the step: what the far side may still slope beside it."""
-WINDOW_RADIUS_PX = 2
-"""Of the window that an edge fits into: smoothed depth takes some pixels for it."""
 MARGIN_SHARE = 1 / 64
 """Of the image's longer side: beside an edge, colours of the foreground are mixed in."""
 REACH_SHARE = 1 / 6
 """Of the image's longer side: what a camera path disoccludes behind an edge."""
+EVEN_SHARE = 1 / 8
+"""Of the image's longer side: farther from all cells, colours are even. What is inpainted in a
+large hole is an object that is not there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NearestEdge:
-    """The far side of the depth edge nearest to each pixel."""
+class OccludedLayers:
+    """Static layers behind depth edges."""
 
-    log_depth: Float[Tensor, "h w"]
-    distance_px: Float[Tensor, "h w"]
+    ground: ImageLayer | None = None
+    """Behind figures; None where nothing is."""
+    figures: tuple[ImageLayer, ...] = ()
+    """Behind what is in front of a figure, and behind the relief of one surface."""
+
+    @property
+    def all(self) -> list[ImageLayer]:
+        """Those that there are."""
+        return [*([] if self.ground is None else [self.ground]), *self.figures]
 
 
 @torch.no_grad()
-def occluded_layer(pixels: ImageLayer, inpaint: Inpaint = textured) -> ImageLayer | None:
-    """The static layer behind the depth edges of ``pixels``; None where there is none."""
+def occluded_layers(pixels: ImageLayer, inpaint: Inpaint = textured) -> OccludedLayers:
+    """The layers behind the depth edges of ``pixels``, as far as a camera path looks."""
     edge = far_side_of_edges(pixels.depth)
     if not bool(edge.any()):
-        return None
-    nearest = nearest_edge(pixels.depth, edge)
-    foreground = nearest.log_depth - pixels.depth.log() > DEPTH_STEP / 2
+        return OccludedLayers()
+    nearest = nearest_edge(edge)
+    nearer = nearest.of(pixels.depth).log() - pixels.depth.log() > DEPTH_STEP / 2
     # Another layer lies behind what moves.
     moving = grown(moving_mask(pixels.depth, pixels.displacement), 1)
-    known = ~grown(foreground, math.ceil(MARGIN_SHARE * max(edge.shape))) & ~moving
-    within = nearest.distance_px < REACH_SHARE * max(edge.shape)
-    mask = grown(foreground, 1) & within & ~moving
+    cells = grown(nearer, 1) & (nearest.distance_px < REACH_SHARE * max(edge.shape)) & ~moving
+    division = figure_ground(pixels.rgb, pixels.depth)
+    level = occlusion_level(division, nearest)
+    # A network that knows places would paint another object behind the relief of one.
+    hiding = ((division.figure, inpaint), (division.before_figure, inpaint), (moving, even_colors))
+    layers = []
+    for count, (in_front, fill) in enumerate(hiding):
+        beside = nearer & (level == count) & (nearest.distance_px < 2 * _margin_px(edge))
+        known = ~grown(in_front | beside, _margin_px(edge)) & ~moving
+        layers.append(_layer(pixels, known, cells & (level == count) & ~known, fill))
+    return OccludedLayers(ground=layers[0], figures=tuple(one for one in layers[1:] if one))
+
+
+def occlusion_level(division: FigureGround, nearest: NearestEdge) -> Int[Tensor, "h w"]:
+    """How many figures lie one behind the other at the far side of each pixel's edge, 0 to 2.
+
+    The outline of a mask is off by a cell, so its rim does not count.
+    """
+    rim_px = 2 * math.ceil(max(division.figure.shape) / MOST_SIDE_PX)
+    counts = (~grown(~mask, rim_px) for mask in (division.figure, division.before_figure))
+    return nearest.of(sum(one.int() for one in counts))
+
+
+def _layer(
+    pixels: ImageLayer, known: Bool[Tensor, "h w"], mask: Bool[Tensor, "h w"], inpaint: Inpaint
+) -> ImageLayer | None:
     if not bool(known.any()) or not bool(mask.any()):
         return None
+    near = grown(mask, math.ceil(EVEN_SHARE * max(mask.shape)))
+    rgb = inpaint(*_evenly_beyond(near, pixels.rgb, known))
     # A footprint covers the neighbours too.
-    farthest = largest_around(pixels.depth, 1)
-    return static_layer(pixels, known, mask, farthest, inpaint)
+    return static_layer(pixels, known, mask, largest_around(pixels.depth, 1), rgb)
 
 
-def far_side_of_edges(depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h w"]:
-    """Pixels beside a nearer surface that are about as far as the farthest around them."""
-    log_depth, rim = depth.log(), torch.ones_like(depth)
-    step = log_depth - smallest_around(log_depth, WINDOW_RADIUS_PX)
-    slope = largest_around(log_depth, WINDOW_RADIUS_PX) - log_depth
-    # Where the window leaves the image, half a slope looks like a step.
-    inner = slice(WINDOW_RADIUS_PX, -WINDOW_RADIUS_PX)
-    rim[inner, inner] = 0
-    return (step > DEPTH_STEP * (1 + rim)) & (slope < SLOPE_SHARE * step)
+def _evenly_beyond(
+    near: Bool[Tensor, "h w"], rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]
+) -> tuple[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]]:
+    """Colours and where they are known, which they are everywhere but ``near``."""
+    if bool((known | near).all()):
+        return rgb, known
+    return even_colors(rgb, known), known | ~near
 
 
-def nearest_edge(depth: Float[Tensor, "h w"], edge: Bool[Tensor, "h w"]) -> NearestEdge:
-    """For every pixel, by a distance transform; there must be an edge."""
-    # OpenCV takes a tenth of a second to load, which small images need not wait for.
-    import cv2
-
-    elsewhere = (~edge).cpu().numpy().astype(np.uint8)
-    distance, label = cv2.distanceTransformWithLabels(
-        elsewhere, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    labels = torch.from_numpy(label).long().to(depth.device)
-    of_label = depth.new_zeros(int(labels.max()) + 1)
-    of_label[labels[edge]] = depth[edge].log()
-    return NearestEdge(log_depth=of_label[labels], distance_px=torch.from_numpy(distance).to(depth))
+def _margin_px(edge: Bool[Tensor, "h w"]) -> int:
+    return math.ceil(MARGIN_SHARE * max(edge.shape))

@@ -11,8 +11,6 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.background_layer import BEHIND
 from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
-from diff4splat.generation.layered_image.disoccluded.texture import textured
-from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.obliqueness import is_drawable
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
 
@@ -25,16 +23,16 @@ def static_layer(
     known: Bool[Tensor, "h w"],
     mask: Bool[Tensor, "h w"],
     covering_depth: Float[Tensor, "h w"],
-    inpaint: Inpaint = textured,
+    rgb: Float[Tensor, "h w 3"],
 ) -> ImageLayer:
     """Cells where ``mask`` is true, behind ``covering_depth``; something must be ``known``.
 
-    Inverse depth of the known pixels is extended evenly; colours are those of ``inpaint``.
+    Inverse depth of the known pixels is extended evenly; ``rgb`` are the cells' colours.
     """
     depth = 1 / extended_evenly(1 / pixels.depth, known)
     return replace(
         pixels,
-        rgb=inpaint(pixels.rgb, known),
+        rgb=rgb,
         depth=torch.maximum(depth, BEHIND * covering_depth),
         mask=mask & is_drawable(pixels.camera),
         footprint_px=FOOTPRINT_PX,

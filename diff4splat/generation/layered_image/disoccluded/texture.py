@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn.functional import avg_pool2d, interpolate
 
-from diff4splat.generation.layered_image.disoccluded.even_extension import extended_evenly
+from diff4splat.generation.layered_image.disoccluded.even_extension import even_colors
 from diff4splat.generation.layered_image.disoccluded.shift_map import shift_map, source_pixels
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.windows import mean_around
@@ -39,8 +39,7 @@ def textured(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[T
     """
     if bool(known.all()):
         return rgb
-    even = torch.stack([extended_evenly(channel, known) for channel in rgb.unbind(-1)], -1)
-    return with_detail(rgb, known, even)
+    return with_detail(rgb, known, even_colors(rgb, known))
 
 
 def with_detail(
