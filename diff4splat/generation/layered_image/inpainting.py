@@ -39,7 +39,7 @@ class NetworkInpainting:
         if bool(known.all()):
             return rgb
         image = torch.where(known[..., None], rgb, 0.0).movedim(-1, 0)[None]
-        small, mask = _reduced(image, known)
+        small, mask = _reduced(image, known, MOST_SIDE_PX)
         found = interpolate(self._completed(small, mask), known.shape, mode="bilinear")
         if _is_grey(rgb[known]):
             found = found.mean(1, keepdim=True).expand_as(found)
@@ -63,13 +63,29 @@ def _is_grey(rgb: Float[Tensor, "n 3"]) -> bool:
     return bool((rgb.amax(-1) - rgb.amin(-1) < GREY).all())
 
 
+def on_copy(inpaint: Inpaint, most_side_px: int) -> Inpaint:
+    """The same on a copy of at most ``most_side_px``, in a fraction of the time."""
+
+    def inpaint_copy(
+        rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]
+    ) -> Float[Tensor, "h w 3"]:
+        if max(known.shape) <= most_side_px:
+            return inpaint(rgb, known)
+        image, mask = _reduced(rgb.movedim(-1, 0)[None], known, most_side_px)
+        small = inpaint(image[0].movedim(0, -1), mask[0]).movedim(-1, 0)[None]
+        found = interpolate(small, known.shape, mode="bilinear")[0].movedim(0, -1)
+        return torch.where(known[..., None], rgb, found)
+
+    return inpaint_copy
+
+
 def _reduced(
-    image: Float[Tensor, "1 3 h w"], known: Bool[Tensor, "h w"]
+    image: Float[Tensor, "1 3 h w"], known: Bool[Tensor, "h w"], most_side_px: int
 ) -> tuple[Float[Tensor, "1 3 hs ws"], Bool[Tensor, "1 hs ws"]]:
-    """The copy that the network sees, known where all of its pixels are."""
+    """A copy, known where all of its pixels are."""
     longest = max(known.shape)
-    if longest <= MOST_SIDE_PX:
+    if longest <= most_side_px:
         return image, known[None]
-    size = tuple(max(round(side * MOST_SIDE_PX / longest), 1) for side in known.shape)
+    size = tuple(max(round(side * most_side_px / longest), 1) for side in known.shape)
     share = interpolate(known[None, None].to(image), size, mode="area")
     return interpolate(image, size, mode="area"), share[:, 0] > 1 - 1e-4

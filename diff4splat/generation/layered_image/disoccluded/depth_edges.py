@@ -64,3 +64,8 @@ def nearest_edge(edge: Bool[Tensor, "h w"]) -> NearestEdge:
     of_label[labels[edge]] = edge.flatten().nonzero()[:, 0]
     distance_px = torch.from_numpy(distance).to(edge.device)
     return NearestEdge(pixel=of_label[labels], distance_px=distance_px)
+
+
+def within(mask: Bool[Tensor, "h w"], distance_px: float) -> Bool[Tensor, "h w"]:
+    """Pixels no farther than that from the nearest of ``mask``, where any is."""
+    return nearest_edge(mask).distance_px <= distance_px

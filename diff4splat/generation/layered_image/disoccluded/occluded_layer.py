@@ -22,6 +22,7 @@ from diff4splat.generation.layered_image.disoccluded.depth_edges import (
     NearestEdge,
     far_side_of_edges,
     nearest_edge,
+    within,
 )
 from diff4splat.generation.layered_image.disoccluded.even_extension import even_colors
 from diff4splat.generation.layered_image.disoccluded.figure_ground import (
@@ -32,7 +33,7 @@ from diff4splat.generation.layered_image.disoccluded.figure_ground import (
 from diff4splat.generation.layered_image.disoccluded.static_layer import static_layer
 from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
-from diff4splat.generation.layered_image.inpainting import Inpaint
+from diff4splat.generation.layered_image.inpainting import Inpaint, on_copy
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
 from diff4splat.generation.layered_image.windows import largest_around
 
@@ -40,6 +41,8 @@ MARGIN_SHARE = 1 / 64
 """Of the image's longer side: beside an edge, colours of the foreground are mixed in."""
 REACH_SHARE = 1 / 6
 """Of the image's longer side: what a camera path disoccludes behind an edge."""
+NARROW_SIDE_PX = 256
+"""Of the copy in which figures go on: strips beside what is before them, without much detail."""
 EVEN_SHARE = 1 / 8
 """Of the image's longer side: farther from all cells, colours are even. What is inpainted in a
 large hole is an object that is not there."""
@@ -74,7 +77,8 @@ def occluded_layers(pixels: ImageLayer, inpaint: Inpaint = textured) -> Occluded
     division = figure_ground(pixels.rgb, pixels.depth)
     level = occlusion_level(division, nearest)
     # A network that knows places would paint another object behind the relief of one.
-    hiding = ((division.figure, inpaint), (division.before_figure, inpaint), (moving, even_colors))
+    narrow = on_copy(inpaint, NARROW_SIDE_PX)
+    hiding = ((division.figure, inpaint), (division.before_figure, narrow), (moving, even_colors))
     layers = []
     for count, (in_front, fill) in enumerate(hiding):
         beside = nearer & (level == count) & (nearest.distance_px < 2 * _margin_px(edge))
@@ -98,7 +102,7 @@ def _layer(
 ) -> ImageLayer | None:
     if not bool(known.any()) or not bool(mask.any()):
         return None
-    near = grown(mask, math.ceil(EVEN_SHARE * max(mask.shape)))
+    near = within(mask, EVEN_SHARE * max(mask.shape))
     rgb = inpaint(*_evenly_beyond(near, pixels.rgb, known))
     # A footprint covers the neighbours too.
     return static_layer(pixels, known, mask, largest_around(pixels.depth, 1), rgb)

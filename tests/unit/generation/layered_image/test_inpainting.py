@@ -6,7 +6,7 @@ from image_layers import random_rgb
 from torch import Tensor
 
 from diff4splat.generation.layered_image import inpainting
-from diff4splat.generation.layered_image.inpainting import NetworkInpainting
+from diff4splat.generation.layered_image.inpainting import NetworkInpainting, on_copy
 
 
 class Painter:
@@ -72,6 +72,16 @@ def test_large_images_are_seen_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
     # Of 11 × 16 cells in the middle, those that hold an unknown pixel are unknown.
     assert not bool(painter.known[:, :2].any()) and 0 < int(painter.known.sum()) < 11 * 16
     assert found.shape == rgb.shape and torch.equal(found[known], rgb[known])
+
+
+def test_a_copy_is_inpainted_and_enlarged() -> None:
+    painter, rgb, known = Painter(), random_rgb(32, 48), hole(32, 48)
+    network = NetworkInpainting(network=painter)
+    found = on_copy(network, 24)(rgb, known)
+    assert painter.image.shape[2:] == (16, 24)
+    assert torch.equal(found[known], rgb[known])
+    assert bool((found[10:14, 16:20] < 0.1).all()), "far enough from what is known"
+    assert torch.equal(on_copy(network, 48)(rgb, known), network(rgb, known))
 
 
 def test_a_cell_with_one_unknown_pixel_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:

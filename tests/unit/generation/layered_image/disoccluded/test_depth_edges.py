@@ -8,6 +8,7 @@ from diff4splat.generation.layered_image.disoccluded.depth_edges import (
     far_side_of_edges,
     nearest_edge,
     step_of_edges,
+    within,
 )
 
 SIDE = 48
@@ -61,6 +62,12 @@ def test_the_nearest_edge_of_a_pixel() -> None:
     assert int(found.pixel[3, 4]) == 0 and int(found.pixel[-3, -4]) == SIDE * SIDE - 1
     assert float(found.of(depth)[3, 4]) == FAR and float(found.of(depth)[-3, -4]) == NEAR
     assert float(found.distance_px[3, 4]) == pytest.approx(5, rel=0.05)
+
+
+def test_pixels_within_a_distance() -> None:
+    mask = torch.zeros(9, 9, dtype=torch.bool)
+    mask[4, 4] = True
+    assert int(within(mask, 0.5).sum()) == 1 and int(within(mask, 1.0).sum()) == 5
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 3), (4, 9)])
