@@ -41,8 +41,8 @@ MARGIN_SHARE = 1 / 64
 """Of the image's longer side: beside an edge, colours of the foreground are mixed in."""
 REACH_SHARE = 1 / 6
 """Of the image's longer side: what a camera path disoccludes behind an edge."""
-NARROW_SIDE_PX = 256
-"""Of the copy in which figures go on: strips beside what is before them, without much detail."""
+NARROW_SHARE, NARROW_PX = 1 / 2, 256
+"""Of the image's longer side, and at most: the copy in which figures go on, in narrow strips."""
 EVEN_SHARE = 1 / 8
 """Of the image's longer side: farther from all cells, colours are even. What is inpainted in a
 large hole is an object that is not there."""
@@ -77,7 +77,7 @@ def occluded_layers(pixels: ImageLayer, inpaint: Inpaint = textured) -> Occluded
     division = figure_ground(pixels.rgb, pixels.depth)
     level = occlusion_level(division, nearest)
     # A network that knows places would paint another object behind the relief of one.
-    narrow = on_copy(inpaint, NARROW_SIDE_PX)
+    narrow = on_copy(inpaint, min(math.ceil(NARROW_SHARE * max(edge.shape)), NARROW_PX))
     hiding = ((division.figure, inpaint), (division.before_figure, narrow), (moving, even_colors))
     layers = []
     for count, (in_front, fill) in enumerate(hiding):
