@@ -1,9 +1,10 @@
 """From an image, its depth and its displacement to all layers.
 
     image and maps ─ upsample ─ smooth, align edges ─ grow foreground ─ pixels ─ infill  these show
-    pixels ─┬─ occluded layer ─ infill                           the image; all others extend
-            └─ disoccluded layer ─ fine border                       it into what it hides
-    smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving
+    pixels ─┬─ occluded layers ─┬─ infill                        the image; all others extend
+            │                   └─ ground                            it into what it hides
+            └─ disoccluded layer ─ fine border
+    smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving ─ colours of the ground
                            └─ border extension ─┘  objects disocclude
 
 A new way of filling hidden regions belongs into ``hidden_layers``.
