@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn.functional import interpolate, pad
 
+from diff4splat.generation.layered_image.other_grid import copy_size
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.models.protocols import ImageCompletion
 
@@ -83,9 +84,8 @@ def _reduced(
     image: Float[Tensor, "1 3 h w"], known: Bool[Tensor, "h w"], most_side_px: int
 ) -> tuple[Float[Tensor, "1 3 hs ws"], Bool[Tensor, "1 hs ws"]]:
     """A copy, known where all of its pixels are."""
-    longest = max(known.shape)
-    if longest <= most_side_px:
+    size = copy_size((known.shape[0], known.shape[1]), most_side_px)
+    if known.shape == size:
         return image, known[None]
-    size = tuple(max(round(side * most_side_px / longest), 1) for side in known.shape)
     share = interpolate(known[None, None].to(image), size, mode="area")
     return interpolate(image, size, mode="area"), share[:, 0] > 1 - 1e-4

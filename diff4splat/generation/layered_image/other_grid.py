@@ -1,4 +1,4 @@
-"""A map on the grid of another camera at the same place.
+"""A map on the grid of another camera at the same place, and the size of a smaller copy.
 
 Axes: ``h w`` cells of the map, ``y x`` cells of the other grid, ``c`` channels.
 """
@@ -9,6 +9,13 @@ from torch import Tensor
 from torch.nn.functional import grid_sample
 
 from diff4splat.geometry.camera import Camera
+
+
+def copy_size(size_px: tuple[int, int], most_side_px: int) -> tuple[int, int]:
+    """The same shape with at most that along the longer side."""
+    scale = min(most_side_px / max(size_px), 1)
+    height, width = (max(round(side * scale), 1) for side in size_px)
+    return height, width
 
 
 def on_grid(

@@ -26,6 +26,7 @@ from diff4splat.generation.layered_image.disoccluded.depth_edges import (
     WINDOW_RADIUS_PX,
     far_side_of_edges,
 )
+from diff4splat.generation.layered_image.other_grid import copy_size
 from diff4splat.generation.layered_image.windows import largest_around, smallest_around
 
 MOST_SIDE_PX = 128
@@ -130,10 +131,9 @@ def copies(
     rgb: Float[Tensor, "h w 3"], depth: Float[Tensor, "h w"]
 ) -> tuple[Float[Tensor, "y x 3"], Float[Tensor, "y x"]]:
     """Means of colours, and single depths: no surface lies between two sides of an edge."""
-    longest = max(depth.shape)
-    if longest <= MOST_SIDE_PX:
+    size = copy_size((depth.shape[0], depth.shape[1]), MOST_SIDE_PX)
+    if depth.shape == size:
         return rgb, depth
-    size = tuple(max(round(side * MOST_SIDE_PX / longest), 1) for side in depth.shape)
     small = interpolate(rgb.movedim(-1, 0)[None], size, mode="area")[0].movedim(0, -1)
     return small, interpolate(depth[None, None], size, mode="nearest-exact")[0, 0]
 

@@ -78,7 +78,7 @@ def occluded_layers(pixels: ImageLayer, inpaint: Inpaint = textured) -> Occluded
     level = occlusion_level(division, nearest)
     # A network that knows places would paint another object behind the relief of one.
     narrow = on_copy(inpaint, min(math.ceil(NARROW_SHARE * max(edge.shape)), NARROW_PX))
-    hiding = ((division.figure, inpaint), (division.before_figure, narrow), (moving, even_colors))
+    hiding = ((division.figure, inpaint), (division.before_figure, narrow), (moving, None))
     layers = []
     for count, (in_front, fill) in enumerate(hiding):
         beside = nearer & (level == count) & (nearest.distance_px < 2 * _margin_px(edge))
@@ -98,23 +98,30 @@ def occlusion_level(division: FigureGround, nearest: NearestEdge) -> Int[Tensor,
 
 
 def _layer(
-    pixels: ImageLayer, known: Bool[Tensor, "h w"], mask: Bool[Tensor, "h w"], inpaint: Inpaint
+    pixels: ImageLayer,
+    known: Bool[Tensor, "h w"],
+    mask: Bool[Tensor, "h w"],
+    inpaint: Inpaint | None,
 ) -> ImageLayer | None:
     if not bool(known.any()) or not bool(mask.any()):
         return None
     near = within(mask, EVEN_SHARE * max(mask.shape))
-    rgb = inpaint(*_evenly_beyond(near, pixels.rgb, known))
+    rgb = _colors(pixels.rgb, known, near, inpaint)
     # A footprint covers the neighbours too.
     return static_layer(pixels, known, mask, largest_around(pixels.depth, 1), rgb)
 
 
-def _evenly_beyond(
-    near: Bool[Tensor, "h w"], rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]
-) -> tuple[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]]:
-    """Colours and where they are known, which they are everywhere but ``near``."""
-    if bool((known | near).all()):
-        return rgb, known
-    return even_colors(rgb, known), known | ~near
+def _colors(
+    rgb: Float[Tensor, "h w 3"],
+    known: Bool[Tensor, "h w"],
+    near: Bool[Tensor, "h w"],
+    inpaint: Inpaint | None,
+) -> Float[Tensor, "h w 3"]:
+    """Known colours, inpainted ones ``near``, and even ones elsewhere; all even without network."""
+    if inpaint is not None and bool((known | near).all()):
+        return inpaint(rgb, known)
+    even = even_colors(rgb, known)
+    return even if inpaint is None else inpaint(even, known | ~near)
 
 
 def _margin_px(edge: Bool[Tensor, "h w"]) -> int:

@@ -2,7 +2,7 @@
 
 import torch
 
-from diff4splat.generation.layered_image.other_grid import on_grid
+from diff4splat.generation.layered_image.other_grid import copy_size, on_grid
 from diff4splat.geometry.camera import pinhole
 
 
@@ -22,3 +22,9 @@ def test_cells_outside_repeat_the_border() -> None:
     torch.testing.assert_close(found[0, 3], want)
     assert torch.equal(inside.nonzero().amin(0), torch.tensor([1, 2]))
     assert int(inside.sum()) == 4 * 6
+
+
+def test_a_copy_has_the_shape_of_the_image_and_no_more_pixels() -> None:
+    assert copy_size((300, 200), 128) == (128, 85)
+    assert copy_size((30, 20), 128) == (30, 20)
+    assert copy_size((1000, 1), 128) == (128, 1)
