@@ -257,7 +257,11 @@ main()
 
 
 @pytest.mark.parametrize(
-    ("stop", "phase"), [(signal.SIGINT, "write files"), (signal.SIGTERM, "render")]
+    ("stop", "phase"),
+    [
+        (signal.SIGINT, "write files"),
+        pytest.param(signal.SIGTERM, "render", marks=pytest.mark.slow),
+    ],
 )
 def test_an_interrupt_leaves_nothing_half_written(
     stop: signal.Signals, phase: str, photo: Path, tmp_path: Path

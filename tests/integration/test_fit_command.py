@@ -31,7 +31,11 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("motion", "kind"), [("hexplane", HexPlaneMotion), ("spacetime", SpacetimeMotion)]
+    ("motion", "kind"),
+    [
+        ("hexplane", HexPlaneMotion),
+        pytest.param("spacetime", SpacetimeMotion, marks=pytest.mark.slow),
+    ],
 )
 def test_a_folder_becomes_a_scene_with_a_card(
     motion: str, kind: type, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture
@@ -68,6 +72,7 @@ def test_a_fitted_field_bakes_to_key_frames(
     )
 
 
+@pytest.mark.slow
 def test_a_fit_in_float64_keeps_every_bit(data: Path, tmp_path: Path) -> None:
     out, exact = tmp_path / "fit", ("--dtype", "float64", "--compression", "lossless")
     assert fit(data, out, *exact, "--set", "coarse_steps=5", "points=40") == 0

@@ -45,6 +45,7 @@ def test_a_map_decides_the_depth_of_the_scene(photo: Path, tmp_path: Path) -> No
     assert "monocular_depth" not in card["networks_run"]
 
 
+@pytest.mark.slow
 def test_a_network_decides_it_too_and_fills_by_video(photo: Path, tmp_path: Path) -> None:
     graph = small_onnx.one_map(tmp_path / "any.onnx")
     card = generated(photo, tmp_path / "out", "--depth", str(graph), "--fill", "video")

@@ -14,7 +14,9 @@ from diff4splat.cli.main import run
 KILLED = Path(__file__).parents[1] / "support" / "killed_command.py"
 
 
-@pytest.mark.parametrize(("moment", "number"), [("update", 4), ("hand-over", 2)])
+@pytest.mark.parametrize(
+    ("moment", "number"), [("update", 4), pytest.param("hand-over", 2, marks=pytest.mark.slow)]
+)
 def test_a_killed_run_is_finished_by_the_same_command(
     moment: str, number: int, six_steps: Path, shards: Path, tmp_path: Path
 ) -> None:

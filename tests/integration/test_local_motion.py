@@ -70,7 +70,7 @@ def test_without_local_motion_nothing_grows(
     assert "motion in place" in {one.what for one in log.skipped}
 
 
-@pytest.mark.parametrize("fill", ["none", "video"])
+@pytest.mark.parametrize("fill", ["none", pytest.param("video", marks=pytest.mark.slow)])
 def test_a_disc_that_spins_has_another_side(
     pipeline: Diff4SplatPipeline, image: InputImage, fill: str
 ) -> None:

@@ -15,6 +15,7 @@ from diff4splat.paths.build import build_path
 from diff4splat.paths.presets import PRESETS
 from diff4splat.paths.settings import PathFrame, PathSettings
 
+SLOW = pytest.mark.slow
 ASKED_FOR = {
     *("static", "orbit", "arc", "spiral", "forward", "backward", "up", "down", "left", "right"),
     *("roll", "dolly-zoom", "figure8"),
@@ -27,14 +28,23 @@ def assert_image(file: Path) -> None:
         assert len(set(image.convert("L").resize((64, 64)).tobytes())) > 10
 
 
-@pytest.mark.parametrize("camera", ["spiral", "orbit:0.25+up:0.1", "dolly-zoom"])
+@pytest.mark.parametrize(
+    "camera",
+    ["orbit:0.25+up:0.1", *(pytest.param(c, marks=SLOW) for c in ("spiral", "dolly-zoom"))],
+)
 def test_preview_draws_presets(camera: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert run(["paths", "preview", camera, "--out", str(tmp_path / "p.png")]) == 0
     assert_image(tmp_path / "p.png")
     assert "focal length" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["path.txt", "path.tum", "transforms.json", "camera_path.json"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "path.txt",
+        *(pytest.param(n, marks=SLOW) for n in ("path.tum", "transforms.json", "camera_path.json")),
+    ],
+)
 def test_preview_and_generate_follow_every_file_format(name: str, tmp_path: Path) -> None:
     view = PathFrame(camera=pinhole(40.0, (32, 48)), near_depth=4.0, focus_depth=4.0)
     path = build_path("arc+forward", view, PathSettings(frames=7, fps=10.0))

@@ -42,10 +42,12 @@ More remains when cameras are exchanged, when motion is not rendered or when the
 of the target.
 """
 SHORT_STAGES = [
-    pytest.param(name, marks=pytest.mark.slow) if name in ("dynamic", "static-high") else name
+    name
+    if name in ("vae", "static-low", "video_diffusion")
+    else pytest.param(name, marks=pytest.mark.slow)
     for name in STAGES
 ]
-"""``joint`` renders motion as well; with one optimizer static stages differ in size alone."""
+"""One per part of the model; the others train parts together or at another size."""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 

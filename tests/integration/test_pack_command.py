@@ -107,6 +107,7 @@ def test_inspect_wants_one_thing(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "the file is damaged, fetch the model again" in refusal(capsys)
 
 
+@pytest.mark.slow
 def test_a_scene_of_bundled_weights_without_a_video_model(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

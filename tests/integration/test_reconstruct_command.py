@@ -70,6 +70,7 @@ def test_the_bundled_weights_find_unit_and_scene(
     assert {"scene.safetensors", "scene.html", "depth.exr", "preview.png", "card.json"} <= names
 
 
+@pytest.mark.slow
 def test_a_scene_starts_a_fit_of_the_same_data(video: Path, tmp_path: Path) -> None:
     assert reconstruct(video, tmp_path / "out", "--photometric-steps", "0") == 0
     start = str(tmp_path / "out/scene.safetensors")

@@ -68,7 +68,10 @@ def test_the_trained_model_makes_a_scene(
     assert "untrained" not in json.dumps(card).replace('"untrained": false', "")
 
 
-@pytest.mark.parametrize("task", ["generation", "reconstruction", "text"])
+@pytest.mark.parametrize(
+    "task",
+    ["generation", *(pytest.param(t, marks=pytest.mark.slow) for t in ("reconstruction", "text"))],
+)
 def test_the_trained_model_is_judged(
     task: str, course: Path, shards: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -184,9 +184,10 @@ def test_a_signal_to_one_process_stops_both_after_the_step(done) -> None:
     assert state(done / "signalled")["progress"]["step"] == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "how"),
-    [("ddp", "signal_at"), pytest.param("fsdp2", "die_while_saving", marks=pytest.mark.slow)],
+    [("ddp", "signal_at"), ("fsdp2", "die_while_saving")],
 )
 def test_a_killed_process_leaves_a_usable_checkpoint(tmp_path, mode: str, how: str) -> None:
     """Sample 18 is taken by the second process at step 4; the fourth checkpoint follows step 3."""

@@ -3,6 +3,7 @@
 Two processes that come to need the same kernels would both compile them.
 """
 
+import gc
 import os
 
 from diff4splat.data_prep.synthetic.renderer.jit import GROUP as WORLDS
@@ -20,9 +21,13 @@ def compile_share() -> None:
     if worker is None:
         return
     number, count = int(worker.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
-    for group in shares(count)[number]:
+    # The compiler makes garbage by the million, and none of it is worth a search.
+    gc.disable()
+    # A process that takes the place of a crashed one has a number beyond the count.
+    for group in shares(count)[number % count]:
         if not group.is_ready():
             group.precompile()
+    gc.enable()
 
 
 def shares(count: int) -> list[list[KernelGroup]]:

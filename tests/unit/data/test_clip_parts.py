@@ -129,6 +129,7 @@ def test_other_licences(name: str) -> None:
     assert not commercial_ok(name)
 
 
+@pytest.mark.slow
 def test_other_processes_read_it(folder: ClipFolder) -> None:
     # Started afresh: a fork of a process with threads may hang in whatever a thread was holding.
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:

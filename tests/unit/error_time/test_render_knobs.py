@@ -150,6 +150,7 @@ def test_settings_read_well() -> None:
     assert str(render_knobs.support_knob().default) == str(Fraction(1, 255))
 
 
+@pytest.mark.slow
 def test_listing_knobs_loads_no_compiler() -> None:
     code = (
         "import sys\nfrom diff4splat.error_time.known_knobs import known_knobs\nknown_knobs()\n"

@@ -85,7 +85,7 @@ def test_the_newest_protocol_of_all_tasks_is_the_default() -> None:
     assert Evaluate().protocol == whole[-1]
 
 
-@pytest.mark.parametrize("asked", [None, 0, 3])
+@pytest.mark.parametrize("asked", [None, pytest.param(0, marks=pytest.mark.slow), 3])
 def test_reconstruction_sees_the_whole_input_video(
     asked: int | None, protocol_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,7 +34,7 @@ SETTINGS = FitSettings(
     time_slices=2,
     judge_every=6,
 )
-MOTIONS = ("hexplane", "spacetime", "static")
+MOVING = [pytest.param(motion, marks=pytest.mark.slow) for motion in ("hexplane", "spacetime")]
 
 
 def fitted(folder: Path, **changes) -> FitResult:
@@ -43,7 +43,7 @@ def fitted(folder: Path, **changes) -> FitResult:
     return fit_scene(FitRequest(capture=ball_capture(), settings=settings, folder=folder))
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", ["static", *MOVING])
 def test_both_precisions_fit_alike(motion: str, tmp_path: Path) -> None:
     exact = fitted(tmp_path / "exact", motion=motion)
     usual = fitted(tmp_path / "usual", motion=motion, dtype="float32")
@@ -55,7 +55,7 @@ def test_both_precisions_fit_alike(motion: str, tmp_path: Path) -> None:
     assert 0 < largest < 1e-2
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", ["static", *MOVING])
 def test_a_checkpoint_keeps_every_bit(motion: str, tmp_path: Path) -> None:
     whole = fitted(tmp_path / "whole", motion=motion)
     settings = replace(SETTINGS, motion=motion)

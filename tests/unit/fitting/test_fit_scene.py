@@ -28,6 +28,7 @@ from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Provenance, Scene
 
 pytestmark = pytest.mark.usefixtures("module_as_shipped")
+SLOW = pytest.mark.slow
 SETTINGS = FitSettings(
     coarse_steps=40,
     fine_steps=80,
@@ -57,7 +58,7 @@ def stood(tmp_path_factory) -> FitResult:
     return fit_scene(run(tmp_path_factory.mktemp("stood"), motion="static"))
 
 
-@pytest.fixture(scope="module", params=["hexplane", "spacetime"])
+@pytest.fixture(scope="module", params=["spacetime", pytest.param("hexplane", marks=SLOW)])
 def moved(request, tmp_path_factory) -> FitResult:
     return fit_scene(run(tmp_path_factory.mktemp("moved"), motion=request.param))
 
@@ -71,7 +72,7 @@ def test_a_motion_shows_held_out_views_better_than_a_standing_scene(
     assert 0 < len(moved.motion.moving_index) <= len(moved.gaussians)
 
 
-@pytest.mark.parametrize("motion", ["hexplane", "spacetime"])
+@pytest.mark.parametrize("motion", ["spacetime", pytest.param("hexplane", marks=SLOW)])
 def test_a_stopped_fit_goes_on_to_the_same_scene(motion: str, tmp_path: Path, monkeypatch):
     steps = {"motion": motion, "coarse_steps": 20, "fine_steps": 30}
     whole = fit_scene(run(tmp_path / "whole", **steps))

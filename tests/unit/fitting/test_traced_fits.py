@@ -126,6 +126,7 @@ def test_cameras_wait_until_the_scene_is_there():
     assert float(made.table["camera_readout"].grad.abs()) > 0
 
 
+@pytest.mark.slow
 def test_a_stopped_fit_that_learns_cameras_goes_on_exactly(tmp_path: Path, monkeypatch):
     optics = Optics(
         lens=OpenCVFisheye(coefficients=torch.zeros(4)),

@@ -198,6 +198,7 @@ for name in [*tests.WRITERS, "frames"]:
 """
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_really_full(tmp_path: Path) -> None:
     """No file may grow beyond 300 bytes, which is what a full disk looks like to a writer."""
     paths = os.pathsep.join([str(Path(__file__).parent), str(Path(oracles_io.__file__).parent)])

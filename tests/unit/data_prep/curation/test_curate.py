@@ -91,6 +91,7 @@ def test_a_changed_clip_is_scored_again(clips, tmp_path) -> None:
     assert store.read()[("planes", "good")] == old
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_bytes(clips, tmp_path) -> None:
     curate(job(clips, tmp_path / "one"), Phases())
     curate(job(clips, tmp_path / "two", workers=2), Phases())

@@ -35,7 +35,12 @@ def noted(script: str, folder: Path) -> list[list[str]]:
 
 
 @pytest.mark.parametrize(
-    ("begins", "tasks"), [("seq 0 63", 64), ("sbatch --array=0-63", 64), ("seq 0 7", 8)]
+    ("begins", "tasks"),
+    [
+        ("seq 0 63", 64),
+        pytest.param("sbatch --array=0-63", 64, marks=pytest.mark.slow),
+        ("seq 0 7", 8),
+    ],
 )
 def test_every_task_is_run_once(begins: str, tasks: int, tmp_path: Path) -> None:
     (script,) = [block for block in blocks("bash") if block.startswith(begins)]

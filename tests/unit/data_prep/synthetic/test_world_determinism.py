@@ -7,6 +7,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+import pytest
 from made_worlds import SPLITS, made_world
 
 from diff4splat.data_prep.synthetic.world import World
@@ -69,6 +70,7 @@ def test_worlds_are_what_they_have_always_been() -> None:
     assert digests() == GOLDEN
 
 
+@pytest.mark.slow
 def test_other_processors_make_the_same_worlds() -> None:
     plain = {
         **os.environ,

@@ -64,8 +64,7 @@ def video(unit: float = 1.0, step: float = STEP) -> InputVideo:
     )
 
 
-@pytest.mark.parametrize("unit", [1e-4, 0.3, 1.0, 250.0])
-@pytest.mark.parametrize("depth", [3.0, 3.22, 5.0])
+@pytest.mark.parametrize(("unit", "depth"), [(1e-4, 3.0), (250.0, 3.22), (1.0, 5.0), (0.3, 5.0)])
 def test_the_unit_is_found_whatever_it_is(unit: float, depth: float) -> None:
     """The plane lies at DEPTH · unit in the capture and at ``depth`` for the prior."""
     scale = find_camera_scale(model_that_sees(depth), video(unit))

@@ -82,6 +82,7 @@ def run(code: str, timeout_s: float = 600) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_numba_is_loaded_with_the_first_image_and_not_before() -> None:
     code = """
 import diff4splat.render.api

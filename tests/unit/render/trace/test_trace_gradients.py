@@ -23,7 +23,10 @@ SETTINGS = {
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-@pytest.mark.parametrize("moves", [False, True], ids=["still", "moving"])
+@pytest.mark.parametrize(
+    "moves",
+    [pytest.param(False, id="still", marks=pytest.mark.slow), pytest.param(True, id="moving")],
+)
 def test_of_brute_force_are_those_of_finite_differences(moves: bool, name: str) -> None:
     cloud = scene(4, seed=3)
     ahead = torch.tensor([0.0, 0.0, 3.0], dtype=torch.float64)

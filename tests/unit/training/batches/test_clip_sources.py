@@ -143,6 +143,7 @@ def test_folders_without_clips_are_refused(tmp_path: Path) -> None:
         source(tmp_path, 0.5)
 
 
+@pytest.mark.slow
 def test_other_processes_draw_the_same_clips(folder: Path) -> None:
     clips = source(folder, 0.5)
     here = names(clips, range(3))

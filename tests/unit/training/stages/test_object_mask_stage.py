@@ -80,6 +80,7 @@ def test_it_learns_which_half_is_asked_for() -> None:
     assert float(measured["absent_empty"].mean()) == 1.0
 
 
+@pytest.mark.slow
 def test_it_learns_the_names_of_pixels() -> None:
     stage, batch = make_stage(mask_recipe(), model=MODEL), requests()
     optimiser = torch.optim.Adam(stage.object_mask.parameters(), lr=1e-2)
@@ -159,6 +160,7 @@ def two_squares() -> RequestBatch:
     return replace(requests(), images=images, objects=objects)
 
 
+@pytest.mark.slow
 def test_it_learns_which_pixels_are_one_object() -> None:
     stage, batch = make_stage(instance_recipe(), model=WITH_INSTANCES), two_squares()
     optimiser = torch.optim.Adam(stage.object_mask.parameters(), lr=1e-2)

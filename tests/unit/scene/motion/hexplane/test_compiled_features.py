@@ -123,6 +123,7 @@ def test_differentiating_twice_is_refused() -> None:
         slope.sum().backward()
 
 
+@pytest.mark.slow
 def test_numba_is_loaded_by_the_first_compiled_features_and_not_before() -> None:
     code = (
         "import sys, torch\n"
