@@ -118,7 +118,7 @@ def _monocular_depth(config: ModelConfig) -> nn.Module:
     depth = config.monocular_depth
     if not depth.image_backbone:
         return MonocularDepthNet(depth.channels)
-    return BackboneDepthNet(depth.channels, uncertainty=depth.uncertainty)
+    return BackboneDepthNet(depth.channels, size=depth.backbone_size, uncertainty=depth.uncertainty)
 
 
 def _object_mask(config: ModelConfig) -> nn.Module:

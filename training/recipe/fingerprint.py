@@ -69,8 +69,12 @@ def _model(model: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_plain(model: Mapping[str, Any]) -> dict[str, Any]:
-    """The same without the layout and the encoder that all models had."""
-    plain = {("vae", "layout"): "plain", ("text", "encoder"): "bytes"}
+    """The same without the layout, the encoder and the backbone that all models had."""
+    plain = {
+        ("vae", "layout"): "plain",
+        ("text", "encoder"): "bytes",
+        ("monocular_depth", "backbone_size"): "lite0",
+    }
     return {
         key: {n: one for n, one in value.items() if plain.get((key, n)) != one}
         if isinstance(value, Mapping)

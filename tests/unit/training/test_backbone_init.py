@@ -10,7 +10,7 @@ from clip_shards import reading, write_shards
 from depth_stages import depth_recipe
 
 from diff4splat.errors import ConfigError
-from diff4splat.models.config.priors import MonocularDepthConfig
+from diff4splat.models.config.priors import BackboneSize, MonocularDepthConfig
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
@@ -23,11 +23,14 @@ from diff4splat.training.train_stage import StageRequest, train_stage
 from diff4splat.training.trainer.checkpoints.export import load_parts
 
 
-def test_only_the_backbone_takes_public_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("size", ["lite0", "lite2"])
+def test_only_the_backbone_takes_public_weights(
+    size: BackboneSize, monkeypatch: pytest.MonkeyPatch
+) -> None:
     torch.manual_seed(1)
-    public = EfficientNetLite().state_dict()
-    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda: public)
-    network = BackboneDepthNet(4)
+    public = EfficientNetLite(size=size).state_dict()
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", {size: public}.__getitem__)
+    network = BackboneDepthNet(4, size=size)
     before = {key: value.clone() for key, value in network.state_dict().items()}
     networks = Networks(monocular_depth=network)
     backbone_init.start_from_public_backbones(networks, ["monocular_depth"])
@@ -40,7 +43,7 @@ def test_only_the_backbone_takes_public_weights(monkeypatch: pytest.MonkeyPatch)
 def test_a_shorter_backbone_takes_the_weights_that_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
     torch.manual_seed(1)
     public = EfficientNetLite().state_dict()
-    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda: public)
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda size: public)
     network = BackboneObjectMaskNet(HeadShape(width=4, text_width=8))
     backbone_init.start_from_public_backbones(Networks(object_mask=network), ["object_mask"])
     taken = network.backbone.state_dict()
@@ -56,13 +59,14 @@ def test_a_part_without_a_backbone_is_refused() -> None:
     backbone_init.start_from_public_backbones(networks, [])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("as_shipped")
 def test_a_stage_starts_from_public_weights_also_after_a_start_without_a_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     torch.manual_seed(1)
     public = EfficientNetLite().state_dict()
-    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda: public)
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda size: public)
     recipe = reading(write_shards(tmp_path / "shards"))
     prior = MonocularDepthConfig(channels=4, image_backbone=True)
     like = depth_recipe()

