@@ -8,7 +8,7 @@ from diff4splat.models.config.checks import require, require_counts, require_opt
 BACKBONE_MULTIPLE_PX = 32
 """Image sides that the image backbone takes are multiples of it."""
 BackboneSize = Literal["lite0", "lite2"]
-"""Of EfficientNet-Lite; the larger one has 6.7 million weights in place of 5.3 in the depth prior."""
+"""Of EfficientNet-Lite: with the larger one the depth prior has 6.7 million weights, else 5.3."""
 MAX_LEVELS, MAX_WIDTH = 10, 1 << 14
 """Of image inpainting; more is damage."""
 

@@ -24,7 +24,6 @@ from diff4splat.models.image_backbone.inverted_residual import (
 )
 from diff4splat.models.image_backbone.public_weights import NORM_EPSILON, folded_weights
 
-
 SIZES = sorted(FEATURE_CHANNELS)
 
 
