@@ -252,6 +252,7 @@ def two_squares() -> tuple[Tensor, Tensor, Tensor]:
     return image, target, texts.repeat(2, 1, 1)
 
 
+@pytest.mark.slow
 def test_it_learns_which_square_the_text_names() -> None:
     image, target, text = two_squares()
     torch.manual_seed(0)

@@ -64,6 +64,7 @@ def recipe(*sources: SourceSettings, data: DataSettings = DATA) -> StageRecipe:
     )
 
 
+@pytest.mark.slow
 def test_the_share_of_still_clips_is_the_asked_one(folder: Path) -> None:
     clips = source(folder, still_share=0.3)
     still = [clips.clip(index).note.is_static for index in range(200)]
