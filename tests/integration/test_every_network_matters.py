@@ -84,8 +84,7 @@ RUNS = [
     for name in ("prompt", "no prompt")
     for part in sorted(CASES[name].parts - {SEES_NO_BOX})
 ]
-RUNS += [("video", "dit")]
-RUNS += [pytest.param("video", part, marks=pytest.mark.slow) for part in sorted(VIDEO - {"dit"})]
+RUNS += [pytest.param("video", part, marks=pytest.mark.slow) for part in sorted(VIDEO)]
 UNREAD = [(name, with_nan) for name in ("prompt", "no prompt", "still")]
 UNREAD += [("no prompt", with_garbage), ("no prompt", without_file)]
 UNREAD += [
@@ -197,7 +196,13 @@ def test_networks_that_do_not_run_are_not_read(name: str, change: Change, tmp_pa
     assert scene.provenance.weights_sha256 == weights_sha256(folder, case.parts)
 
 
-@pytest.mark.parametrize("change", [with_nan, with_garbage, without_file])
+@pytest.mark.parametrize(
+    "change",
+    [
+        with_nan,
+        *(pytest.param(one, marks=pytest.mark.slow) for one in (with_garbage, without_file)),
+    ],
+)
 @pytest.mark.parametrize("part", PARTS)
 def test_networks_that_run_are_read(part: str, change: Change, tmp_path: Path) -> None:
     folder = copied_folder(tmp_path / "model", [(part, change)])

@@ -67,7 +67,17 @@ def test_a_checkpoint_keeps_every_bit(motion: str, tmp_path: Path) -> None:
     assert torch.equal(parts.gaussians.means, whole.gaussians.means)
 
 
-@pytest.mark.parametrize("name", ["means", "log_scales", "quats", "opacity_logits", "velocities"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "means",
+        "velocities",
+        *(
+            pytest.param(n, marks=pytest.mark.slow)
+            for n in ("log_scales", "quats", "opacity_logits")
+        ),
+    ],
+)
 def test_gradients_of_a_step_are_those_of_its_loss(name: str) -> None:
     capture = ball_capture(views=2, times=2, held=())
     settings = replace(SETTINGS, motion="spacetime")

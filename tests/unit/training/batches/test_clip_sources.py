@@ -87,7 +87,9 @@ def test_every_epoch_shows_every_clip_once_in_another_order(
     assert len({tuple(epoch) for epoch in epochs}) > 1
 
 
-@pytest.mark.parametrize("still_share", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(
+    "still_share", [0.5, *(pytest.param(share, marks=pytest.mark.slow) for share in (0.0, 1.0))]
+)
 def test_clips_kept_back_are_never_trained_on(folder: Path, still_share: float) -> None:
     clips = source(folder, still_share)
     trained = set(names(clips, range(100)))
