@@ -1,11 +1,15 @@
 """Depth prior and object mask on the image backbone."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 import torch
 from torch import Tensor, nn
 
+from diff4splat.models.config.priors import MonocularDepthConfig
+from diff4splat.models.config.sizes import test_size
+from diff4splat.models.factory import parameter_counts
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
 from diff4splat.models.object_mask.mask_heads import HeadShape
@@ -43,6 +47,15 @@ NETWORKS = pytest.mark.parametrize("make", [depth, masks])
 
 def test_a_fresh_network_predicts_the_plane() -> None:
     assert bool((BackboneDepthNet(WIDTH)(torch.rand(1, 3, 32, 64)) == 0).all())
+
+
+def test_the_configuration_decides_the_size_of_the_backbone() -> None:
+    counts = []
+    for size in ("lite0", "lite2"):
+        depth = MonocularDepthConfig(channels=WIDTH, image_backbone=True, backbone_size=size)
+        counts.append(parameter_counts(replace(test_size(), monocular_depth=depth)))
+    assert counts[0]["monocular_depth"] < counts[1]["monocular_depth"]
+    assert counts[0]["ldrm"] == counts[1]["ldrm"]
 
 
 def test_depth_is_the_mean_of_both_encoders() -> None:
