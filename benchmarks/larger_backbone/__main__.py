@@ -1,0 +1,61 @@
+"""Write a model to train further: ``python -m benchmarks.larger_backbone --out start``."""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from benchmarks.larger_backbone.fitted_start import with_backbone
+from diff4splat.models.config.priors import BackboneSize
+from diff4splat.models.hub.model import load_model, save_model
+
+PHOTOGRAPHS = (
+    *("astronaut", "coffee", "chelsea", "rocket", "camera", "hubble_deep_field"),
+    *("immunohistochemistry", "retina", "brick", "grass", "gravel"),
+)
+"""Of scikit-image."""
+SIDES_PX, WINDOWS = (128, 192, 256, 384), 6
+"""Of windows, and how many of each side are cut from a photograph."""
+INPUT_PX = 128
+"""What the network sees of a photograph, whatever the window."""
+
+
+def main() -> None:
+    """The bundled model, its depth prior on the larger backbone."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--size", choices=("lite0", "lite2"), default="lite2")
+    parser.add_argument("--out", type=Path, required=True)
+    arguments = parser.parse_args()
+    size: BackboneSize = arguments.size
+    model = load_model("small")
+    images = torch.from_numpy(np.stack(list(windows()))).movedim(-1, 1) / 255
+    depth, left = with_backbone(model.networks.monocular_depth, size, images)
+    config = replace(model.config.monocular_depth, backbone_size=size)
+    networks = replace(model.networks, monocular_depth=depth)
+    config = replace(model.config, monocular_depth=config)
+    save_model(replace(model, config=config, networks=networks), arguments.out)
+    print("left of the variance, finest level first:", *(f"{share:.2f}" for share in left))
+
+
+def windows() -> Iterator[Float[np.ndarray, "h w 3"]]:
+    """Windows of photographs at random places, all of one size."""
+    import skimage.data
+
+    generator = np.random.default_rng(0)
+    for name in PHOTOGRAPHS:
+        image = np.atleast_3d(getattr(skimage.data, name)())[..., :3]
+        image = np.broadcast_to(image, (*image.shape[:2], 3)).astype(np.float32)
+        for side in (one for one in SIDES_PX if one <= min(image.shape[:2])):
+            for _ in range(WINDOWS):
+                y, x = generator.integers(0, np.array(image.shape[:2]) - side + 1)
+                window = np.ascontiguousarray(image[y : y + side, x : x + side])
+                yield cv2.resize(window, (INPUT_PX, INPUT_PX), interpolation=cv2.INTER_AREA)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,47 @@
+"""The start of a depth prior on a larger backbone."""
+
+import pytest
+import torch
+
+from benchmarks.larger_backbone import fitted_start
+from benchmarks.larger_backbone.fitted_start import fit, with_backbone
+from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
+from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
+
+
+def test_least_squares_find_a_convolution_again() -> None:
+    torch.manual_seed(0)
+    wanted, found = (torch.nn.Conv2d(5, 3, 1) for _ in range(2))
+    features = torch.randn(4, 5, 6, 7) + 2
+    with torch.no_grad():
+        left = fit(found, features, wanted(features))
+    torch.testing.assert_close(found.weight, wanted.weight, atol=3e-3, rtol=0)
+    torch.testing.assert_close(found.bias, wanted.bias, atol=2e-2, rtol=0)
+    assert left < 1e-4
+
+
+def test_what_the_image_does_not_show_is_left() -> None:
+    torch.manual_seed(0)
+    conv, features = torch.nn.Conv2d(2, 1, 1), torch.randn(1, 2, 32, 32)
+    with torch.no_grad():
+        left = fit(conv, features, features.sum(1, keepdim=True) + torch.randn(1, 1, 32, 32))
+    assert left == pytest.approx(1 / 3, abs=0.05)
+
+
+@pytest.mark.parametrize("uncertainty", [False, True])
+def test_all_but_the_backbone_and_what_joins_it_is_kept(
+    uncertainty: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.manual_seed(0)
+    public = EfficientNetLite(size="lite2").state_dict()
+    monkeypatch.setattr(fitted_start, "public_backbone_weights", lambda size: public)
+    network = BackboneDepthNet(4, uncertainty=uncertainty)
+    other, left = with_backbone(network, "lite2", torch.rand(6, 3, 64, 64))
+    assert len(left) == 5 and all(0 <= share <= 1 for share in left)
+    before = network.state_dict()
+    for name, value in other.state_dict().items():
+        if name.startswith("backbone."):
+            assert torch.equal(value, public[name.removeprefix("backbone.")])
+        elif not name.startswith("lateral."):
+            assert torch.equal(value, before[name])
+    assert all(bool(value.isfinite().all()) for value in other.state_dict().values())
