@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -28,7 +29,7 @@ INPUT_PX = 128
 def main() -> None:
     """The bundled model, its depth prior on the larger backbone."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--size", choices=("lite0", "lite2"), default="lite2")
+    parser.add_argument("--size", choices=get_args(BackboneSize), default="lite2")
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     size: BackboneSize = arguments.size

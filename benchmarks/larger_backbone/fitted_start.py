@@ -10,8 +10,9 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from diff4splat.models.config.priors import BackboneSize
-from diff4splat.models.image_backbone.public_weights import public_backbone_weights
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
+from diff4splat.models.networks import Networks
+from diff4splat.training.backbone_init import start_from_public_backbones
 
 RIDGE = 1e-3
 """Of the mean variance of a channel."""
@@ -29,8 +30,7 @@ def with_backbone(
     other = BackboneDepthNet(width, size=size, uncertainty=network.uncertainty is not None)
     own = {name: value for name, value in network.state_dict().items() if _is_kept(name)}
     other.load_state_dict(own, strict=False)
-    weights = public_backbone_weights(size)
-    other.backbone.load_state_dict({name: weights[name] for name in other.backbone.state_dict()})
+    start_from_public_backbones(Networks(monocular_depth=other), ["monocular_depth"])
     with torch.no_grad():
         pairs = zip(network.lateral, network.backbone(images), strict=True)
         wanted = [conv(level) for conv, level in pairs]

@@ -47,7 +47,7 @@ SHORT_STAGES = [
     else pytest.param(name, marks=pytest.mark.slow)
     for name in STAGES
 ]
-"""One per part of the model; the others train parts together or at another size."""
+"""``dynamic`` and ``joint``, in which deformation learns, are slow."""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 

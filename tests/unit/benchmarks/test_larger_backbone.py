@@ -3,10 +3,10 @@
 import pytest
 import torch
 
-from benchmarks.larger_backbone import fitted_start
 from benchmarks.larger_backbone.fitted_start import fit, with_backbone
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
+from diff4splat.training import backbone_init
 
 
 def test_least_squares_find_a_convolution_again() -> None:
@@ -34,7 +34,7 @@ def test_all_but_the_backbone_and_what_joins_it_is_kept(
 ) -> None:
     torch.manual_seed(0)
     public = EfficientNetLite(size="lite2").state_dict()
-    monkeypatch.setattr(fitted_start, "public_backbone_weights", lambda size: public)
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda size: public)
     network = BackboneDepthNet(4, uncertainty=uncertainty)
     other, left = with_backbone(network, "lite2", torch.rand(6, 3, 64, 64))
     assert len(left) == 5 and all(0 <= share <= 1 for share in left)

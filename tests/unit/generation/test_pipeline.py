@@ -260,18 +260,26 @@ def test_networks_load_when_they_are_needed_and_stay(image: InputImage) -> None:
     assert pipeline.model.networks.monocular_depth is first
 
 
-def test_what_was_loaded_before_changes_nothing(image: InputImage) -> None:
-    whole = with_parts(priors_model(), PARTS)
-    for settings, prompt in (
-        (QUICK, "a ball rolls"),
-        (replace(QUICK, fill="video"), "a ball rolls"),
-        (replace(QUICK, still=True), None),
-    ):
-        scenes = [
-            Diff4SplatPipeline(model)(image, "left", prompt, settings=settings)
-            for model in (priors_model(), whole)
-        ]
-        assert_same_scene(*scenes)
+@pytest.mark.parametrize(
+    ("change", "prompt"),
+    [
+        ({}, "a ball rolls"),
+        ({"fill": "video"}, "a ball rolls"),
+        ({"still": True}, None),
+        pytest.param({}, None, marks=pytest.mark.slow),
+        pytest.param({"fill": "video"}, None, marks=pytest.mark.slow),
+        pytest.param({"still": True}, "a ball rolls", marks=pytest.mark.slow),
+    ],
+)
+def test_what_was_loaded_before_changes_nothing(
+    change: dict[str, object], prompt: str | None, image: InputImage
+) -> None:
+    settings = replace(QUICK, **change)
+    scenes = [
+        Diff4SplatPipeline(model)(image, "left", prompt, settings=settings)
+        for model in (priors_model(), with_parts(priors_model(), PARTS))
+    ]
+    assert_same_scene(*scenes)
 
 
 def test_a_model_without_trained_priors_shows_the_image_on_a_plane(

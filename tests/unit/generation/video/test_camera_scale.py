@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import pytest
 import torch
@@ -64,7 +65,14 @@ def video(unit: float = 1.0, step: float = STEP) -> InputVideo:
     )
 
 
-@pytest.mark.parametrize(("unit", "depth"), [(1e-4, 3.0), (250.0, 3.22), (1.0, 5.0), (0.3, 5.0)])
+QUICK = {(1e-4, 3.0), (250.0, 3.22), (1.0, 5.0), (0.3, 5.0)}
+UNITS_AND_DEPTHS = [
+    pair if pair in QUICK else pytest.param(*pair, marks=pytest.mark.slow)
+    for pair in product((1e-4, 0.3, 1.0, 250.0), (3.0, 3.22, 5.0))
+]
+
+
+@pytest.mark.parametrize(("unit", "depth"), UNITS_AND_DEPTHS)
 def test_the_unit_is_found_whatever_it_is(unit: float, depth: float) -> None:
     """The plane lies at DEPTH · unit in the capture and at ``depth`` for the prior."""
     scale = find_camera_scale(model_that_sees(depth), video(unit))
