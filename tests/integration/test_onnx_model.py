@@ -177,10 +177,25 @@ assert not [name for name in sys.modules if name.startswith("diff4splat.models")
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("damage", ["graph", "config", "another graph", "manifest"])
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        ("graph", "text_encoder.onnx: expected SHA-256"),
+        ("config", "config.json: expected SHA-256"),
+        ("another graph", "text_encoder.onnx: expected SHA-256"),
+        ("manifest", "expected a manifest of ONNX graphs"),
+    ],
+)
 def test_a_changed_folder_is_refused_before_anything_runs(
-    exported: Path, photo: Path, tmp_path: Path, damage: str, capsys: pytest.CaptureFixture
+    exported: Path,
+    photo: Path,
+    tmp_path: Path,
+    damage: str,
+    says: str,
+    capsys: pytest.CaptureFixture,
 ) -> None:
+    import onnx
+
     folder = copytree(exported, tmp_path / "copy", symlinks=True)
     file = folder / "text_encoder.onnx"
     if damage == "graph":
@@ -188,12 +203,16 @@ def test_a_changed_folder_is_refused_before_anything_runs(
     elif damage == "config":
         (folder / "config.json").write_text((folder / "config.json").read_text() + " ")
     elif damage == "another graph":
-        convert_precision(file, "float16")
+        other = onnx.load(file)
+        other.producer_name = "another"
+        onnx.save(other, file)
     else:
         (folder / MANIFEST_FILE).write_text("{}")
     out = tmp_path / "scene"
-    assert run(["generate", str(photo), "--model", str(folder), "--out", str(out)]) == 2
-    assert "export the model again" in capsys.readouterr().err
+    command = ["generate", str(photo), "--model", str(folder), "--prompt", "a cube slides"]
+    assert run([*command, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert says in error and "export the model again" in error
     assert not out.exists()
 
 
