@@ -15,14 +15,12 @@ from diff4splat.generation.layered_image.gaussians import GaussianSet
 from diff4splat.generation.scene_assembly import joined
 from diff4splat.generation.video.video_fill import VideoFill
 from diff4splat.geometry.camera import Camera
-from diff4splat.render.api import render
-from diff4splat.render.settings import RenderSettings
+from diff4splat.render.api import UNDILATED, render
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import DEGREE_ZERO
 
 MAX_VISIBLE_PX = 0.05
 """Pixels of the input view that one Gaussian of the fill may cover."""
-UNDILATED = RenderSettings(dilation_px2=0.0)
 
 
 def without_visible(fill: VideoFill, image: GaussianSet, camera: Camera) -> VideoFill:

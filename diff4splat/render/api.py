@@ -35,6 +35,8 @@ from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
 
 DEFAULTS = RenderSettings()
+UNDILATED = RenderSettings(dilation_px2=0.0)
+"""As scenes made from images are rendered (ADR 24)."""
 
 
 def _nothing() -> None:

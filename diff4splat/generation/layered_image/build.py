@@ -3,7 +3,8 @@
     image and maps ─ upsample ─ smooth, align edges ─ grow foreground ─ pixels ─ infill  these show
     pixels ─┬─ occluded layers ─┬─ infill                        the image; all others extend
             │                   └─ ground                            it into what it hides
-            └─ disoccluded layer ─ fine border
+            └─ disoccluded layer ─┬─ fine border
+                                  └─ sharp colours
     smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving ─ colours of the ground
                            └─ border extension ─┘  objects disocclude
 
@@ -32,6 +33,8 @@ from diff4splat.generation.layered_image.disoccluded.occluded_layer import (
     OccludedLayers,
     occluded_layers,
 )
+from diff4splat.generation.layered_image.disoccluded.patch_texture import with_patch_texture
+from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sharp_colors
 from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
@@ -83,9 +86,11 @@ def build_layered_image(
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
     if occluded.ground is not None:
         hidden = [with_ground_colors(layer, pixels, occluded.ground) for layer in hidden]
-    if (disoccluded := disoccluded_layer(pixels, inpaint_hole)) is not None:
+    inpaint_behind = textured if inpaint is None else with_patch_texture(inpaint)
+    if (disoccluded := disoccluded_layer(pixels, inpaint_behind)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
-        hidden = [disoccluded, *(without_disoccluded(layer, moving) for layer in hidden)]
+        layer = disoccluded if inpaint is None else with_sharp_colors(disoccluded)
+        hidden = [layer, *(without_disoccluded(each, moving) for each in hidden)]
     hidden += with_infill(occluded.all, maps)
     if border_cells:
         hidden += fine_borders(pixels, disoccluded, rings, inpaint)

@@ -17,13 +17,11 @@ from diff4splat.geometry.camera import Camera
 from diff4splat.models.hub.model import Model
 from diff4splat.models.video_dit.conditions import RenderCondition
 from diff4splat.paths.camera_path import CameraPath
-from diff4splat.render.api import render
-from diff4splat.render.settings import RenderSettings
+from diff4splat.render.api import UNDILATED, render
 from diff4splat.scene.gaussians import Gaussians
 
 MIN_COVERAGE = 0.5
 """Opacity of the image's own layers from which a pixel is valid."""
-UNDILATED = RenderSettings(dilation_px2=0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

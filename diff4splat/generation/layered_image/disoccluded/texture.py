@@ -8,12 +8,16 @@ import math
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
-from torch.nn.functional import avg_pool2d, interpolate
+from torch.nn.functional import interpolate
 
 from diff4splat.generation.layered_image.disoccluded.even_extension import even_colors
 from diff4splat.generation.layered_image.disoccluded.shift_map import shift_map, source_pixels
 from diff4splat.generation.layered_image.disocclusion import grown
-from diff4splat.generation.layered_image.windows import mean_around
+from diff4splat.generation.layered_image.windows import (
+    block_means,
+    means_around,
+    on_copy_of,
+)
 
 DETAIL_SHARE = 1 / 16
 """Of the image's longer side: the window over whose mean detail is what remains."""
@@ -46,29 +50,43 @@ def with_detail(
     rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"], even: Float[Tensor, "h w 3"]
 ) -> Float[Tensor, "h w 3"]:
     """``rgb`` where ``known``, not everywhere; else the ``even`` colours with fine detail."""
+    detail, likeness = patch_detail(rgb, known, even)
+    return torch.where(known[..., None], rgb, (even + detail * likeness).clamp(0, 1))
+
+
+def patch_detail(
+    rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"], even: Float[Tensor, "h w 3"]
+) -> tuple[Float[Tensor, "h w 3"], Float[Tensor, "h w 1"]]:
+    """Fine detail of shifted patches over ``even`` colours, and how alike their surfaces are.
+
+    Not everything may be ``known``; detail is zero where it is.
+    """
     rgb = torch.where(known[..., None], rgb, even)
     means = means_within_objects(rgb)
     rows, columns = _window(~known)
     detail = _bounded(torch.where(known[..., None], rgb - means, 0.0), known)
     shifts = _shifts(*(image[rows, columns] for image in (rgb, even, means, known)))
-    result, around = even.clone(), _means_around(rgb)
+    around = means_around(rgb, DETAIL_SHARE)
     detail, of_patch = (
-        shifted(each[rows, columns], known[rows, columns], shifts) for each in (detail, around)
+        _in_window(shifted(each[rows, columns], known[rows, columns], shifts), rows, columns, known)
+        for each in (detail, around)
     )
-    result[rows, columns] += detail * _likeness(around[rows, columns], of_patch)
-    return torch.where(known[..., None], rgb, result.clamp(0, 1))
+    return detail, _likeness(around, of_patch)
+
+
+def _in_window(
+    values: Float[Tensor, "y x 3"], rows: slice, columns: slice, known: Bool[Tensor, "h w"]
+) -> Float[Tensor, "h w 3"]:
+    """Zero elsewhere."""
+    whole = values.new_zeros(*known.shape, 3)
+    whole[rows, columns] = values
+    return whole
 
 
 def _likeness(one: Float[Tensor, "h w 3"], other: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 1"]:
     """1 where mean colours are of one surface, 0 where they are of two."""
     difference = (one - other).square().mean(-1, keepdim=True)
     return torch.exp(-difference / (2 * LIKE_SIGMA**2))
-
-
-def _means_around(rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
-    """Of twice that window, whatever it shows: a pattern's is even."""
-    reach = math.ceil(DETAIL_SHARE * max(rgb.shape[:2]))
-    return torch.stack([mean_around(channel, reach) for channel in rgb.unbind(-1)], -1)
 
 
 def _shifts(
@@ -79,8 +97,8 @@ def _shifts(
 ) -> Int[Tensor, "h w 2"]:
     """Sought in a smaller copy."""
     step = math.ceil(max(known.shape) / MAX_SIDE_PX)
-    complete = _reduced(known[..., None].to(rgb), step)[..., 0] == 1
-    found = shift_map(*(_reduced(image, step) for image in (rgb, even, means)), complete)
+    complete = block_means(known[..., None].to(rgb), step)[..., 0] == 1
+    found = shift_map(*(block_means(image, step) for image in (rgb, even, means)), complete)
     return _enlarged(found * step, step, known.shape)
 
 
@@ -99,13 +117,6 @@ def _bounded(detail: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Floa
     return detail.clamp(-bound, bound)
 
 
-def _reduced(image: Float[Tensor, "h w c"], step: int) -> Float[Tensor, "hs ws c"]:
-    """Means of ``step`` × ``step`` pixels."""
-    planes = image.movedim(-1, 0)[None]
-    small = avg_pool2d(planes, step, ceil_mode=True, count_include_pad=False)
-    return small[0].movedim(0, -1)
-
-
 def _enlarged(shifts: Int[Tensor, "hs ws 2"], step: int, shape: torch.Size) -> Int[Tensor, "h w 2"]:
     planes = shifts.movedim(-1, 0)[None].double()
     large = interpolate(planes, scale_factor=float(step), mode="nearest")[0].movedim(0, -1)
@@ -117,6 +128,10 @@ def means_within_objects(rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
 
     A joint bilateral filter (Petschnigg et al. 2004) whose guide is the blurred image.
     """
+    return on_copy_of(rgb, _bilateral_means)
+
+
+def _bilateral_means(rgb: Float[Tensor, "hs ws 3"]) -> Float[Tensor, "hs ws 3"]:
     # OpenCV takes a tenth of a second to load, which static small images need not wait for.
     import cv2
 

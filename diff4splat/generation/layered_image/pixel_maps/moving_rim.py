@@ -1,7 +1,8 @@
 """Pixels of mixed colour at the edge of what moves go along with it (ours, ADR 25).
 
 Axes: ``h w`` pixels, ``t`` latent frames. The mask belongs to a smaller copy, so a pixel of the
-image beside it may show a bit of the object. Left behind, such pixels draw its outline.
+image beside it may show a bit of the object. Left behind, such pixels draw its outline. JPEG has
+half as many pixels of chroma, so beside an object grass may have its tint and yet be dark as grass.
 """
 
 import torch
@@ -24,7 +25,9 @@ def with_moving_rim(
     if not bool(moving.any()) or bool(moving.all()):
         return depth, displacement
     beside = grown(moving, RIM_PX) & ~moving
-    joins = beside & (likeness(moving, beside, rgb) > LEAST_LIKENESS)
+    chroma = rgb - rgb.mean(-1, keepdim=True)
+    alike = [likeness(moving, beside, colors) for colors in (rgb, chroma)]
+    joins = beside & (torch.maximum(*alike) > LEAST_LIKENESS)
     own = torch.arange(depth.numel(), device=depth.device).view_as(depth)
     source = torch.where(joins, nearest_inside(moving), own)
     return depth.flatten()[source], displacement.flatten(1, 2)[:, source]

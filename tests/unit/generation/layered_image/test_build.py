@@ -13,7 +13,10 @@ from diff4splat.generation.layered_image.build import (
     farthest_depth,
     with_infill,
 )
+from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layers
+from diff4splat.generation.layered_image.disoccluded.patch_texture import with_patch_texture
+from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sharp_colors
 from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
@@ -251,3 +254,18 @@ def test_a_network_colours_every_layer_of_what_is_hidden_at_the_size_of_the_imag
         assert torch.equal(one.depth, other.depth) and torch.equal(one.mask, other.mask)
     for hidden in found[5:]:
         assert bool((hidden.rgb[hidden.mask] == 0.5).all(-1).any())
+
+
+def test_behind_what_moves_lie_the_texture_of_patches_and_sharp_colours() -> None:
+    def grey(rgb: Tensor, known: Tensor) -> Tensor:
+        return torch.where(known[..., None], rgb, 0.5)
+
+    moving = torch.zeros(3, *SMALL, 3)
+    moving[1:, 3:5, 10:12, 0] = 0.5
+    layers = with_box(displacement=moving, inpaint=grey).layers
+    plain, textured = (
+        disoccluded_layer(layers[0], each) for each in (grey, with_patch_texture(grey))
+    )
+    expected = with_sharp_colors(textured).rgb
+    assert torch.equal(layers[2].rgb, expected)
+    assert not torch.equal(expected, textured.rgb) and not torch.equal(textured.rgb, plain.rgb)

@@ -13,7 +13,6 @@ from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.types import LayeredImage
 from diff4splat.generation.video.render_condition import (
     MIN_COVERAGE,
-    UNDILATED,
     RenderedImage,
     encode_condition,
     render_layered_image,
@@ -21,7 +20,7 @@ from diff4splat.generation.video.render_condition import (
 from diff4splat.models.config.sizes import test_size as tiny_size
 from diff4splat.models.factory import create_networks
 from diff4splat.models.hub.model import Model
-from diff4splat.render.api import render
+from diff4splat.render.api import UNDILATED, render
 
 SIZE_PX, FOCAL_PX, DEPTH = (32, 48), 40.0, 4.0
 STEP = 3 * DEPTH / FOCAL_PX

@@ -33,6 +33,14 @@ def test_pixels_that_show_a_bit_of_the_object_move_with_it(share: float, joins: 
     assert not bool(displacement[0].any())
 
 
+def test_dark_pixels_with_the_tint_of_the_object_move_with_it() -> None:
+    """As JPEG makes them: the chroma of both, the brightness of the background alone."""
+    image = 0.3 * _image(0.4)
+    image[MASK] += 0.6
+    _, displacement = with_moving_rim(*_maps(), image)
+    assert torch.equal(displacement[1].any(-1), MASK | MIXED)
+
+
 @pytest.mark.parametrize("moving", [False, True])
 def test_nothing_changes_where_nothing_or_everything_moves(moving: bool) -> None:
     depth, displacement = (
