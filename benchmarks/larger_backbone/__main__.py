@@ -1,4 +1,7 @@
-"""Write a model to train further: ``python -m benchmarks.larger_backbone --out start``."""
+"""Write a model to train further: ``python -m benchmarks.larger_backbone --model M --out start``.
+
+``M`` is a model whose depth prior has another backbone.
+"""
 
 import argparse
 from collections.abc import Iterator
@@ -27,13 +30,16 @@ INPUT_PX = 128
 
 
 def main() -> None:
-    """The bundled model, its depth prior on the larger backbone."""
+    """The model, its depth prior on another backbone."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--size", choices=get_args(BackboneSize), default="lite2")
+    parser.add_argument("--model", required=True)
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     size: BackboneSize = arguments.size
-    model = load_model("small")
+    model = load_model(arguments.model)
+    if model.config.monocular_depth.backbone_size == size:
+        parser.error(f"--model: expected another backbone than {size}, got it; name one in --size")
     images = torch.from_numpy(np.stack(list(windows()))).movedim(-1, 1) / 255
     depth, left = with_backbone(model.networks.monocular_depth, size, images)
     config = replace(model.config.monocular_depth, backbone_size=size)

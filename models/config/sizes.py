@@ -66,7 +66,11 @@ def small_size() -> ModelConfig:
         activation=ActivationConfig(),
         refinement=RefinementConfig(channels=48, depth_prior=True),
         monocular_depth=MonocularDepthConfig(
-            channels=32, photo_scale=2, image_backbone=True, uncertainty=True
+            channels=32,
+            photo_scale=2,
+            image_backbone=True,
+            backbone_size="lite2",
+            uncertainty=True,
         ),
         motion_unet=MotionUNetConfig(width=64, mask_refiner_width=32, input_scale=2),
         object_mask=ObjectMaskConfig(

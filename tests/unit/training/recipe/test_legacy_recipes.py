@@ -68,7 +68,13 @@ STAGES_OF_SMALL = (
 def since(old: ModelConfig, new: ModelConfig) -> ModelConfig:
     """Sets what the first release did not know and this one sets for ``small``."""
     assert old.monocular_depth.photo_scale == old.motion_unet.input_scale == 1
-    prior = replace(old.monocular_depth, photo_scale=2, image_backbone=True, uncertainty=True)
+    prior = replace(
+        old.monocular_depth,
+        photo_scale=2,
+        image_backbone=True,
+        backbone_size="lite2",
+        uncertainty=True,
+    )
     return replace(
         old,
         monocular_depth=prior,
