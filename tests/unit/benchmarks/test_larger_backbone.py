@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from benchmarks.larger_backbone.__main__ import main
 from benchmarks.larger_backbone.fitted_start import fit, with_backbone
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
@@ -45,3 +46,13 @@ def test_all_but_the_backbone_and_what_joins_it_is_kept(
         elif not name.startswith("lateral."):
             assert torch.equal(value, before[name])
     assert all(bool(value.isfinite().all()) for value in other.state_dict().values())
+
+
+def test_the_backbone_that_a_model_has_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr("sys.argv", ["larger_backbone", "--model", "small", "--out", "nowhere"])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    assert "expected another backbone than lite2" in capsys.readouterr().err

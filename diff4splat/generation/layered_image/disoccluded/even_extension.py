@@ -9,6 +9,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from diff4splat.generation.layered_image.windows import block_means
+
 SWEEPS = 40
 """Averages with the neighbours, per level of the pyramid."""
 
@@ -24,8 +26,9 @@ def extended_evenly(
         return values
     if min(values.shape) > 1:
         size = [math.ceil(side / 2) for side in values.shape]
-        share = _pooled(known.to(values))
-        coarse = _pooled(torch.where(known, values, 0.0)) / share.clamp_min(1e-6)
+        both = torch.stack([known.to(values), torch.where(known, values, 0.0)], -1)
+        share, total = block_means(both, 2).unbind(-1)
+        coarse = total / share.clamp_min(1e-6)
         start = _enlarged(extended_evenly(coarse, share > 0), size, values.shape)
     else:
         start = values[known].mean().expand_as(values)
@@ -40,13 +43,6 @@ def extended_evenly(
 def even_colors(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:
     """The same for every channel of an image."""
     return torch.stack([extended_evenly(channel, known) for channel in rgb.unbind(-1)], -1)
-
-
-def _pooled(values: Float[Tensor, "h w"]) -> Float[Tensor, "h2 w2"]:
-    """Means of 2 × 2 cells; those at the border count what is there."""
-    return torch.nn.functional.avg_pool2d(
-        values[None, None], 2, ceil_mode=True, count_include_pad=False
-    )[0, 0]
 
 
 def _enlarged(
