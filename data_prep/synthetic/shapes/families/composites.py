@@ -5,6 +5,7 @@ A network that only sees the families of the registry learns their outlines by h
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float64
@@ -32,6 +33,10 @@ MIRRORED_SHARE, TURNED_SHARE, TAPERED_SHARE, TWISTED_SHARE = 0.5, 0.4, 0.3, 0.25
 ONE_ROLE_SHARE = 0.5
 FIRST_SIZES, OTHER_SIZES = (0.5, 1.0), (0.2, 0.8)
 """Along each axis, log-uniform, before the object is scaled."""
+THIN_SHARE, THIN_SIZES = 0.15, (0.03, 0.12)
+"""Of pieces whose third axis is thin: sheets, discs and flat rings."""
+WALL_SHARES = (0.04, 0.3)
+"""Thickness of a hollow body's wall over its radius, log-uniform."""
 ROLES = ("painted", "toy", "coat", "machine", "ceramic", "wood", "staves", "pot", "accent", "fence")
 
 
@@ -61,6 +66,8 @@ def _piece(sizes: tuple[float, float], rng: Rng) -> Surface:
     piece = make(rng.child("primitive"))
     low, high = piece.vertices.min(0), piece.vertices.max(0)
     wanted = np.array([rng.log_uniform(*sizes) for _ in range(3)])
+    if rng.bernoulli(THIN_SHARE):
+        wanted[2] = rng.log_uniform(*THIN_SIZES)
     factor = wanted / np.maximum(high - low, 1e-6)
     piece = replace(piece, vertices=(piece.vertices - (low + high) / 2) * factor)
     return piece.turned(_turn(rng))
@@ -157,6 +164,24 @@ def _tube(rng: Rng) -> Surface:
     return tube(path, np.full(10, rng.uniform(0.08, 0.3)), 10)
 
 
+def _pipe(rng: Rng) -> Surface:
+    """Open at both ends."""
+    inner, narrow = 1.0 - rng.log_uniform(*WALL_SHARES), rng.uniform(0.6, 1.0)
+    corners = [(narrow, 1.0), (1.0, 0.0), (inner, 0.0), (inner * narrow, 1.0), (narrow, 1.0)]
+    return revolved([list(pair) for pair in pairwise(corners)], 20)
+
+
+def _vessel(rng: Rng) -> Surface:
+    """Open at the top, with a floor: a bowl, a cup or a bucket."""
+    heights = np.linspace(1.0, 0.0, rng.integer(2, 4))
+    knots = [(rng.log_uniform(0.5, 1.0), float(height)) for height in heights]
+    wall = 1.0 - rng.log_uniform(*WALL_SHARES)
+    outer = smooth_profile(knots, 3)
+    inner = [(wall * radius, height) for radius, height in outer if height > 1.0 - wall]
+    foot, floor = [outer[-1], (0.0, 0.0)], [(0.0, inner[-1][1]), inner[-1]]
+    return revolved([outer, foot, floor, inner[::-1], [inner[0], outer[0]]], 16)
+
+
 PRIMITIVES: tuple[Callable[[Rng], Surface], ...] = (
     _superquadric,
     _box,
@@ -166,4 +191,6 @@ PRIMITIVES: tuple[Callable[[Rng], Surface], ...] = (
     _ring,
     _lump,
     _tube,
+    _pipe,
+    _vessel,
 )

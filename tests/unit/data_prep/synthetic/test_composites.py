@@ -6,6 +6,7 @@ import pytest
 from diff4splat.captions.grammar import parse_caption
 from diff4splat.captions.vocabulary import NOUNS, UNNAMED
 from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.families import composites
 from diff4splat.data_prep.synthetic.shapes.families.composites import PRIMITIVES, make_composite
 from diff4splat.data_prep.synthetic.shapes.registry import COMPOSITE
 from diff4splat.data_prep.synthetic.shapes.surfaces.surface import signed_volume
@@ -20,6 +21,36 @@ SMALL = {"frames": 3, "views": 1, "size_px": (32, 32), "still_share": 0.0}
 def test_primitives_are_closed_and_have_a_volume(make) -> None:
     for seed in range(20):
         assert signed_volume(make(Rng("primitive", seed))) > 0
+
+
+def _on_axis(surface) -> np.ndarray:
+    """Heights at which the body meets its axis."""
+    vertices = surface.vertices
+    return -vertices[np.linalg.norm(vertices[:, [0, 2]], axis=1) < 0.2, 1]
+
+
+def test_pipes_are_open_at_both_ends_and_vessels_at_the_top() -> None:
+    for seed in range(20):
+        assert len(_on_axis(composites._pipe(Rng("pipe", seed)))) == 0
+        meets = _on_axis(composites._vessel(Rng("vessel", seed)))
+        assert meets.min() == pytest.approx(0.0, abs=1e-9) and 0.0 < meets.max() <= 0.5
+
+
+def test_walls_of_hollow_bodies_have_a_volume_without_crossing() -> None:
+    for seed in range(20):
+        for make in (composites._pipe, composites._vessel):
+            piece = make(Rng("wall", seed))
+            low, high = piece.vertices.min(0), piece.vertices.max(0)
+            solid = np.pi / 4 * np.prod(high - low)
+            assert 0.0 < signed_volume(piece) < 0.75 * solid
+
+
+def test_some_pieces_are_thin() -> None:
+    pieces = [composites._piece(composites.FIRST_SIZES, Rng("thin", seed)) for seed in range(200)]
+    # The smallest singular value of a cloud of corners is small where the piece is a sheet.
+    spans = [np.linalg.svd(piece.vertices - piece.vertices.mean(0))[1] for piece in pieces]
+    thin = np.array([span[2] < 0.2 * span[0] for span in spans])
+    assert 0.08 < thin.mean() < 0.35
 
 
 def test_many_draws_are_well_made() -> None:
