@@ -2,10 +2,11 @@
 
     inpainted image ─┬─ means within objects ─┬─ colours
                      └─ its own detail ───────┤
-    image ─ detail of shifted patches ────────┘ where both are of one texture
+    image ─ detail of shifted patches ────────┘ where it belongs to this surface
 
 Axes: ``h w`` pixels. MI-GAN repeats fine textures in steps of 16 pixels: a meadow gets rows. It
-does know how much detail belongs where, and which surface goes on there.
+does know which surface goes on there. How much detail belongs there it often knows too; else the
+image around says so, where it has as much of it everywhere.
 """
 
 import torch
@@ -23,6 +24,9 @@ EVEN_SHARE, EVEN_SIGMA = 1 / 12, 0.06
 """Window over the longer side, and deviation of its mean colours at which several surfaces meet."""
 DETAIL_SHARE, AGREEMENT_POWER = 1 / 24, 6
 """Window over the longer side in which strengths of detail are compared, and how strictly."""
+AROUND_SHARE, AROUND_SIGMA = 1 / 4, 2.0
+"""Reach of what counts as around, over the longer side; and deviation of the logarithm of strength
+at which it is of several textures."""
 LEAST_ENERGY = 1e-6
 """Detail that cannot be seen."""
 
@@ -46,7 +50,7 @@ def textured_by_patches(
     means = means_within_objects(inpainted)
     own = inpainted - means
     detail, likeness = patch_detail(inpainted, known, means)
-    weight = likeness * _evenness(means) * _agreement(own, detail, ~known)
+    weight = likeness * _evenness(means) * _plausibility(own, detail, known[..., None])
     return torch.where(
         known[..., None], inpainted, (inpainted + weight * (detail - own)).clamp(0, 1)
     )
@@ -59,15 +63,46 @@ def _evenness(means: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 1"]:
     return torch.exp(-variance / (2 * EVEN_SIGMA**2))
 
 
-def _agreement(
-    one: Float[Tensor, "h w 3"], other: Float[Tensor, "h w 3"], hole: Bool[Tensor, "h w"]
+def _plausibility(
+    own: Float[Tensor, "h w 3"], detail: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w 1"]
 ) -> Float[Tensor, "h w 1"]:
-    """1 where detail is equally strong in the hole, 0 where one has none."""
-    share = means_around(hole[..., None].to(one), DETAIL_SHARE).clamp_min(LEAST_ENERGY)
-    inside = [torch.where(hole[..., None], each, 0.0) for each in (one, other)]
-    energies = [
-        means_around(each.square().sum(-1, keepdim=True), DETAIL_SHARE) / share + LEAST_ENERGY
-        for each in inside
-    ]
-    geometric = (energies[0] * energies[1]).sqrt()
-    return (2 * geometric / (energies[0] + energies[1])) ** AGREEMENT_POWER
+    """1 where ``detail`` is as strong as the network's own, or as the image's evenly is around."""
+    strength = _strength(detail, ~known)
+    typical, sameness = _around(_strength(own, known), known)
+    return torch.maximum(
+        _agreement(_strength(own, ~known), strength), sameness * _agreement(typical, strength)
+    )
+
+
+def _strength(
+    detail: Float[Tensor, "h w 3"], where: Bool[Tensor, "h w 1"]
+) -> Float[Tensor, "h w 1"]:
+    """Mean square of the pixels ``where`` in the window around each."""
+    share = means_around(where.to(detail), DETAIL_SHARE).clamp_min(LEAST_ENERGY)
+    energy = torch.where(where, detail.square().sum(-1, keepdim=True), 0.0)
+    return means_around(energy, DETAIL_SHARE) / share + LEAST_ENERGY
+
+
+def _around(
+    strength: Float[Tensor, "h w 1"], known: Bool[Tensor, "h w 1"]
+) -> tuple[Float[Tensor, "h w 1"], Float[Tensor, "h w 1"]]:
+    """Typical strength of the known pixels around each, and how far it is the same everywhere.
+
+    A geometric mean, which a stroke hardly changes. The second is 0 where nothing is known.
+    """
+    weight = known.to(strength)
+    logarithm = strength.log()
+    share = means_around(weight, AROUND_SHARE)
+    mean, square = (
+        means_around(weight * each, AROUND_SHARE) / share.clamp_min(LEAST_ENERGY)
+        for each in (logarithm, logarithm.square())
+    )
+    sameness = torch.exp(-(square - mean.square()).clamp_min(0) / (2 * AROUND_SIGMA**2))
+    return mean.exp(), torch.where(share > LEAST_ENERGY, sameness, 0.0)
+
+
+def _agreement(
+    one: Float[Tensor, "h w 1"], other: Float[Tensor, "h w 1"]
+) -> Float[Tensor, "h w 1"]:
+    """1 where both are equally strong, 0 where one is far stronger."""
+    return (2 * (one * other).sqrt() / (one + other)) ** AGREEMENT_POWER

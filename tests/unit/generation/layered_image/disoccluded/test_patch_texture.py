@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from diff4splat.generation.layered_image.disoccluded import patch_texture
 from diff4splat.generation.layered_image.disoccluded.patch_texture import (
     textured_by_patches,
     with_patch_texture,
@@ -43,12 +44,40 @@ def test_what_is_known_stays_and_colours_are_colours() -> None:
     assert float(found.min()) >= 0 and float(found.max()) <= 1
 
 
-def test_a_smooth_guess_beside_a_texture_stays_smooth() -> None:
-    """The network expects another surface there: the wall behind what stands on the meadow."""
-    image = torch.where(HOLE[..., None], torch.tensor([0.3, 0.5, 0.2]), _meadow(0.5))
-    found = textured_by_patches(image, ~HOLE)
-    middle = found[16:32, 16:32]
-    assert float(middle.diff(dim=1).abs().mean()) < 0.02  # 0.1 with patches everywhere
+def _smooth(image: Tensor) -> Tensor:
+    """The hole without any detail."""
+    return torch.where(HOLE[..., None], torch.tensor([0.3, 0.5, 0.2]), image)
+
+
+def _detail(image: Tensor) -> float:
+    return float(image[16:32, 16:32].diff(dim=1).abs().mean())
+
+
+def test_a_smooth_guess_amid_one_texture_gets_it() -> None:
+    meadow = _meadow(0.5)
+    found = textured_by_patches(_smooth(meadow), ~HOLE)
+    assert _detail(found) > 0.4 * _detail(meadow)  # 0 by the network's strength alone
+
+
+def test_a_smooth_guess_stays_where_the_texture_is_not_the_same_all_around() -> None:
+    """A pole on a wall of one colour: patches of it would put another one into the hole."""
+    image = torch.tensor([0.3, 0.5, 0.2]).expand(SIDE, SIDE, 3).clone()
+    image[:, 38:42] = _meadow(0.5)[:, 38:42]
+    found = textured_by_patches(_smooth(image), ~HOLE)
+    assert _detail(found) < 0.01
+
+
+def test_around_one_texture_is_the_same_and_around_several_is_not() -> None:
+    known = ~HOLE[..., None]
+    one = torch.full((SIDE, SIDE, 1), 0.02)
+    typical, sameness = patch_texture._around(one, known)
+    torch.testing.assert_close(typical, one)
+    assert float(sameness.min()) > 0.999
+    stroke, halves = one.clone(), one.clone()
+    stroke[:, 40:42], halves[:, : SIDE // 2] = 2.0, 1e-5
+    assert float(patch_texture._around(stroke, known)[0][HOLE].max()) < 0.1  # its mean: 0.6
+    assert float(patch_texture._around(halves, known)[1][24, 24]) < 0.4
+    assert float(patch_texture._around(one, torch.zeros_like(known))[1].max()) == 0
 
 
 def test_where_two_surfaces_meet_the_network_decides() -> None:
