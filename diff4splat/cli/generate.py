@@ -1,12 +1,10 @@
 """``diff4splat generate``: one photograph, a camera path and optional text to a scene folder.
 
-photograph ─ load_image ───┐
---camera ── read_inputs ───┼─ Diff4SplatPipeline ─ Scene ─ render_into ─ write_scene_folder
---prompt ── require_prompt ┘
+The options, and what is checked of them; the work is in ``cli/generation``.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,39 +12,23 @@ import tyro
 
 from diff4splat.cli.limits.options import LimitOptions
 from diff4splat.cli.options.adapter import AdapterFolder, require_video_model
-from diff4splat.cli.options.camera import CameraOptions, choose_path, read_preset, require_camera
+from diff4splat.cli.options.camera import CameraOptions, require_camera
 from diff4splat.cli.options.constraints import Number, OutFolder
 from diff4splat.cli.options.depth import (
     DepthFileOrName,
-    depth_file,
     require_depth_kind,
     require_one_photo,
 )
-from diff4splat.cli.options.device import render_device, require_device
 from diff4splat.cli.options.guard_overwrite import require_inputs_not_overwritten
 from diff4splat.cli.options.models import (
     ModelName,
     require_prompt_for,
     require_runtime,
 )
-from diff4splat.io.file_digest import file_sha256
 
 if TYPE_CHECKING:
-    from diff4splat.cli.limits.generation import Outcome
-    from diff4splat.generation.given_depth.source import DepthSource
-    from diff4splat.generation.inputs.input_image import InputImage
-    from diff4splat.generation.settings import GenerationSettings
-    from diff4splat.outputs.card import Result
-    from diff4splat.outputs.compressed_scene import SceneFileFacts
-    from diff4splat.paths.camera_path import CameraPath
-    from diff4splat.paths.preset_path import PresetPath
     from diff4splat.progress.phases import Phases
-    from diff4splat.progress.run_log import RunLog
     from diff4splat.scene.scene import Scene
-
-
-SEPARATE = ("options", "limits")
-"""Groups of options, whose members the card lists."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,180 +186,11 @@ class Generate:
         ``phases`` report instead of progress bars; ``on_scene`` gets the scene before it is
         rendered.
         """
+        from diff4splat.cli.generation.run import generate_scene
         from diff4splat.cli.limits.generation import Outcome, promise
         from diff4splat.cli.limits.stopwatch import Stopwatch
 
         watch = Stopwatch.of_process() if phases is None else Stopwatch.now()
         command, promised = promise(self)
         outcome = Outcome(asked=self, promised=promised, watch=watch)
-        command.run_promised(outcome, phases, on_scene)
-
-    def run_promised(
-        self,
-        outcome: "Outcome",
-        phases: "Phases | None" = None,
-        on_scene: "Callable[[Scene], None] | None" = None,
-    ) -> None:
-        """Generate with the settings as they are; ``outcome`` compares with what was expected."""
-        from diff4splat.cli.common.console import ConsolePhases, note
-        from diff4splat.generation.pipeline import Diff4SplatPipeline
-        from diff4splat.io.atomic import atomic_folder
-        from diff4splat.outputs.card import write_card
-        from diff4splat.outputs.file_names import OUTPUT_FILES
-        from diff4splat.progress.run_log import RunLog
-
-        settings, log = self.settings(), RunLog(phases=phases or ConsolePhases())
-        device = "cpu" if self.runtime_is_onnx() else require_device(self.device)
-        depth = self.given_depth()
-        input_image, path = self.read_inputs()
-        for line in outcome.promised.lines():
-            note(line)
-        with atomic_folder(self.out, OUTPUT_FILES) as folder:
-            pipeline = Diff4SplatPipeline.from_pretrained(self.model, self.lora)
-            pipeline.to(device, self.dtype)
-            scene = pipeline(
-                input_image,
-                path,
-                self.prompt,
-                seed=self.seed,
-                settings=settings,
-                log=log,
-                depth=depth,
-            )
-            if on_scene is not None:
-                on_scene(scene)
-            result, scene_file, lines = self.write_results(folder, scene, input_image, log)
-            inputs = self.inputs(input_image, settings, pipeline.model.config.fingerprint())
-            record = outcome.record(result)
-            write_card(folder / "card.json", result, inputs, log, scene_file, record)
-        for line in (*lines, *filter(None, [record["not_held"]]), f"wrote {self.out}"):
-            note(line)
-
-    def runtime_is_onnx(self) -> bool:
-        """Whether the model folder holds graphs, which stay on the CPU."""
-        from diff4splat.models.onnx.manifest import has_graphs
-
-        return has_graphs(Path(self.model))
-
-    def given_depth(self) -> "DepthSource | None":
-        """The network or map of --depth, opened."""
-        from diff4splat.generation.given_depth.source import open_depth
-
-        return None if self.depth is None else open_depth(depth_file(self.depth), self.depth_kind)
-
-    def write_results(
-        self, folder: Path, scene: "Scene", input_image: "InputImage", log: "RunLog"
-    ) -> tuple["Result", "SceneFileFacts", list[str]]:
-        """Render the scene and write every file but the card; returns lines about the result."""
-        from diff4splat.cli.common.console import note
-        from diff4splat.cli.common.precompile import precompile_renderer
-        from diff4splat.cli.common.skipped_gaussians import skipped_gaussians
-        from diff4splat.io.movies.background_movie import BackgroundMovie
-        from diff4splat.outputs.card import Result, describe
-        from diff4splat.outputs.filming import FilmRecord, empty_note
-        from diff4splat.outputs.scene_folder import (
-            frames_per_second,
-            render_into,
-            write_first_ply,
-            write_scene_folder,
-        )
-
-        precompile_renderer(scene.gaussians, log.phases)
-        if skipped := skipped_gaussians(scene, float(scene.path.times_s[0])):
-            note(skipped)
-        device = render_device(self.device)
-        record = FilmRecord(path=scene.path, with_depth=not self.skip_depth, device=device)
-        with BackgroundMovie(folder / self.video_name(), frames_per_second(scene.path)) as movie:
-            render_into(movie, scene, record, log)
-            result = Result.of(scene, input_image.rgb, record.first_rgb)
-            facts = describe(result, self.camera, input_image.focal_source)
-            scene_file = write_scene_folder(
-                folder, result, record, facts, log.phases, self.compression
-            )
-            if self.ply:
-                write_first_ply(scene, folder)
-            with log.phases.phase("write video"):
-                notes = movie.finish()
-        lines = [*notes, *(f"{name}: {value}" for name, value in facts)]
-        lines += [f"Scene file: {scene_file}", empty_note(scene, record)]
-        return result, scene_file, [line for line in lines if line]
-
-    def read_inputs(self) -> tuple["InputImage", "CameraPath | PresetPath"]:
-        """The photo at the model's size and the camera path, announced.
-
-        Presets are sized once the depth of the photo is known.
-        """
-        from diff4splat.cli.common.generation_notes import announce
-        from diff4splat.generation.inputs.input_cameras import path_frame, reconcile_intrinsics
-
-        input_image, preset = self.read_image(), read_preset(self.camera, self.options)
-        asked = choose_path(self.camera, path_frame(input_image.camera), self.options)
-        input_image, path = reconcile_intrinsics(input_image, asked)
-        announce(self, input_image, path)
-        return input_image, path if preset is None else preset
-
-    def video_name(self) -> str:
-        """The name of the video, which says its format."""
-        from diff4splat.io.movies.movie import default_suffix
-
-        return f"video.{self.video}" if self.video else f"video{default_suffix()}"
-
-    def settings(self) -> "GenerationSettings":
-        """Seed, prompt, sampling, guidance and pruning, checked before anything is loaded."""
-        from diff4splat.flow.guidance import DEFAULT_GUIDANCE
-        from diff4splat.generation.settings import (
-            GenerationSettings,
-            MotionSettings,
-            require_seed,
-        )
-        from diff4splat.models.hub.folders import find_config
-        from diff4splat.models.text_encoder.prompt import require_prompt
-
-        require_seed(self.seed)
-        if self.prompt is not None:
-            require_prompt(self.prompt, find_config(self.model).text.max_bytes)
-        given = {"steps": self.steps, "shift": self.shift}
-        if self.guidance is not None:
-            given["guidance"] = replace(DEFAULT_GUIDANCE, weight=self.guidance)
-        given = {name: value for name, value in given.items() if value is not None}
-        matching = {}
-        if self.color_matching_steps is not None:
-            matching["color_matching_steps"] = self.color_matching_steps
-        return GenerationSettings(
-            sampler=self.sampler,
-            latent_tolerance=self.latent_tolerance,
-            fill=self.fill,
-            negative_prompt=self.negative_prompt,
-            still=self.still,
-            min_opacity=self.min_opacity,
-            motion=MotionSettings(**given),
-            subpixel_infill=self.infill != "none",
-            **matching,
-            **given,
-        )
-
-    def read_image(self) -> "InputImage":
-        """The photograph at the model's size."""
-        from diff4splat.generation.inputs.image_size import find_image_size
-        from diff4splat.generation.inputs.input_image import load_image
-        from diff4splat.io.photos.images import photo_size
-
-        photo_px = photo_size(self.image)
-        side_px, multiple_px = find_image_size(
-            self.model, self.resolution, self.fill, photo_px, self.depth is not None
-        )
-        return load_image(self.image, side_px, self.fov, self.convert, multiple_px, self.fit)
-
-    def inputs(
-        self, input_image: "InputImage", settings: "GenerationSettings", model_fingerprint: str
-    ) -> dict[str, object]:
-        """Every setting as it was used, for the card."""
-        given = {name: value for name, value in asdict(self).items() if name not in SEPARATE}
-        given = {"image": self.image} | {name: given[name] for name in given if name != "images"}
-        given |= asdict(self.options) | asdict(self.limits)
-        given |= {"generation": asdict(settings)}
-        given |= {"focal_source": input_image.focal_source, "notes": input_image.notes}
-        given |= {"image_sha256": file_sha256(self.image), "model_fingerprint": model_fingerprint}
-        return {
-            name: str(value) if isinstance(value, Path) else value for name, value in given.items()
-        }
+        generate_scene(command, outcome, phases, on_scene)

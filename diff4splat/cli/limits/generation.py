@@ -74,12 +74,11 @@ def frame_count(command: "Generate") -> int:
         return command.options.frames
     if not command.camera.lower().endswith(FILE_SUFFIXES) and not Path(command.camera).is_file():
         return PRESET_FRAMES
+    from diff4splat.cli.generation.inputs import read_image
     from diff4splat.cli.options.camera import choose_path
     from diff4splat.generation.inputs.input_cameras import path_frame
 
-    return len(
-        choose_path(command.camera, path_frame(command.read_image().camera), command.options)
-    )
+    return len(choose_path(command.camera, path_frame(read_image(command).camera), command.options))
 
 
 def promise(command: "Generate") -> tuple["Generate", Promise]:
@@ -106,9 +105,10 @@ def promise(command: "Generate") -> tuple["Generate", Promise]:
 
 def measured_loss_db(command: "Generate", first_view: "Tensor") -> float:
     """What the first view loses against the photo at the size of the reference setting."""
+    from diff4splat.cli.generation.inputs import read_image
     from diff4splat.cli.limits.measured import frame_error
 
-    return round(loss_from_error(frame_error(first_view, command.read_image().rgb)), 4)
+    return round(loss_from_error(frame_error(first_view, read_image(command).rgb)), 4)
 
 
 def fixed(command: "Generate") -> SettingValues:
@@ -146,7 +146,9 @@ def _keeps_shape(command: "Generate", values: SettingValues, full_px: int) -> bo
 
 def photo_unit(command: "Generate", full_px: int) -> "Callable[[SettingValues], float]":
     """What the error of a setting is a share of, for this photo."""
-    rgb = command.read_image().rgb
+    from diff4splat.cli.generation.inputs import read_image
+
+    rgb = read_image(command).rgb
 
     def unit(values: SettingValues) -> float:
         small = with_setting(command, values, full_px)

@@ -1,0 +1,1 @@
+"""What ``diff4splat generate`` does once its options are checked."""
