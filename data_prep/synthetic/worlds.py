@@ -33,8 +33,8 @@ from diff4splat.geometry.camera import Camera
 ATTEMPTS = 60
 FPS = 8.0
 SHARES = (
-    "still_share", "against_share", "frozen_share", "composite_share", "mesh_share",
-    "furnished_share",
+    "still_share", "against_share", "frozen_share", "composite_share", "person_share",
+    "mesh_share", "furnished_share",
 )  # fmt: skip
 Names = tuple[str, ...] | None
 
@@ -65,6 +65,8 @@ class WorldRecipe:
     """Static objects before a surface, a corner, a room or open ground, seen from any side."""
     composite_share: float = 0.0
     """Share of objects that are random shapes without a name."""
+    person_share: float = 0.0
+    """Of the others, the share that are people without a name."""
     meshes: Path | None = None
     """A mesh library (``meshes/library.py``), for arrangements."""
     mesh_share: float = 0.0
@@ -111,6 +113,7 @@ class WorldRecipe:
             palettes=full.palettes.only(self.palettes, "palettes"),
             scenes=full.scenes.only(self.scenes, "scenes"),
             composite_share=self.composite_share,
+            person_share=self.person_share,
             meshes=None if self.meshes is None else open_library(self.meshes),
             mesh_share=self.mesh_share,
             furnished_share=self.furnished_share,
@@ -245,6 +248,7 @@ def world_identifier(recipe: WorldRecipe, index: int) -> str:
     kind = f"-rig{recipe.views}" if recipe.rig else "-free" if recipe.free_cameras else ""
     kind = "-arranged" if recipe.arrangements else kind
     kind += f"-composite{round(100 * recipe.composite_share)}" if recipe.composite_share else ""
+    kind += f"-person{round(100 * recipe.person_share)}" if recipe.person_share else ""
     if recipe.meshes is not None:
         shares = f"{round(100 * recipe.mesh_share)}-{round(100 * recipe.furnished_share)}"
         kind += f"-mesh{shares}-{open_library(recipe.meshes).digest}"

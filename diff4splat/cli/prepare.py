@@ -46,6 +46,8 @@ class PrepareSynthetic:
     """Static objects before walls, in rooms or on open ground, from any side; for depth."""
     composite_share: Annotated[float, Number(least=0, most=1)] = 0.0
     """Fraction of objects that are random shapes without a name."""
+    person_share: Annotated[float, Number(least=0, most=1)] = 0.0
+    """Fraction of the other objects that are people, without a name."""
     meshes: Annotated[Path | None, InputPath(what="a mesh library", folder=False)] = None
     """Mesh library (prepare meshes), for objects of --arrangements."""
     mesh_share: Annotated[float, Number(least=0, most=1)] = 0.5
@@ -88,6 +90,7 @@ class PrepareSynthetic:
             free_cameras=self.free_cameras,
             arrangements=self.arrangements,
             composite_share=self.composite_share,
+            person_share=self.person_share,
             meshes=self.meshes,
             mesh_share=self.mesh_share if self.meshes else 0.0,
             furnished_share=self.furnished_share if self.meshes else 0.0,

@@ -12,10 +12,14 @@ from diff4splat.data_prep.synthetic.arrangements.backdrops import Backdrop
 from diff4splat.data_prep.synthetic.arrangements.objects import Arranged
 from diff4splat.data_prep.synthetic.cameras import ViewSpec
 from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.registry import PERSON
 
 FOV_DEG = (28.0, 85.0)
 DISTANCES_M, PORTRAIT_RADII = (0.5, 3.2), (1.3, 3.2)
 MAX_TILT_DEG, OPEN_TILT_DEG = 85.0, 35.0
+FACED_SHARE, FACED_RADII = 0.7, (0.4, 1.3)
+"""Of the views of a person, those that a photographer would choose: level, of the upper half."""
+FACED_TILT_DEG, FACED_ROLL_DEG = (-15.0, 20.0), 6.0
 MAX_ROLL_DEG = 30.0
 LEAST_EYE_M = 0.12
 ATTEMPTS = 40
@@ -36,6 +40,8 @@ def _candidate(
     objects: list[Arranged], backdrop: Backdrop, rng: Rng, is_portrait: bool
 ) -> ViewSpec:
     target = rng.choice(objects)
+    if target.placed.family == PERSON and rng.child("faced").bernoulli(FACED_SHARE):
+        return _faced(target, rng.child("face"))
     fov_deg = rng.uniform(*FOV_DEG)
     jitter = 0.6 * target.radius_m if is_portrait else 0.8
     focus = target.center_m + jitter * rng.uniform_array(-1.0, 1.0, 3)
@@ -53,6 +59,23 @@ def _candidate(
         path="static",
         focus_m=(float(focus[0]), float(focus[1]), float(focus[2])),
         roll_rad=_roll_rad(backdrop, rng),
+        fov_deg=fov_deg,
+    )
+
+
+def _faced(person: Arranged, rng: Rng) -> ViewSpec:
+    """From the face down to the waist or the feet."""
+    fov_deg = rng.uniform(*FOV_DEG)
+    reach = person.radius_m / math.tan(math.radians(fov_deg) / 2)
+    aside, up = 0.25 * rng.uniform_array(-1.0, 1.0, 2), rng.uniform(0.0, 0.6)
+    focus = person.center_m + person.radius_m * np.array([aside[0], -up, aside[1]])
+    return ViewSpec(
+        azimuth_rad=rng.uniform(-np.pi, np.pi),
+        tilt_rad=math.radians(rng.uniform(*FACED_TILT_DEG)),
+        distance_m=max(reach * rng.uniform(*FACED_RADII), 1.1 * person.radius_m),
+        path="static",
+        focus_m=(float(focus[0]), float(focus[1]), float(focus[2])),
+        roll_rad=math.radians(rng.uniform(-FACED_ROLL_DEG, FACED_ROLL_DEG)),
         fov_deg=fov_deg,
     )
 

@@ -13,13 +13,14 @@ from jaxtyping import Float64
 from diff4splat.data_prep.synthetic.layout.floor_plan import PlacedObject
 from diff4splat.data_prep.synthetic.motions.context import rest_positions
 from diff4splat.data_prep.synthetic.rng import Rng
+from diff4splat.data_prep.synthetic.shapes.registry import PERSON
 from diff4splat.data_prep.synthetic.shapes.surfaces.surface import about_y
 from diff4splat.data_prep.synthetic.splits import Split
 
 SIZES_M, PORTRAIT_SIZES_M = (0.18, 1.1), (0.8, 1.5)
 LEAST, MOST, MOST_IN_PORTRAIT = 3, 10, 3
 UPRIGHT_SHARE, STANDING_SHARE = 0.5, 0.7
-MESH_UPRIGHT_SHARE = 0.8
+UPRIGHT_KIND_SHARE = 0.8
 """People, animals and furniture rarely lie."""
 SPREAD_M, LIFT_M = 1.3, 0.9
 HIGH_LIFT_M = (0.3, 3.0)
@@ -63,8 +64,8 @@ def _object(
     size = rng.log_uniform(*sizes_m)
     shape = shape.of_height(size / extent)
     turn = about_y(rng.uniform(0.0, 2 * np.pi))
-    is_mesh = shape.parts[0].image is not None
-    if not rng.bernoulli(MESH_UPRIGHT_SHARE if is_mesh else UPRIGHT_SHARE):
+    is_upright_kind = family == PERSON or shape.parts[0].image is not None
+    if not rng.bernoulli(UPRIGHT_KIND_SHARE if is_upright_kind else UPRIGHT_SHARE):
         turn = _any_turn(rng)
     parts = [part @ turn.T for part in rest_positions(shape)]
     points = np.concatenate([part.reshape(-1, 3) for part in parts])

@@ -16,6 +16,7 @@ from diff4splat.data_prep.synthetic.shapes.families import (
     composites,
     furniture,
     outlines,
+    people,
     plants,
     pottery,
     sheets,
@@ -51,8 +52,9 @@ def _family(
     )
 
 
-COMPOSITE = "composite"
-"""The family that no split has: only recipes with a share of it do."""
+COMPOSITE, PERSON = "composite", "person"
+OF_NO_SPLIT = frozenset({COMPOSITE, PERSON})
+"""Families that only recipes with a share of them have. No word of a caption names them."""
 _SOLID = "move spin hop drop soft"
 _ROUND = "move hop drop soft"
 FAMILIES: dict[str, Family] = {
@@ -178,5 +180,8 @@ FAMILIES: dict[str, Family] = {
         ((0.05, 1.2), (1.2, 5.0)),
         f"{_SOLID} tumble bounce hang orbit sway",
         "room table ground street",
+    ),
+    PERSON: _family(
+        people.make_person, UNNAMED, ((1.0, 2.0),), "move hop sway", "room ground street"
     ),
 }

@@ -17,7 +17,7 @@ from diff4splat.data_prep.synthetic.meshes.library import MeshLibrary
 from diff4splat.data_prep.synthetic.motions.registry import MOTIONS
 from diff4splat.data_prep.synthetic.palettes import PALETTES
 from diff4splat.data_prep.synthetic.rng import Rng
-from diff4splat.data_prep.synthetic.shapes.registry import COMPOSITE, FAMILIES
+from diff4splat.data_prep.synthetic.shapes.registry import COMPOSITE, FAMILIES, OF_NO_SPLIT, PERSON
 from diff4splat.data_prep.synthetic.shapes.shape import Shape
 from diff4splat.errors import ConfigError
 
@@ -60,6 +60,8 @@ class Split:
     scenes: Allowed
     composite_share: float = 0.0
     """Share of objects that are random shapes without a name."""
+    person_share: float = 0.0
+    """Of the others, the share that are people."""
     meshes: MeshLibrary | None = None
     mesh_share: float = 0.0
     """Share of objects of arrangements that come from ``meshes``."""
@@ -67,9 +69,11 @@ class Split:
     """Share of arrangements that are furnished with ``meshes``."""
 
     def draw_family(self, families: Sequence[str], rng: Rng) -> str:
-        """One of ``families``, or composites with their share."""
+        """One of ``families``, or composites and people with their shares."""
         if rng.child("composite").bernoulli(self.composite_share):
             return COMPOSITE
+        if rng.child("person").bernoulli(self.person_share):
+            return PERSON
         return rng.choice(families)
 
     def draw_shape(self, rng: Rng) -> tuple[str, Shape]:
@@ -84,7 +88,7 @@ class Split:
 def known_names() -> dict[str, frozenset[str]]:
     """All existing names, by list."""
     textures = {option.family for role in ROLES.values() for option in role.options}
-    tables = (FAMILIES.keys() - {COMPOSITE}, textures, MOTIONS, PALETTES, SCENE_KINDS)
+    tables = (FAMILIES.keys() - OF_NO_SPLIT, textures, MOTIONS, PALETTES, SCENE_KINDS)
     lists = ("families", "textures", "motions", "palettes", "scenes")
     return {name: frozenset(table) for name, table in zip(lists, tables, strict=True)}
 
