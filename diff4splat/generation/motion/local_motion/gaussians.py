@@ -5,21 +5,30 @@ Axes: ``k`` key times, ``m`` moving Gaussians of one object, ``n`` all.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
 from diff4splat.generation.layered_image.gaussians import GaussianSet, offset_motion
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
-from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX, hidden_side
+from diff4splat.generation.motion.local_motion.hidden_side import (
+    RIM_PX,
+    hidden_side,
+    interior_colors,
+)
 from diff4splat.generation.motion.local_motion.moving_object import MovingObject, MovingObjects
 from diff4splat.generation.scene_assembly import joined
-from diff4splat.geometry.camera import project
+from diff4splat.geometry.camera import Camera, project
 from diff4splat.geometry.depth import unproject
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
+
+OTHER_COLOR = 0.15
+"""Difference from the object's colours near by, in [0, 1], of a pixel that is not all of it."""
+GONE = math.log(0.02)
+"""Growth of what vanishes."""
 
 
 def with_local_motion(
@@ -42,16 +51,24 @@ def with_local_motion(
     key_times_s = result.motion.key_times_s
     for each, one in enumerate(objects.objects, 1):
         if one.local.shows_back:
-            result = joined(result, _hidden_side(layered.layers[0], each, objects, key_times_s))
+            visible = _visible_side(layered.layers[0], each, objects)
+            result = replace(result, motion=_without_rim(result, visible))
+            result = joined(result, _hidden_side(visible, one, key_times_s))
     return result, visible_count
 
 
 def object_number(means: Float[Tensor, "n 3"], objects: MovingObjects) -> Int[Tensor, " n"]:
     """Of the object at the pixel where the input view shows each point."""
-    height, width = objects.number.shape
-    pixels, _ = project(objects.camera, means)
+    return _at_pixels(objects.number, objects.camera, means)
+
+
+def _at_pixels(
+    values: Shaped[Tensor, "h w"], camera: Camera, means: Float[Tensor, "n 3"]
+) -> Shaped[Tensor, " n"]:
+    height, width = values.shape
+    pixels, _ = project(camera, means)
     column, row = pixels.nan_to_num(0).floor().long().unbind(-1)
-    return objects.number[row.clamp(0, height - 1), column.clamp(0, width - 1)]
+    return values[row.clamp(0, height - 1), column.clamp(0, width - 1)]
 
 
 def _does_not_follow(
@@ -90,18 +107,43 @@ def _following(
     return replace(motion, offsets=offsets, log_scale_offsets=growth)
 
 
-def _hidden_side(
-    pixels: ImageLayer, number: int, objects: MovingObjects, key_times_s: Float[Tensor, " k"]
-) -> GaussianSet:
-    """What the image hides of an object, with its motion."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _VisibleSide:
+    """What the image shows of one object."""
+
+    pixels: ImageLayer
+    inside: Bool[Tensor, "h w"]
+    mixed_px: int
+    """Width of the rim in which colours may be mixed with those around."""
+
+
+def _visible_side(pixels: ImageLayer, number: int, objects: MovingObjects) -> _VisibleSide:
     points = unproject(pixels.camera, pixels.depth)
     numbers = object_number(points.flatten(0, 1), objects).view_as(pixels.mask)
     inside = (numbers == number) & pixels.displacement.any(-1).any(0)
-    one = objects.objects[number - 1]
     # The mask is known to a pixel of the copy.
     cell_px = math.ceil(len(pixels.rgb) / len(objects.number))
-    gaussians = hidden_side(pixels, inside, float(one.frame.foot[2]), RIM_PX + 2 * cell_px)
-    index = torch.arange(len(gaussians), device=inside.device)
+    return _VisibleSide(pixels=pixels, inside=inside, mixed_px=RIM_PX + 2 * cell_px)
+
+
+def _without_rim(gaussian_set: GaussianSet, visible: _VisibleSide) -> KeyframeMotion:
+    """The motion in which pixels of other colours at the outline vanish once the object turns."""
+    motion, pixels = gaussian_set.motion, visible.pixels
+    own = interior_colors(pixels, visible.inside, visible.mixed_px)
+    rim = visible.inside & ((pixels.rgb - own).abs().amax(-1) > OTHER_COLOR)
+    means = gaussian_set.gaussians.means[motion.moving_index]
+    growth = motion.log_scale_offsets.clone()
+    growth[1:, _at_pixels(rim, pixels.camera, means)] = GONE
+    return replace(motion, log_scale_offsets=growth)
+
+
+def _hidden_side(
+    visible: _VisibleSide, one: MovingObject, key_times_s: Float[Tensor, " k"]
+) -> GaussianSet:
+    """What the image hides of an object, with its motion."""
+    middle_z = float(one.frame.foot[2])
+    gaussians = hidden_side(visible.pixels, visible.inside, middle_z, visible.mixed_px)
+    index = torch.arange(len(gaussians), device=visible.inside.device)
     at_rest = gaussians.means.new_zeros(2, len(index), 3)
     motion = offset_motion(index, at_rest, key_times_s)
     everything = torch.ones_like(index, dtype=torch.bool)

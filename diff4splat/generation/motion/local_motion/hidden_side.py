@@ -45,13 +45,13 @@ def hidden_side(
     scale = footprint_px * of_front / pixels.camera.focal_px[0]
     center = rays.mean(0)
     means = center * z[:, None] + (rays[row] - center) * of_front[:, None]
-    return _isotropic(means, scale, _colors(pixels, inside, mixed_px)[core][row])
+    return _isotropic(means, scale, interior_colors(pixels, inside, mixed_px)[core][row])
 
 
-def _colors(
+def interior_colors(
     pixels: ImageLayer, inside: Bool[Tensor, "h w"], mixed_px: int
 ) -> Float[Tensor, "h w 3"]:
-    """Of the nearest pixel whose colour is the object's alone; any where there is none."""
+    """Of the nearest pixel ``mixed_px`` from the outline; the image's own where there is none."""
     pure = ~grown(~inside, mixed_px)
     if not bool(pure.any()):
         return pixels.rgb

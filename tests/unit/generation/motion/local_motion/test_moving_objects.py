@@ -51,11 +51,14 @@ def maps(*, travel: float = 0.0, image_scale: float = 1.0) -> MovingMaps:
     )
 
 
-def followed(motion: str, given: MovingMaps | None = None) -> tuple[GaussianSet, int]:
-    """Gaussians of an image in which the square moves so."""
+def followed(
+    motion: str, given: MovingMaps | None = None, rgb: Tensor | None = None
+) -> tuple[GaussianSet, int]:
+    """Gaussians of an image in which the square, white by default, moves so."""
     moved, objects = with_moving_objects(given or maps(), [request(motion)], round_bodies=True)
     changes = {"displacement": moved.displacement, "in_image": True, "opacity": 0.999}
-    pixels = layer(moved.depth, rgb=moved.event[..., None].expand(-1, -1, 3).float(), **changes)
+    white = moved.event[..., None].expand(-1, -1, 3).float()
+    pixels = layer(moved.depth, rgb=white if rgb is None else rgb, **changes)
     image = layered(pixels)
     return with_local_motion(image_gaussians(image, KEY_TIMES_S), image, objects)
 
@@ -103,6 +106,25 @@ def test_what_turns_gets_a_back_that_the_input_view_does_not_see(motion: str) ->
     )
     seen, wanted = (rendered(one) for one in (found, front))
     assert float((seen - wanted).abs().max()) < 0.05
+
+
+@pytest.mark.parametrize(("motion", "vanishes"), [("spins", True), ("grows", False)])
+def test_an_outline_of_other_colours_vanishes_once_the_object_turns(
+    motion: str, vanishes: bool
+) -> None:
+    rgb = maps().event[..., None].expand(-1, -1, 3).float().clone()
+    rgb[FIRST:LAST, FIRST], rgb[FIRST:LAST, FIRST + 8] = 0.2, 0.2
+    found, count = followed(motion, rgb=rgb)
+    outline, inner = (
+        torch.tensor([row * SIDE + column for row in range(FIRST, LAST)])
+        for column in (FIRST, FIRST + 8)
+    )
+    assert count == SIDE**2
+    first, last = (found.motion.state_at(found.gaussians, at).scales for at in (0.0, 2.0))
+    shrinks = (last / first)[:, 0]
+    assert bool((shrinks[inner] > 0.9).all())
+    assert bool((shrinks[outline] < 0.05).all()) == vanishes
+    torch.testing.assert_close(first, found.gaussians.scales)
 
 
 def test_half_a_turn_shows_the_back() -> None:
