@@ -142,6 +142,7 @@ def same(left: Scene, right: Scene) -> bool:
     return len(pair[0]) == len(pair[1]) and all(map(torch.equal, *pair))
 
 
+@pytest.mark.slow
 def test_noise_in_the_image_classifier_changes_what_it_corrects(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -176,7 +177,13 @@ def test_noise_in_any_network_that_runs_changes_the_scene(
     assert changed.provenance.weights_sha256 != expected(CASES[name]).provenance.weights_sha256
 
 
-@pytest.mark.parametrize("part", sorted((VIDEO | PRIORS) - {SEES_NO_BOX}))
+@pytest.mark.parametrize(
+    "part",
+    [
+        *sorted(PRIORS - {SEES_NO_BOX}),
+        *(pytest.param(part, marks=pytest.mark.slow) for part in sorted(VIDEO)),
+    ],
+)
 def test_any_network_can_be_left_out_and_changes_the_scene(part: str) -> None:
     whole = CASES["prompt" if part in PRIORS else "video"]
     log = RunLog()
@@ -210,7 +217,14 @@ def test_networks_that_run_are_read(part: str, change: Change, tmp_path: Path) -
         generate(folder, CASES["video"])
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(name for name in CASES if not CASES[name].fill or name == "video"),
+        pytest.param("video, no prompt", marks=pytest.mark.slow),
+        pytest.param("video, still", marks=pytest.mark.slow),
+    ],
+)
 def test_scenes_are_finite(name: str) -> None:
     assert all(bool(value.isfinite().all()) for value in tensors(expected(CASES[name])))
 

@@ -42,12 +42,10 @@ More remains when cameras are exchanged, when motion is not rendered or when the
 of the target.
 """
 SHORT_STAGES = [
-    name
-    if name in ("vae", "static-low", "video_diffusion")
-    else pytest.param(name, marks=pytest.mark.slow)
+    name if name in ("vae", "static-low") else pytest.param(name, marks=pytest.mark.slow)
     for name in STAGES
 ]
-"""``dynamic`` and ``joint``, in which deformation learns, are slow."""
+"""``dynamic`` and ``joint``, in which deformation learns, and diffusion are slow."""
 TARGET_FRAMES = 4
 """Views and times per step: with fewer, the loss of a step says more of them than of the scene."""
 

@@ -83,6 +83,7 @@ def test_a_worker_that_does_not_answer_is_stopped() -> None:
         worker.ask("find", TINY[0], Path("unused"), False)
 
 
+@pytest.mark.slow
 def test_one_renderer_is_measured_and_checked(tmp_path: Path) -> None:
     peer = Peer(name="tile-loop", file=BUILT_IN / "tile_loop.py")
     said = []
@@ -97,6 +98,7 @@ def test_one_renderer_is_measured_and_checked(tmp_path: Path) -> None:
     assert said[:2] == ["tiny: tile-loop", "tiny: tile-loop, round 1"]
 
 
+@pytest.mark.slow
 def test_a_truth_that_fails_is_said_and_not_compared(tmp_path: Path) -> None:
     nowhere = tmp_path / "missing" / "folder"
     subject = interleaved.find_subject(TINY[0], nowhere, EFFORT)

@@ -119,7 +119,7 @@ EVENTS = st.builds(
 )
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(
     st.lists(EVENTS, min_size=1, max_size=4),
     st.sampled_from(["", *PLACES]),
@@ -141,7 +141,7 @@ def stripped(text: str) -> str:
     return re.sub(r"^[\s,;.]+|[\s,;.]+$", "", text)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(st.text(max_size=60))
 @example(". 0")
 def test_any_text_has_an_event(prompt: str) -> None:

@@ -49,6 +49,7 @@ def test_clips_are_those_of_their_worlds_in_order(whole: Path) -> None:
     assert {entry.size_px for entry in clips.entries} == {(32, 32)}
 
 
+@pytest.mark.slow
 def test_no_result_depends_on_the_number_of_processes(whole: Path, tmp_path: Path) -> None:
     assert write_worlds(job(tmp_path, workers=2), Phases()) == 3
     assert contents(tmp_path) == contents(whole)

@@ -264,7 +264,7 @@ def test_networks_load_when_they_are_needed_and_stay(image: InputImage) -> None:
     ("change", "prompt"),
     [
         ({}, "a ball rolls"),
-        ({"fill": "video"}, "a ball rolls"),
+        pytest.param({"fill": "video"}, "a ball rolls", marks=pytest.mark.slow),
         ({"still": True}, None),
         pytest.param({}, None, marks=pytest.mark.slow),
         pytest.param({"fill": "video"}, None, marks=pytest.mark.slow),

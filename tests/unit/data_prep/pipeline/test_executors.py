@@ -41,6 +41,7 @@ def shards(work: Path) -> dict[str, bytes]:
     return {str(file.relative_to(work)): file.read_bytes() for file in files}
 
 
+@pytest.mark.slow
 @needs_datatrove
 def test_two_workers_do_what_tasks_one_by_one_do(tmp_path: Path) -> None:
     for name in ("one by one", "datatrove"):
