@@ -61,19 +61,24 @@ def make_person(rng: Rng) -> Shape:
     build = Build.of(rng.child("build"))
     skin, hair = _head(build, rng.child("head"))
     hands, sleeves = _arms(build, rng.child("arms"))
-    upper = [merged(_torso(build), *sleeves)]
-    lean = about_z(build.lean_rad)
-    above = [piece.at(y=HIP).turned(lean).at(y=-HIP) for piece in (*upper, skin, hands, hair)]
     roles = rng.child("roles")
-    top, skin_role = roles.choice(CLOTHES), roles.choice(SKINS)
-    pieces = [(top, above[0]), (skin_role, merged(*above[1:3])), (roles.choice(HAIRS), above[3])]
+    pieces = [
+        (roles.choice(CLOTHES), merged(_torso(build), *sleeves)),
+        (roles.choice(SKINS), merged(skin, hands)),
+        (roles.choice(HAIRS), hair),
+    ]
     if roles.bernoulli(TIE_SHARE):
-        tie = _tie(build).at(y=HIP).turned(lean).at(y=-HIP)
-        pieces.append((roles.choice(CLOTHES), tie))
+        pieces.append((roles.choice(CLOTHES), _tie(build)))
+    pieces = [(role, _leaning(piece, build)) for role, piece in pieces]
     if not roles.bernoulli(PORTRAIT_SHARE):
         pieces.append((roles.choice(CLOTHES), _legs(build, rng.child("legs"))))
-    parts = tuple(Part(role=role, surface=surface) for role, surface in pieces)
+    parts = tuple(Part(role=role, surface=piece) for role, piece in pieces)
     return Shape(parts=parts).of_height(1.0)
+
+
+def _leaning(piece: Surface, build: Build) -> Surface:
+    """Turned at the hips."""
+    return piece.at(y=HIP).turned(about_z(build.lean_rad)).at(y=-HIP)
 
 
 def _torso(build: Build) -> Surface:

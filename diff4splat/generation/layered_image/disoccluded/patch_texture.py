@@ -67,20 +67,21 @@ def _plausibility(
     own: Float[Tensor, "h w 3"], detail: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w 1"]
 ) -> Float[Tensor, "h w 1"]:
     """1 where ``detail`` is as strong as the network's own, or as the image's evenly is around."""
-    strength = _strength(detail, ~known)
-    typical, sameness = _around(_strength(own, known), known)
+    of_network, of_patches = _strengths(~known, own, detail)
+    typical, sameness = _around(*_strengths(known, own), known)
     return torch.maximum(
-        _agreement(_strength(own, ~known), strength), sameness * _agreement(typical, strength)
+        _agreement(of_network, of_patches), sameness * _agreement(typical, of_patches)
     )
 
 
-def _strength(
-    detail: Float[Tensor, "h w 3"], where: Bool[Tensor, "h w 1"]
-) -> Float[Tensor, "h w 1"]:
-    """Mean square of the pixels ``where`` in the window around each."""
-    share = means_around(where.to(detail), DETAIL_SHARE).clamp_min(LEAST_ENERGY)
-    energy = torch.where(where, detail.square().sum(-1, keepdim=True), 0.0)
-    return means_around(energy, DETAIL_SHARE) / share + LEAST_ENERGY
+def _strengths(
+    where: Bool[Tensor, "h w 1"], *details: Float[Tensor, "h w 3"]
+) -> tuple[Float[Tensor, "h w 1"], ...]:
+    """Mean square of the pixels ``where`` in the window around each, of every detail."""
+    energy = torch.cat([each.square().sum(-1, keepdim=True) for each in details], -1)
+    share = means_around(where.to(energy), DETAIL_SHARE).clamp_min(LEAST_ENERGY)
+    means = means_around(torch.where(where, energy, 0.0), DETAIL_SHARE)
+    return (means / share + LEAST_ENERGY).split(1, -1)
 
 
 def _around(

@@ -113,8 +113,8 @@ class _VisibleSide:
 
     pixels: ImageLayer
     inside: Bool[Tensor, "h w"]
-    mixed_px: int
-    """Width of the rim in which colours may be mixed with those around."""
+    colors: Float[Tensor, "h w 3"]
+    """Those of the image, but at the outline, where they may be mixed, of the interior."""
 
 
 def _visible_side(pixels: ImageLayer, number: int, objects: MovingObjects) -> _VisibleSide:
@@ -123,14 +123,14 @@ def _visible_side(pixels: ImageLayer, number: int, objects: MovingObjects) -> _V
     inside = (numbers == number) & pixels.displacement.any(-1).any(0)
     # The mask is known to a pixel of the copy.
     cell_px = math.ceil(len(pixels.rgb) / len(objects.number))
-    return _VisibleSide(pixels=pixels, inside=inside, mixed_px=RIM_PX + 2 * cell_px)
+    colors = interior_colors(pixels, inside, RIM_PX + 2 * cell_px)
+    return _VisibleSide(pixels=pixels, inside=inside, colors=colors)
 
 
 def _without_rim(gaussian_set: GaussianSet, visible: _VisibleSide) -> KeyframeMotion:
     """The motion in which pixels of other colours at the outline vanish once the object turns."""
     motion, pixels = gaussian_set.motion, visible.pixels
-    own = interior_colors(pixels, visible.inside, visible.mixed_px)
-    rim = visible.inside & ((pixels.rgb - own).abs().amax(-1) > OTHER_COLOR)
+    rim = visible.inside & ((pixels.rgb - visible.colors).abs().amax(-1) > OTHER_COLOR)
     means = gaussian_set.gaussians.means[motion.moving_index]
     growth = motion.log_scale_offsets.clone()
     growth[1:, _at_pixels(rim, pixels.camera, means)] = GONE
@@ -142,7 +142,7 @@ def _hidden_side(
 ) -> GaussianSet:
     """What the image hides of an object, with its motion."""
     middle_z = float(one.frame.foot[2])
-    gaussians = hidden_side(visible.pixels, visible.inside, middle_z, visible.mixed_px)
+    gaussians = hidden_side(visible.pixels, visible.inside, middle_z, visible.colors)
     index = torch.arange(len(gaussians), device=visible.inside.device)
     at_rest = gaussians.means.new_zeros(2, len(index), 3)
     motion = offset_motion(index, at_rest, key_times_s)

@@ -30,12 +30,9 @@ MAX_STEPS = 64
 
 
 def hidden_side(
-    pixels: ImageLayer, inside: Bool[Tensor, "h w"], middle_z: float, mixed_px: int = RIM_PX
+    pixels: ImageLayer, inside: Bool[Tensor, "h w"], middle_z: float, colors: Float[Tensor, "h w 3"]
 ) -> Gaussians:
-    """Back and outline of the object ``inside``, at rest; empty of one that is nothing but rim.
-
-    Colours are those of pixels ``mixed_px`` from the outline.
-    """
+    """Back and outline of the object ``inside``, at rest; empty of one that is nothing but rim."""
     core = ~grown(~inside, RIM_PX)
     z, row = _depths(pixels, core, middle_z)
     rays = unproject(pixels.camera, torch.ones_like(pixels.depth))[core]
@@ -45,7 +42,7 @@ def hidden_side(
     scale = footprint_px * of_front / pixels.camera.focal_px[0]
     center = rays.mean(0)
     means = center * z[:, None] + (rays[row] - center) * of_front[:, None]
-    return _isotropic(means, scale, interior_colors(pixels, inside, mixed_px)[core][row])
+    return _isotropic(means, scale, colors[core][row])
 
 
 def interior_colors(

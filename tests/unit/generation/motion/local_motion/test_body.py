@@ -7,9 +7,14 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.motion.local_motion.body import rounded
-from diff4splat.generation.motion.local_motion.hidden_side import RIM_PX, hidden_side
+from diff4splat.generation.motion.local_motion.hidden_side import (
+    RIM_PX,
+    hidden_side,
+    interior_colors,
+)
 from diff4splat.geometry.camera import project
 from diff4splat.geometry.depth import unproject
+from diff4splat.scene.harmonics import dc_from_color
 
 SIDE, FOCAL_PX, DEPTH = 48, 48.0, 6.0
 
@@ -70,7 +75,7 @@ def test_the_back_mirrors_the_front_and_the_front_hides_it() -> None:
     inside = disc(16.0)
     body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
     pixels = layer(body)
-    back = hidden_side(pixels, inside, middle)
+    back = hidden_side(pixels, inside, middle, pixels.rgb)
     at, z = project(pixels.camera, back.means)
     column, row = at.floor().long().unbind(-1)
     assert bool(inside[row, column].all())
@@ -88,7 +93,7 @@ def test_off_the_axis_too_the_back_stays_within_the_outline() -> None:
     inside = box(2, 20)
     body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
     pixels = layer(body)
-    at, _ = project(pixels.camera, hidden_side(pixels, inside, middle).means)
+    at, _ = project(pixels.camera, hidden_side(pixels, inside, middle, pixels.rgb).means)
     column, row = at.floor().long().unbind(-1)
     assert bool(inside[row, column].all())
 
@@ -98,7 +103,7 @@ def test_the_surface_is_closed() -> None:
     inside = disc(16.0)
     body, middle = rounded(torch.full((SIDE, SIDE), DEPTH), inside, FOCAL_PX, RIM_PX)
     pixels, row = layer(body), SIDE // 2
-    back = hidden_side(pixels, inside, middle)
+    back = hidden_side(pixels, inside, middle, pixels.rgb)
     at, z = project(pixels.camera, back.means)
     front = body[row][disc(16.0 - RIM_PX)[row]]
     along = torch.cat([z[(at[:, 1] - 0.5).round().long() == row], front]).sort().values
@@ -108,17 +113,19 @@ def test_the_surface_is_closed() -> None:
 
 def test_an_object_of_nothing_but_rim_has_no_back() -> None:
     pixels = layer(torch.full((SIDE, SIDE), DEPTH))
-    assert len(hidden_side(pixels, box(20, 23), DEPTH)) == 0
+    assert len(hidden_side(pixels, box(20, 23), DEPTH, pixels.rgb)) == 0
 
 
-def test_colours_of_the_other_side_are_those_within_the_outline() -> None:
+def test_colours_of_the_interior_go_on_to_the_outline() -> None:
     inside, rgb = disc(16.0), torch.zeros(SIDE, SIDE, 3)
     rgb[disc(12.0)] = 1.0
     pixels = layer(torch.full((SIDE, SIDE), DEPTH), rgb=rgb)
-    pure, mixed = (hidden_side(pixels, inside, DEPTH, margin).sh for margin in (6, RIM_PX))
-    assert float(pure.std()) < 1e-5 < float(mixed.std())
+    pure, mixed = (interior_colors(pixels, inside, margin) for margin in (6, RIM_PX))
+    assert float(pure[inside].min()) == 1.0 > float(mixed[inside].min())
     # Nothing is as far from the outline: the colours as they are.
-    assert torch.equal(hidden_side(pixels, inside, DEPTH, SIDE).sh, mixed)
+    assert torch.equal(interior_colors(pixels, inside, SIDE), rgb)
+    back = hidden_side(pixels, inside, DEPTH, pure)
+    torch.testing.assert_close(back.sh, dc_from_color(torch.ones(len(back), 3))[:, None])
 
 
 def test_the_rim_is_as_far_as_the_pixels_next_to_it() -> None:
