@@ -123,13 +123,14 @@ def _monocular_depth(config: ModelConfig) -> nn.Module:
 
 def _object_mask(config: ModelConfig) -> nn.Module:
     mask = config.object_mask
-    kind = BackboneObjectMaskNet if mask.image_backbone else ObjectMaskNet
     shape = HeadShape(
         width=mask.width,
         text_width=config.text.width,
         instance_channels=mask.instance_channels,
     )
-    return kind(shape)
+    if not mask.image_backbone:
+        return ObjectMaskNet(shape)
+    return BackboneObjectMaskNet(shape, mask.backbone_size)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:

@@ -1,1 +1,1 @@
-"""A depth prior on a larger image backbone that starts where the bundled one ends."""
+"""A network on a larger image backbone that starts where the bundled one ends."""

@@ -1,6 +1,6 @@
 """Write a model to train further: ``python -m benchmarks.larger_backbone --model M --out start``.
 
-``M`` is a model whose depth prior has another backbone.
+``M`` is a model whose depth prior, or other ``--part``, has another backbone.
 """
 
 import argparse
@@ -14,10 +14,13 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from benchmarks.larger_backbone.fitted_start import with_backbone
+from benchmarks.larger_backbone.fitted_start import start_from
 from diff4splat.models.config.priors import BackboneSize
-from diff4splat.models.hub.model import load_model, save_model
+from diff4splat.models.factory import create_networks
+from diff4splat.models.hub.model import Model, load_model, save_model
 
+PARTS = ("monocular_depth", "object_mask")
+"""Those on an image backbone."""
 PHOTOGRAPHS = (
     *("astronaut", "coffee", "chelsea", "rocket", "camera", "hubble_deep_field"),
     *("immunohistochemistry", "retina", "brick", "grass", "gravel"),
@@ -30,23 +33,31 @@ INPUT_PX = 128
 
 
 def main() -> None:
-    """The model, its depth prior on another backbone."""
+    """The model, one of its parts on another backbone."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--part", choices=PARTS, default=PARTS[0])
     parser.add_argument("--size", choices=get_args(BackboneSize), default="lite2")
     parser.add_argument("--model", required=True)
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
-    size: BackboneSize = arguments.size
     model = load_model(arguments.model)
-    if model.config.monocular_depth.backbone_size == size:
-        parser.error(f"--model: expected another backbone than {size}, got it; name one in --size")
-    images = torch.from_numpy(np.stack(list(windows()))).movedim(-1, 1) / 255
-    depth, left = with_backbone(model.networks.monocular_depth, size, images)
-    config = replace(model.config.monocular_depth, backbone_size=size)
-    networks = replace(model.networks, monocular_depth=depth)
-    config = replace(model.config, monocular_depth=config)
-    save_model(replace(model, config=config, networks=networks), arguments.out)
+    if getattr(model.config, arguments.part).backbone_size == arguments.size:
+        expected = f"--model: expected another backbone than {arguments.size}"
+        parser.error(f"{expected}, got it; name one in --size")
+    larger, left = with_backbone(model, arguments.part, arguments.size)
+    save_model(larger, arguments.out)
     print("left of the variance, finest level first:", *(f"{share:.2f}" for share in left))
+
+
+def with_backbone(model: Model, part: str, size: BackboneSize) -> tuple[Model, list[float]]:
+    """The model with one part on the backbone of ``size``, and what every level misses."""
+    config = replace(getattr(model.config, part), backbone_size=size)
+    config = replace(model.config, **{part: config})
+    larger = getattr(create_networks(config, parts=[part]), part)
+    images = torch.from_numpy(np.stack(list(windows()))).movedim(-1, 1) / 255
+    left = start_from(getattr(model.networks, part), larger, images)
+    networks = replace(model.networks, **{part: larger})
+    return replace(model, config=config, networks=networks), left
 
 
 def windows() -> Iterator[Float[np.ndarray, "h w 3"]]:

@@ -1,6 +1,6 @@
-"""The bundled depth prior on another backbone, without training: what joins them is fitted.
+"""A bundled network on another backbone, without training: what joins them is fitted.
 
-Axes: ``n`` images, ``h w`` pixels, ``c`` channels. Decoder and U-Net are taken as they are. The
+Axes: ``n`` images, ``h w`` pixels, ``c`` channels. All other layers are taken as they are. The
 convolutions beside the backbone are fitted by least squares, so that the decoder is given what it
 was trained on.
 """
@@ -9,33 +9,33 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from diff4splat.models.config.priors import BackboneSize
-from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
-from diff4splat.models.networks import Networks
-from diff4splat.training.backbone_init import start_from_public_backbones
+from diff4splat.models.image_backbone.public_weights import public_backbone_weights
+from diff4splat.models.image_backbone.unet import BackboneUNet
 
 RIDGE = 1e-3
 """Of the mean variance of a channel."""
 
 
-def with_backbone(
-    network: BackboneDepthNet, size: BackboneSize, images: Float[Tensor, "n 3 h w"]
-) -> tuple[BackboneDepthNet, list[float]]:
-    """The same network on public weights of ``size``, and the share that every level misses.
+def start_from(
+    network: BackboneUNet, larger: BackboneUNet, images: Float[Tensor, "n 3 h w"]
+) -> list[float]:
+    """Give ``larger`` the weights of ``network`` on a public backbone.
+
+    Returns the share of the variance that every level misses, finest first.
 
     Raises:
         InputError: the package with the weights is not installed.
     """
-    width = network.head.in_channels
-    other = BackboneDepthNet(width, size=size, uncertainty=network.uncertainty is not None)
-    own = {name: value for name, value in network.state_dict().items() if _is_kept(name)}
-    other.load_state_dict(own, strict=False)
-    start_from_public_backbones(Networks(monocular_depth=other), ["monocular_depth"])
+    kept = {name: value for name, value in network.state_dict().items() if _is_kept(name)}
+    larger.load_state_dict(kept, strict=False)
+    weights = public_backbone_weights(larger.backbone.size)
+    names = larger.backbone.state_dict()
+    larger.backbone.load_state_dict({name: weights[name] for name in names})
     with torch.no_grad():
         pairs = zip(network.lateral, network.backbone(images), strict=True)
         wanted = [conv(level) for conv, level in pairs]
-        levels = zip(other.lateral, other.backbone(images), wanted, strict=True)
-        return other, [fit(conv, level, want) for conv, level, want in levels]
+        levels = zip(larger.lateral, larger.backbone(images), wanted, strict=True)
+        return [fit(conv, level, want) for conv, level, want in levels]
 
 
 def fit(

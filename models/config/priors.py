@@ -8,7 +8,8 @@ from diff4splat.models.config.checks import require, require_counts, require_opt
 BACKBONE_MULTIPLE_PX = 32
 """Image sides that the image backbone takes are multiples of it."""
 BackboneSize = Literal["lite0", "lite2"]
-"""Of EfficientNet-Lite: with the larger one the depth prior has 6.7 million weights, else 5.3."""
+"""Of EfficientNet-Lite: with the larger one the depth prior has 6.7 million weights, else 5.3, the
+object mask 5.3 million, else 4.8."""
 MAX_LEVELS, MAX_WIDTH = 10, 1 << 14
 """Of image inpainting; more is damage."""
 
@@ -32,10 +33,6 @@ class MonocularDepthConfig:
         require_optional_width(self, "channels")
         require_counts(self, "photo_scale")
         _require_backbone_fits(self)
-        fits = self.image_backbone or self.backbone_size == "lite0"
-        fits = fits and self.backbone_size in get_args(BackboneSize)
-        expected = "lite0, or lite2 with the image backbone"
-        require(fits, "MonocularDepthConfig.backbone_size", expected, self.backbone_size)
         fits = self.image_backbone or not self.uncertainty
         where = "MonocularDepthConfig.uncertainty"
         require(fits, where, "false without the image backbone", self.uncertainty)
@@ -54,6 +51,8 @@ class ObjectMaskConfig:
     """Channels at half the resolution; 0 leaves it out: the motion prior's own mask decides."""
     image_backbone: bool = False
     """Whether it has a second encoder, the image backbone (ADR 32)."""
+    backbone_size: BackboneSize = "lite0"
+    """Of the image backbone."""
     instance_channels: int = 0
     """Of the vectors that separate instances, 2 or more; 0 leaves them out (ADR 36)."""
     image_classifier: bool = False
@@ -140,5 +139,10 @@ class ImageInpaintingConfig:
 
 def _require_backbone_fits(config: MonocularDepthConfig | ObjectMaskConfig) -> None:
     fits = config.used or not config.image_backbone
-    where = f"{type(config).__name__}.image_backbone"
-    require(fits, where, "false without the network that it belongs to", config.image_backbone)
+    where = type(config).__name__
+    expected = "false without the network that it belongs to"
+    require(fits, f"{where}.image_backbone", expected, config.image_backbone)
+    fits = config.image_backbone or config.backbone_size == "lite0"
+    fits = fits and config.backbone_size in get_args(BackboneSize)
+    expected = "lite0, or lite2 with the image backbone"
+    require(fits, f"{where}.backbone_size", expected, config.backbone_size)

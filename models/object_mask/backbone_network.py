@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from diff4splat.models.config.priors import BackboneSize
 from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.object_mask.mask_heads import HeadShape, MaskHeads
 from diff4splat.models.object_mask.network import MaskUNet
@@ -20,8 +21,8 @@ are smaller than cells of 1/32."""
 class BackboneObjectMaskNet(BackboneUNet, MaskHeads):
     """For every pixel the logit of the probability that the prompt asks it to move."""
 
-    def __init__(self, shape: HeadShape) -> None:
-        super().__init__([shape.width * share for share in GROWTH])
+    def __init__(self, shape: HeadShape, size: BackboneSize = "lite0") -> None:
+        super().__init__([shape.width * share for share in GROWTH], size)
         self.unet = MaskUNet(shape.width)
         self.add_heads(shape, encoders=2)
 

@@ -1,13 +1,18 @@
-"""The start of a depth prior on a larger backbone."""
+"""The start of a network on a larger backbone."""
 
 import pytest
 import torch
 
+from benchmarks.larger_backbone import fitted_start
 from benchmarks.larger_backbone.__main__ import main
-from benchmarks.larger_backbone.fitted_start import fit, with_backbone
+from benchmarks.larger_backbone.fitted_start import fit, start_from
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
+from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
-from diff4splat.training import backbone_init
+from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
+from diff4splat.models.object_mask.mask_heads import HeadShape
+
+SHAPE = HeadShape(width=4, text_width=8)
 
 
 def test_least_squares_find_a_convolution_again() -> None:
@@ -29,16 +34,26 @@ def test_what_the_image_does_not_show_is_left() -> None:
     assert left == pytest.approx(1 / 3, abs=0.05)
 
 
-@pytest.mark.parametrize("uncertainty", [False, True])
+@pytest.mark.parametrize(
+    ("network", "other"),
+    [
+        (BackboneDepthNet(4), BackboneDepthNet(4, size="lite2")),
+        (
+            BackboneDepthNet(4, uncertainty=True),
+            BackboneDepthNet(4, size="lite2", uncertainty=True),
+        ),
+        (BackboneObjectMaskNet(SHAPE), BackboneObjectMaskNet(SHAPE, "lite2")),
+    ],
+    ids=["depth", "depth and uncertainty", "object mask"],
+)
 def test_all_but_the_backbone_and_what_joins_it_is_kept(
-    uncertainty: bool, monkeypatch: pytest.MonkeyPatch
+    network: BackboneUNet, other: BackboneUNet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     torch.manual_seed(0)
     public = EfficientNetLite(size="lite2").state_dict()
-    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda size: public)
-    network = BackboneDepthNet(4, uncertainty=uncertainty)
-    other, left = with_backbone(network, "lite2", torch.rand(6, 3, 64, 64))
-    assert len(left) == 5 and all(0 <= share <= 1 for share in left)
+    monkeypatch.setattr(fitted_start, "public_backbone_weights", lambda size: public)
+    left = start_from(network, other, torch.rand(6, 3, 64, 64))
+    assert len(left) == len(other.lateral) and all(0 <= share <= 1 for share in left)
     before = network.state_dict()
     for name, value in other.state_dict().items():
         if name.startswith("backbone."):
@@ -48,7 +63,7 @@ def test_all_but_the_backbone_and_what_joins_it_is_kept(
     assert all(bool(value.isfinite().all()) for value in other.state_dict().values())
 
 
-def test_the_backbone_that_a_model_has_is_refused(
+def test_the_backbone_that_a_part_has_is_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     monkeypatch.setattr("sys.argv", ["larger_backbone", "--model", "small", "--out", "nowhere"])

@@ -2,6 +2,7 @@ import dataclasses
 import json
 import math
 import re
+from typing import get_args
 
 import pytest
 
@@ -19,6 +20,7 @@ from diff4splat.models.config.model import (
     TextConfig,
     VaeConfig,
 )
+from diff4splat.models.config.priors import BackboneSize
 from diff4splat.models.config.sizes import SIZES, paper_size, size_by_name, small_size, test_size
 
 LEAVES = [
@@ -70,11 +72,17 @@ BOUND = [
     ("vae", "groups"),
     ("vae", "tile_px"),
     ("monocular_depth", "backbone_size"),
+    ("object_mask", "backbone_size"),
     ("joint", "level_width"),
     ("joint", "patch_frames"),
     ("image_encoder", "width"),
 ]
 """Fields that may not change alone."""
+ON_BACKBONE = {
+    "monocular_depth": MonocularDepthConfig(channels=4, image_backbone=True),
+    "object_mask": ObjectMaskConfig(width=4, image_backbone=True),
+}
+"""Parts of a model that may be on the image backbone."""
 
 
 @pytest.mark.parametrize("name", SIZES)
@@ -120,12 +128,13 @@ def test_a_start_at_the_depth_prior_changes_the_fingerprint_and_needs_one() -> N
 
 
 def test_the_size_of_the_backbone_changes_the_fingerprint() -> None:
-    depths = [
-        MonocularDepthConfig(channels=4, image_backbone=True, backbone_size=size)
-        for size in ("lite0", "lite2")
+    base = dataclasses.replace(test_size(), motion_unet=MotionUNetConfig(width=8))
+    configs = [
+        dataclasses.replace(base, **{part: dataclasses.replace(on, backbone_size=size)})
+        for part, on in ON_BACKBONE.items()
+        for size in get_args(BackboneSize)
     ]
-    configs = [dataclasses.replace(test_size(), monocular_depth=depth) for depth in depths]
-    assert len({config.fingerprint() for config in configs}) == 2
+    assert len({config.fingerprint() for config in configs}) == len(configs) == 4
 
 
 def test_vectors_of_instances_change_the_fingerprint() -> None:
@@ -246,7 +255,11 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
             "MonocularDepthConfig.image_backbone: expected false without the network",
         ),
         *(
-            (MonocularDepthConfig, {"channels": 4, **change}, "expected lite0, or lite2 with the")
+            (kind, {**size, **change}, f"{kind.__name__}.backbone_size: expected lite0, or lite2")
+            for kind, size in (
+                (MonocularDepthConfig, {"channels": 4}),
+                (ObjectMaskConfig, {"width": 4}),
+            )
             for change in (
                 {"backbone_size": "lite2"},
                 {"backbone_size": "lite1", "image_backbone": True},

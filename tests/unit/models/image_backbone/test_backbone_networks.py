@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from diff4splat.models.config.priors import MonocularDepthConfig
+from diff4splat.models.config.priors import MonocularDepthConfig, MotionUNetConfig, ObjectMaskConfig
 from diff4splat.models.config.sizes import test_size
 from diff4splat.models.factory import parameter_counts
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
@@ -52,9 +52,13 @@ def test_a_fresh_network_predicts_the_plane() -> None:
 def test_the_configuration_decides_the_size_of_the_backbone() -> None:
     counts = []
     for size in ("lite0", "lite2"):
-        depth = MonocularDepthConfig(channels=WIDTH, image_backbone=True, backbone_size=size)
-        counts.append(parameter_counts(replace(test_size(), monocular_depth=depth)))
-    assert counts[0]["monocular_depth"] < counts[1]["monocular_depth"]
+        on = {"image_backbone": True, "backbone_size": size}
+        depth = MonocularDepthConfig(channels=WIDTH, **on)
+        motion, mask = MotionUNetConfig(width=8), ObjectMaskConfig(width=WIDTH, **on)
+        config = replace(test_size(), monocular_depth=depth, motion_unet=motion, object_mask=mask)
+        counts.append(parameter_counts(config))
+    for part in ("monocular_depth", "object_mask"):
+        assert counts[0][part] < counts[1][part]
     assert counts[0]["ldrm"] == counts[1]["ldrm"]
 
 

@@ -120,12 +120,13 @@ def test_runs_from_before_single_events_go_on() -> None:
     assert fingerprint(override(recipe, [share]), name) != fingerprint(recipe, name)
 
 
-def test_runs_from_before_sizes_of_the_backbone_go_on() -> None:
-    recipe, name = recipe_by_name("small"), "monocular_depth"
-    size = "model.monocular_depth.backbone_size="
+@pytest.mark.parametrize("name", ["monocular_depth", "object_mask"])
+def test_runs_from_before_sizes_of_the_backbone_go_on(name: str) -> None:
+    recipe = recipe_by_name("small")
+    size = f"model.{name}.backbone_size="
     first, larger = (override(recipe, [f"{size}{one}"]) for one in ("lite0", "lite2"))
     data = recipe_to_dict(first)
-    del data["model"]["monocular_depth"]["backbone_size"]
+    del data["model"][name]["backbone_size"]
     assert fingerprint_of(data, name, "") == fingerprint(first, name)
     assert fingerprint(larger, name) != fingerprint(first, name)
 
