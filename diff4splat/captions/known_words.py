@@ -8,7 +8,7 @@ do not count: ``moving`` is ``moves``.
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 from diff4splat.captions.colors import COLOR_NAMES
 from diff4splat.captions.cutout_nouns import KNOWN_NOUNS
@@ -65,16 +65,17 @@ def _with_synonyms(
     return tuple(dict.fromkeys(every))
 
 
+@lru_cache(4096)
 def read_prompt(prompt: str) -> PromptWords:
     """Sort the words of ``prompt``; function words and places are left out."""
-    objects, motions, others = _stems()
-    words = words_of(prompt)
-    unknown = [word for word in words if stem(word) not in objects | motions | others]
+    objects, motions, every = _stems()
+    words = [(word, stem(word)) for word in words_of(prompt)]
+    unknown = [word for word, root in words if root not in every]
     # What the image classifier knows, but no caption of training has.
     classes = {word for word in unknown if noun_classes(word)}
     return PromptWords(
-        objects=tuple(word for word in words if stem(word) in objects or word in classes),
-        motions=tuple(word for word in words if stem(word) in motions),
+        objects=tuple(word for word, root in words if root in objects or word in classes),
+        motions=tuple(word for word, root in words if root in motions),
         unknown=tuple(word for word in unknown if word not in classes),
     )
 
@@ -97,14 +98,15 @@ def stem(word: str) -> str:
 
 @cache
 def _stems() -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
-    """Of objects, motions, and all other words of captions."""
+    """Of objects, of motions, and of all words of captions."""
     words, camera = known_words(), [phrase for one in CAMERA_MOVES.values() for phrase in one]
     functions = _of(_FUNCTION_WORDS)
     # Of names in several words the last one is the object: tree of "fir tree".
     nouns = (noun.split()[-1] for noun in words["objects"])
     objects = _of((*nouns, *words["colours"], "nothing"))
     motions = _of((*words["motions"], *words["directions"])) - functions
-    return objects, motions, functions | _of((*words["objects"], *words["places"], *camera))
+    others = functions | _of((*words["objects"], *words["places"], *camera))
+    return objects, motions, objects | motions | others
 
 
 def _of(phrases: Iterable[str]) -> frozenset[str]:

@@ -56,8 +56,9 @@ def _depths(
     log.depth.update(found.record())
     if larger is images.small:
         return found.depth, None
-    # Small images are no photographs: the prior knows their towers.
-    depth = straightened(found.depth) if larger.reduction > 1 else found.depth
+    depth = found.depth
+    if larger.reduction > 1:  # Small images are no photographs: the prior knows their towers.
+        depth = straightened(depth, float(larger.camera.focal_px[1]))
     fine = FineMaps(rgb=larger.rgb, depth=depth)
     return reduced_depth(fine.depth, images.small.camera.size_px), fine
 

@@ -106,14 +106,15 @@ def test_the_depth_prior_can_see_a_larger_copy_of_a_photograph() -> None:
 @pytest.mark.parametrize("size", [2, 4])
 def test_towers_of_photographs_are_straightened(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     """Of an image that the depth prior sees whole they are as predicted."""
-    monkeypatch.setattr(priors, "straightened", lambda depth: torch.full_like(depth, 7.0))
+    monkeypatch.setattr(priors, "straightened", torch.full_like)
     model = model_of("monocular_depth")
     config = replace(model.config, monocular_depth=MonocularDepthConfig(channels=8, photo_scale=2))
     image = input_image(random_rgb(size * SIDE_PX, size * SIDE_PX))
+    focal_px = float(downsample(image, size // 2).camera.focal_px[1])
     copies = Copies(image=image, small=downsample(image, size))
     request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
     maps = image_maps(replace(model, config=config), copies, 2, [request], RunLog())
-    assert bool((maps.fine.depth == 7.0).all()) == (size == 4)
+    assert bool((maps.fine.depth == focal_px).all()) == (size == 4)
 
 
 @torch.no_grad()
