@@ -16,8 +16,6 @@ from typing import Literal
 import torch
 
 from diff4splat import __version__
-from diff4splat.captions.events import is_in_place, local_motion, moving_events
-from diff4splat.captions.image_classes.prompt_classes import prompt_classes
 from diff4splat.generation.color_matching import InputView, match_input_view
 from diff4splat.generation.given_depth.source import DepthSource
 from diff4splat.generation.inputs.copies import Copies
@@ -25,7 +23,6 @@ from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.inputs.request import (
     Request,
     UserInput,
-    negative_prompt,
     prepare_request,
     sized_to_depth,
 )
@@ -34,14 +31,14 @@ from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gau
 from diff4splat.generation.layered_image.inpainting import Inpaint, NetworkInpainting
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.motion.local_motion.gaussians import with_local_motion
-from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
 from diff4splat.generation.priors import image_maps
 from diff4splat.generation.scene_assembly import combine
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.generation.static_pruning import prune_static_tracks
-from diff4splat.generation.video.video_fill import FillRequest, TextStates, fill_hidden
+from diff4splat.generation.text_states import TextStates, encode_text, motion_requests
+from diff4splat.generation.video.video_fill import FillRequest, fill_hidden
 from diff4splat.generation.visible_fill import without_visible
 from diff4splat.models.hub.model import Model, load_model, save_model, with_adapter, with_parts
 from diff4splat.models.placement.resident import keep_blocks
@@ -144,9 +141,8 @@ class Diff4SplatPipeline:
         size_px = request.small.camera.size_px
         frames = model.config.latent_grid(len(request.small_path), size_px)[0]
         with one_thread(), self._autocast():
-            text = self._text_states(request, log)
-            motions = _motion_requests(request, text)
-            maps = image_maps(model, copies, frames, motions, log)
+            text = encode_text(request, model, log)
+            maps = image_maps(model, copies, frames, motion_requests(request, text), log)
         request = sized_to_depth(request, maps.depth)
         gaussians = self._gaussians(request, maps, text, log)
         scene = Scene(
@@ -238,25 +234,6 @@ class Diff4SplatPipeline:
         dtype = self.dtype if half else None
         return torch.autocast(self.device.type, dtype, enabled=half)
 
-    def _text_states(self, request: Request, log: RunLog) -> TextStates:
-        if "text_encoder" not in request.plan.parts:
-            return TextStates()
-        encode = self.model.networks.text_encoder.encode_prompt
-        negative = negative_prompt(request, self.model.config)
-        with log.phases.phase("encode text"):
-            states = TextStates(negative=None if negative is None else encode(negative))
-            if request.prompt is None:
-                return states
-            prompt = encode(request.prompt)
-            events = moving_events(request.prompt)
-            return replace(
-                states,
-                prompt=prompt,
-                events=tuple(prompt if one == request.prompt else encode(one) for one in events),
-                event_classes=tuple(map(prompt_classes, events)),
-                event_words=events,
-            )
-
     def _provenance(self, request: Request) -> Provenance:
         return Provenance(
             generator=f"diff4splat {__version__}",
@@ -271,22 +248,3 @@ class Diff4SplatPipeline:
     def _license(self, parts: Collection[str]) -> str:
         """That of the weights that ran; a scene of no trained network has none."""
         return self.model.license if self.model.trained.intersection(parts) else UNKNOWN_LICENSE
-
-
-def _motion_requests(request: Request, text: TextStates) -> list[MotionRequest]:
-    """One for each event of the prompt."""
-    key_times_s = tuple(request.key_times_s.tolist())
-    return [
-        MotionRequest(
-            text=states,
-            seed=request.seed,
-            settings=request.settings,
-            classes=classes,
-            local_motion=local_motion(words),
-            in_place=is_in_place(words),
-            key_times_s=key_times_s,
-        )
-        for states, classes, words in zip(
-            text.events, text.event_classes, text.event_words, strict=True
-        )
-    ]

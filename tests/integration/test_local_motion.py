@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from diff4splat.generation import pipeline as generation_pipeline
+from diff4splat.generation import text_states
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.motion.object_motion import ObjectMotion
 from diff4splat.generation.pipeline import Diff4SplatPipeline
@@ -63,7 +63,7 @@ def test_a_disc_grows_in_place(pipeline: Diff4SplatPipeline, image: InputImage) 
 def test_without_local_motion_nothing_grows(
     pipeline: Diff4SplatPipeline, image: InputImage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(generation_pipeline, "local_motion", lambda _: "")
+    monkeypatch.setattr(text_states, "local_motion", lambda _: "")
     log = RunLog()
     scene = pipeline(image, "arc:0.1", "the red ball grows", log=log)
     assert isinstance(scene.motion, StaticMotion)

@@ -20,6 +20,7 @@ from diff4splat.generation.layered_image.gaussians import GaussianSet
 from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
 from diff4splat.generation.settings import GenerationSettings, why_unguided
 from diff4splat.generation.static_pruning import deformation_threshold_px, prune_static_tracks
+from diff4splat.generation.text_states import TextStates
 from diff4splat.generation.video.canonical_scene import (
     CanonicalScene,
     keyframe_plane_prior,
@@ -59,21 +60,6 @@ from diff4splat.scene.motion.keyframe_algebra import hold_until
 
 FOOTPRINT_CELLS = 0.6
 """Standard deviation of a hidden cell: the scene is drawn without dilation, and cells must meet."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextStates:
-    """Encoded text of one generation."""
-
-    prompt: Float[Tensor, "1 s d"] | None = None
-    negative: Float[Tensor, "1 s2 d"] | None = None
-    """What guidance leads away from; all there is for a model that needs text, without a prompt."""
-    events: tuple[Float[Tensor, "1 _ d"] | None, ...] = (None,)
-    """Of each event of the prompt; None without one."""
-    event_classes: tuple[tuple[int, ...], ...] = ((),)
-    """Of the nouns of every event (``captions.image_classes``)."""
-    event_words: tuple[str, ...] = ("",)
-    """The events themselves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,8 @@ from diff4splat.generation.layered_image.build import build_layered_image
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.generation.video.video_fill import FillRequest, TextStates, VideoFill, fill_hidden
+from diff4splat.generation.text_states import TextStates
+from diff4splat.generation.video.video_fill import FillRequest, VideoFill, fill_hidden
 from diff4splat.geometry.camera import project
 from diff4splat.models.config.sizes import small_size
 from diff4splat.models.config.sizes import test_size as tiny_size
