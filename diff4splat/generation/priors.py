@@ -15,6 +15,7 @@ from diff4splat.generation.given_depth.maps import given_depth, reduced_depth
 from diff4splat.generation.inputs.copies import Copies, larger_copy
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
+from diff4splat.generation.layered_image.pixel_maps.supported_parts import with_support
 from diff4splat.generation.layered_image.pixel_maps.upright_strips import straightened
 from diff4splat.generation.motion.object_motion import ObjectMotion
 from diff4splat.generation.motion.sampling import MotionRequest
@@ -59,6 +60,8 @@ def _depths(
     depth = found.depth
     if larger.reduction > 1:  # Small images are no photographs: the prior knows their towers.
         depth = straightened(depth, float(larger.camera.focal_px[1]))
+        if bool(found.out_of_domain):
+            depth = with_support(depth, larger.rgb)
     fine = FineMaps(rgb=larger.rgb, depth=depth)
     return reduced_depth(fine.depth, images.small.camera.size_px), fine
 

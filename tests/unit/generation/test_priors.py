@@ -117,6 +117,29 @@ def test_towers_of_photographs_are_straightened(monkeypatch: pytest.MonkeyPatch,
     assert bool((maps.fine.depth == focal_px).all()) == (size == 4)
 
 
+@pytest.mark.parametrize("score", [0.0, 0.5])
+def test_parts_of_photographs_out_of_domain_are_supported(
+    monkeypatch: pytest.MonkeyPatch, score: float
+) -> None:
+    """In the domain of training something may float."""
+    predicted = priors.predicted_depth
+    monkeypatch.setattr(
+        priors,
+        "predicted_depth",
+        lambda *args, **more: replace(predicted(*args, **more), out_of_domain=torch.tensor(score)),
+    )
+    monkeypatch.setattr(priors, "with_support", lambda depth, rgb: 2 * depth + rgb[..., 0])
+    model = model_of("monocular_depth")
+    config = replace(model.config, monocular_depth=MonocularDepthConfig(channels=8, photo_scale=2))
+    image = input_image(random_rgb(4 * SIDE_PX, 4 * SIDE_PX))
+    copies = Copies(image=image, small=downsample(image, 4))
+    request = MotionRequest(text=None, seed=0, settings=GenerationSettings())
+    maps = image_maps(replace(model, config=config), copies, 2, [request], RunLog())
+    plain = priors.image_depth(model, downsample(image, 2))
+    expected = 2 * plain + downsample(image, 2).rgb[..., 0] if score else plain
+    torch.testing.assert_close(maps.fine.depth, expected)
+
+
 @torch.no_grad()
 @pytest.mark.parametrize("reduction", [1, 3])
 def test_an_image_backbone_sees_an_enlarged_copy_of_an_image_without_more_pixels(
