@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 NEARER, BENEATH_QUANTILE = 1.75, 0.75
 """Inverse depth of a floating part over that of what is beneath it, and which of that: predicted
@@ -36,35 +36,37 @@ class FloatingPart:
         return (self.rows.start + self.rows.stop) // 2
 
 
-def nearest_floating_part(inverse: Float[np.ndarray, "h w"]) -> FloatingPart | None:
-    """The largest part that floats."""
+def largest_floating_part(inverse: Float[np.ndarray, "h w"]) -> FloatingPart | None:
+    """The first that is found among the nearest pixels, of most of them to fewest."""
     for share in reversed(NEAREST_SHARES):
         near = (inverse > np.quantile(inverse, 1 - share)).astype(np.uint8)
-        count, component, statistics, _ = cv2.connectedComponentsWithStats(near, connectivity=4)
-        parts = [
-            _part(inverse, component == number, statistics[number]) for number in range(1, count)
-        ]
-        floating = [part for part in parts if part is not None and part.nearness >= NEARER]
+        _, component, statistics, _ = cv2.connectedComponentsWithStats(near, connectivity=4)
+        candidates = 1 + np.nonzero(_is_candidate(statistics[1:], near.shape))[0]
+        parts = [_part(inverse, component == one, statistics[one]) for one in candidates]
+        floating = [part for part in parts if part.nearness >= NEARER]
         if floating:
             return max(floating, key=lambda part: int(part.mask.sum()))
     return None
 
 
+def _is_candidate(
+    statistics: Int[np.ndarray, "n s"], size_px: tuple[int, int]
+) -> Bool[np.ndarray, " n"]:
+    """Not small, not low, not at the upper border: that may hang from what is outside."""
+    top, height, area = statistics[:, [cv2.CC_STAT_TOP, cv2.CC_STAT_HEIGHT, cv2.CC_STAT_AREA]].T
+    is_large = area >= LEAST_AREA * size_px[0] * size_px[1]
+    return is_large & (top > 0) & (top + height <= LOWEST_FOOT * size_px[0])
+
+
 def _part(
-    inverse: Float[np.ndarray, "h w"], mask: Bool[np.ndarray, "h w"], statistics: np.ndarray
-) -> FloatingPart | None:
-    """None for one that is small, or touches the upper border: it may hang from what is outside."""
-    left, top, width, height, area = statistics.tolist()
-    right, foot = left + width, top + height
-    is_small = area < LEAST_AREA * inverse.size
-    if is_small or top == 0 or foot > LOWEST_FOOT * len(inverse):
-        return None
+    inverse: Float[np.ndarray, "h w"],
+    mask: Bool[np.ndarray, "h w"],
+    statistics: Int[np.ndarray, " s"],
+) -> FloatingPart:
+    left, top, width, height, _ = statistics.tolist()
+    rows, columns = slice(top, top + height), slice(left, left + width)
     middle = float(np.median(inverse[mask]))
-    beneath = float(np.quantile(inverse[foot:, left:right], BENEATH_QUANTILE))
+    beneath = float(np.quantile(inverse[rows.stop :, columns], BENEATH_QUANTILE))
     return FloatingPart(
-        mask=mask,
-        rows=slice(top, foot),
-        columns=slice(left, right),
-        inverse=middle,
-        nearness=middle / beneath,
+        mask=mask, rows=rows, columns=columns, inverse=middle, nearness=middle / beneath
     )

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.pixel_maps.floating_parts import (
     FloatingPart,
-    nearest_floating_part,
+    largest_floating_part,
 )
 
 SIDES_SHARE = 3 / 4
@@ -32,7 +32,7 @@ ROUNDS = 5
 def with_support(depth: Float[Tensor, "h w"], rgb: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w"]:
     """``depth``, above 0, with the figure that carries a floating part as near as the part."""
     inverse = (1 / depth.detach().double()).cpu().numpy()
-    part = nearest_floating_part(inverse)
+    part = largest_floating_part(inverse)
     if part is None:
         return depth
     colors = (rgb.clamp(0, 1) * 255).round().byte().cpu().numpy()
