@@ -37,7 +37,7 @@ class FloatingPart:
 
 
 def largest_floating_part(inverse: Float[np.ndarray, "h w"]) -> FloatingPart | None:
-    """The first that is found among the nearest pixels, of most of them to fewest."""
+    """The largest that floats, among the most of the nearest pixels that have one."""
     for share in reversed(NEAREST_SHARES):
         near = (inverse > np.quantile(inverse, 1 - share)).astype(np.uint8)
         _, component, statistics, _ = cv2.connectedComponentsWithStats(near, connectivity=4)
