@@ -14,6 +14,8 @@ NEARER, BENEATH_QUANTILE = 1.75, 0.75
 depth of a part blurs into what is below."""
 NEAREST_SHARES = (0.05, 0.1, 0.15, 0.2, 0.25)
 """Of the pixels, that are looked at for connected parts."""
+LEAST_SOLIDITY = 0.95
+"""Of its convex hull, that a part fills: heads are convex."""
 LEAST_AREA, LOWEST_FOOT = 1 / 50, 0.85
 """Of the image; and of its height, where a part ends that something may carry."""
 
@@ -43,7 +45,7 @@ def largest_floating_part(inverse: Float[np.ndarray, "h w"]) -> FloatingPart | N
         _, component, statistics, _ = cv2.connectedComponentsWithStats(near, connectivity=4)
         candidates = 1 + np.nonzero(_is_candidate(statistics[1:], near.shape))[0]
         parts = [_part(inverse, component == one, statistics[one]) for one in candidates]
-        floating = [part for part in parts if part.nearness >= NEARER]
+        floating = [part for part in parts if part.nearness >= NEARER and _is_convex(part)]
         if floating:
             return max(floating, key=lambda part: int(part.mask.sum()))
     return None
@@ -70,3 +72,8 @@ def _part(
     return FloatingPart(
         mask=mask, rows=rows, columns=columns, inverse=middle, nearness=middle / beneath
     )
+
+
+def _is_convex(part: FloatingPart) -> bool:
+    hull = cv2.convexHull(np.argwhere(part.mask).astype(np.int32))
+    return bool(part.mask.sum() >= LEAST_SOLIDITY * cv2.contourArea(hull))

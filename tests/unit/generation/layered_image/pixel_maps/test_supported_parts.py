@@ -30,6 +30,12 @@ def body() -> np.ndarray:
     return (y > 44) & (np.abs(x - 48) < 5 + np.clip(2.0 * (y - 50), 0, 36))
 
 
+def hollow() -> np.ndarray:
+    """A quarter of the head."""
+    y, x = grid()
+    return (y > 30) & (x > 48)
+
+
 def tree() -> np.ndarray:
     y, x = grid()
     return (y > 20) & (abs(x - 48) < 6)
@@ -91,6 +97,7 @@ def test_relief_of_the_head_stays() -> None:
         (depth_of(head()).roll(-36, 1), portrait().roll(-36, 1)),
         (depth_of(head()), image((body(), PALE_SKY), (head(), SKIN))),  # No edge of colour
         (depth_of(head() & (grid()[0] < 15)), portrait()),  # Small
+        (depth_of(head() & ~hollow()), portrait()),  # Not convex
         (torch.full((SIDE, SIDE), NEAR), portrait()),
         (depth_of(head()), torch.zeros(SIDE, SIDE, 3)),
     ],
