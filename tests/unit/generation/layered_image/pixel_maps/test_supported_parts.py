@@ -58,6 +58,19 @@ def depth_of(near: np.ndarray, nearest: float = NEAR) -> Tensor:
     return torch.from_numpy(np.where(near, nearest, FAR)).float()
 
 
+def lid() -> np.ndarray:
+    y, x = grid()
+    return ((y - 34) / 18) ** 2 + ((x - 48) / 28) ** 2 < 1
+
+
+def pebbles() -> Tensor:
+    """A lid before stones of all colours, which a figure of colours has no outline in."""
+    rgb = np.random.default_rng(2).random((SIDE // 2, SIDE // 2, 3))
+    rgb = rgb.repeat(2, 0).repeat(2, 1)
+    rgb[lid()] = SKIN
+    return torch.from_numpy(rgb).float()
+
+
 def portrait() -> Tensor:
     """Before a flag of the coat's colour; with a badge of the sky's."""
     y, x = grid()
@@ -89,6 +102,7 @@ def test_relief_of_the_head_stays() -> None:
     [
         (depth_of(head()), image((ground(), LAWN), (head(), SKIN))),  # Before a horizon
         (depth_of(head()), image((head(), SKIN))),  # Before one wall
+        (depth_of(lid()), pebbles()),
         (depth_of(head(), FAR / 1.3), portrait()),  # Hardly nearer
         (depth_of(head() | body()), portrait()),  # The body is near already
         (depth_of(tree()), image((tree(), COAT))),  # Reaches the bottom
