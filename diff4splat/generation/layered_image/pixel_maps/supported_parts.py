@@ -83,7 +83,9 @@ def _carries(
     if min(map(_slope, sides)) < LEAST_SLOPE * len(figure):
         return False
     cut = np.abs(np.concatenate(sides) - _sides_end(part)) <= CUT_PX
-    return cut.mean() <= MOST_CUT and _outline_step(figure, part.middle, colors) >= COLOR_STEP
+    if cut.mean() > MOST_CUT:
+        return False
+    return _outline_step(figure, part.middle, colors) >= COLOR_STEP
 
 
 def _tops(figure: Bool[np.ndarray, "h w"], part: FloatingPart) -> Int[np.ndarray, " w"]:
