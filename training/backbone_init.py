@@ -29,6 +29,15 @@ def start_from_public_backbones(networks: Networks, parts: Sequence[str]) -> Non
                 f"public_backbone: expected parts on the image backbone, got {part}; set "
                 f"model.{part}.image_backbone or leave public_backbone out"
             )
-        weights = public_backbone_weights(network.backbone.size)
-        own = network.backbone.state_dict()
-        network.backbone.load_state_dict({name: weights[name] for name in own})
+        fill_backbone(network)
+
+
+def fill_backbone(network: BackboneUNet) -> None:
+    """Give the backbone of ``network`` its public weights.
+
+    Raises:
+        InputError: the package with the weights is not installed.
+    """
+    weights = public_backbone_weights(network.backbone.size)
+    own = network.backbone.state_dict()
+    network.backbone.load_state_dict({name: weights[name] for name in own})

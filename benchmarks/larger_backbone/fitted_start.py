@@ -9,8 +9,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from diff4splat.models.image_backbone.public_weights import public_backbone_weights
 from diff4splat.models.image_backbone.unet import BackboneUNet
+from diff4splat.training.backbone_init import fill_backbone
 
 RIDGE = 1e-3
 """Of the mean variance of a channel."""
@@ -28,9 +28,7 @@ def start_from(
     """
     kept = {name: value for name, value in network.state_dict().items() if _is_kept(name)}
     larger.load_state_dict(kept, strict=False)
-    weights = public_backbone_weights(larger.backbone.size)
-    names = larger.backbone.state_dict()
-    larger.backbone.load_state_dict({name: weights[name] for name in names})
+    fill_backbone(larger)
     with torch.no_grad():
         pairs = zip(network.lateral, network.backbone(images), strict=True)
         wanted = [conv(level) for conv, level in pairs]

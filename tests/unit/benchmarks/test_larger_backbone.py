@@ -3,7 +3,6 @@
 import pytest
 import torch
 
-from benchmarks.larger_backbone import fitted_start
 from benchmarks.larger_backbone.__main__ import main
 from benchmarks.larger_backbone.fitted_start import fit, start_from
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
@@ -11,6 +10,7 @@ from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
 from diff4splat.models.object_mask.mask_heads import HeadShape
+from diff4splat.training import backbone_init
 
 SHAPE = HeadShape(width=4, text_width=8)
 
@@ -51,7 +51,7 @@ def test_all_but_the_backbone_and_what_joins_it_is_kept(
 ) -> None:
     torch.manual_seed(0)
     public = EfficientNetLite(size="lite2").state_dict()
-    monkeypatch.setattr(fitted_start, "public_backbone_weights", lambda size: public)
+    monkeypatch.setattr(backbone_init, "public_backbone_weights", lambda size: public)
     left = start_from(network, other, torch.rand(6, 3, 64, 64))
     assert len(left) == len(other.lateral) and all(0 <= share <= 1 for share in left)
     before = network.state_dict()

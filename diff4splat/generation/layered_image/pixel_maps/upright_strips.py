@@ -66,8 +66,9 @@ def _strips(
     candidates = (inverse > NEARER * beside).astype(np.uint8)
     count, component, statistics, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
     for number in range(1, count):
-        if _is_upright(statistics[number], inverse.shape):
-            found = component == number
+        found = component == number
+        # Blur of a nearer strip beside it may be all that there is.
+        if _is_upright(statistics[number], inverse.shape) and core[found].any():
             yield found & core, found & ~core
 
 

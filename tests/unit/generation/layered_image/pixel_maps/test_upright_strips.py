@@ -101,6 +101,14 @@ def test_what_is_no_tower_stays(rows: slice, columns: slice, nearest: float) -> 
     torch.testing.assert_close(straightened(depth, FOCAL_PX), depth, rtol=1e-6, atol=0)
 
 
+def test_a_faint_strip_beside_a_near_one_is_no_strip() -> None:
+    depth = with_strip(*TOWER, 2.0)
+    depth[10:50, 38] = 20 / 1.2
+    found = straightened(depth, FOCAL_PX)
+    assert torch.equal(found[10:50, 38], depth[10:50, 38])
+    torch.testing.assert_close(found[TOWER], depth[TOWER])
+
+
 def test_a_beam_aslant_stays() -> None:
     depth = with_strip(slice(0, 0), slice(0, 0), 6.0)
     for row in range(10, 50):
