@@ -1,5 +1,7 @@
 """Other words for the nouns, colours, sides and verbs of captions."""
 
+from functools import lru_cache
+
 ANY_OBJECT = ("object", "thing")
 """Name an object together with its colour."""
 NOUN_SYNONYMS: dict[str, tuple[str, ...]] = {
@@ -90,5 +92,10 @@ def names(noun: str) -> tuple[str, ...]:
 
 def may_be_confused(noun: str, other: str) -> bool:
     """Whether one name fits both: a street lamp is a lamp."""
-    ends = [{name.split()[-1] for name in names(each)} for each in (noun, other)]
-    return not ends[0].isdisjoint(ends[1])
+    return not _last_words(noun).isdisjoint(_last_words(other))
+
+
+@lru_cache(4096)
+def _last_words(noun: str) -> frozenset[str]:
+    """Of all its names; asked a hundred times for every prompt of training."""
+    return frozenset(name.split()[-1] for name in names(noun))

@@ -31,6 +31,27 @@ def train(folder: Path, toy: Toy | None = None, **changes) -> StageResult:
     return fit_stage(ToyStage(), ToySamples(), (toy or Toy()).recipe(), toy_run(folder, **changes))
 
 
+@pytest.fixture(scope="module")
+def three_steps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that stopped; copy it."""
+    folder = tmp_path_factory.mktemp("three")
+    train(folder, stop_after_steps=3)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def never_stopped(tmp_path_factory: pytest.TempPathFactory) -> StageResult:
+    return train(tmp_path_factory.mktemp("six"))
+
+
+def assert_same_tensors(first: StageResult, second: StageResult) -> None:
+    for key, shape in stored_shapes(first.checkpoint).items():
+        ours, theirs = {key: torch.empty(shape)}, {key: torch.empty(shape)}
+        read_tensors(first.checkpoint, ours)
+        read_tensors(second.checkpoint, theirs)
+        assert torch.equal(ours[key], theirs[key])
+
+
 def names(folder: Path) -> list[str]:
     return sorted(path.name for path in (folder / "checkpoints").iterdir())
 
@@ -121,9 +142,10 @@ DAMAGES = (
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_checkpoint_is_passed_over_with_a_notice(tmp_path, damage) -> None:
-    train(tmp_path / "whole", stop_after_steps=3)
-    shutil.copytree(tmp_path / "whole", tmp_path / "hurt")
+def test_a_damaged_checkpoint_is_passed_over_with_a_notice(
+    tmp_path, three_steps, never_stopped, damage
+) -> None:
+    shutil.copytree(three_steps, tmp_path / "hurt")
     damage(tmp_path / "hurt" / "checkpoints" / name(3))
     notes: list[str] = []
     hurt = train(tmp_path / "hurt", note=notes.append)
@@ -131,13 +153,8 @@ def test_a_damaged_checkpoint_is_passed_over_with_a_notice(tmp_path, damage) -> 
     assert len(said) == 1
     assert name(3) in said[0]
     assert "toy: resumed at step 2" in notes
-    whole = train(tmp_path / "whole")
-    assert hurt.step == whole.step == 6
-    for key, shape in stored_shapes(whole.checkpoint).items():
-        first, second = {key: torch.empty(shape)}, {key: torch.empty(shape)}
-        read_tensors(whole.checkpoint, first)
-        read_tensors(hurt.checkpoint, second)
-        assert torch.equal(first[key], second[key])
+    assert hurt.step == never_stopped.step == 6
+    assert_same_tensors(never_stopped, hurt)
 
 
 def test_a_run_without_any_whole_checkpoint_begins_again(tmp_path) -> None:
@@ -196,8 +213,9 @@ def full_disk(*args: object, **kwargs: object) -> None:
 
 
 @pytest.mark.parametrize("place", ["safetensors.torch.save", "os.fsync", "os.replace"])
-def test_a_full_disk_leaves_the_checkpoints_before(tmp_path, monkeypatch, place: str) -> None:
-    whole = train(tmp_path / "whole")
+def test_a_full_disk_leaves_the_checkpoints_before(
+    tmp_path, monkeypatch, never_stopped, place: str
+) -> None:
     train(tmp_path / "full", stop_after_steps=2)
     before = names(tmp_path / "full")
     with monkeypatch.context() as patch:
@@ -205,12 +223,7 @@ def test_a_full_disk_leaves_the_checkpoints_before(tmp_path, monkeypatch, place:
         with pytest.raises(OutputError, match="the disk is full"):
             train(tmp_path / "full", stop_after_steps=1)
     assert names(tmp_path / "full") == before
-    result = train(tmp_path / "full")
-    for key, shape in stored_shapes(whole.checkpoint).items():
-        first, second = {key: torch.empty(shape)}, {key: torch.empty(shape)}
-        read_tensors(whole.checkpoint, first)
-        read_tensors(result.checkpoint, second)
-        assert torch.equal(first[key], second[key])
+    assert_same_tensors(never_stopped, train(tmp_path / "full"))
 
 
 def test_a_file_in_the_way_is_named(tmp_path) -> None:
