@@ -16,15 +16,15 @@ from torch.nn.functional import interpolate
 from diff4splat.generation.layered_image.other_grid import on_grid
 from diff4splat.generation.layered_image.types import ImageLayer, moving_mask
 
-GROUND_SHARE = 0.9
+GROUND_SHARE = 0.5
 """Of the way from a figure to the ground behind it, in log depth: cells that close gaps of the
-figure lie before it."""
+figure lie right behind it, those beside its outline a little before the ground."""
 LEAST_DISTANCE = 0.3
 """Of log depth between both: a floor that ends at the sky has cells of its own behind it."""
 
 
 def with_ground_colors(layer: ImageLayer, pixels: ImageLayer, ground: ImageLayer) -> ImageLayer:
-    """Static cells about as far as ``ground`` take its colours, not those of ``pixels``."""
+    """Static cells that lie nearer to ``ground`` than to ``pixels`` take its colours."""
     cell_px = float((pixels.camera.focal_px / layer.camera.focal_px).mean())
     depths = torch.stack([ground.depth, pixels.depth]).log()
     maps = _reduced(torch.cat([ground.rgb.movedim(-1, 0), depths]), cell_px)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 import torch
 from image_layers import layer
 
@@ -9,7 +10,7 @@ from diff4splat.generation.layered_image.ground_colors import with_ground_colors
 from diff4splat.generation.layered_image.types import ImageLayer
 
 SIDE, CELLS = 32, 8
-NEAR, FAR = 2.0, 8.0
+NEAR, MIDDLE, FAR = 2.0, 4.0, 8.0
 RED, BLUE = torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.2, 0.8])
 
 
@@ -28,13 +29,15 @@ def _with_ground(coarse: ImageLayer) -> ImageLayer:
     return with_ground_colors(coarse, _flat(SIDE, NEAR, RED), _flat(SIDE, FAR, BLUE))
 
 
-def test_far_cells_have_the_colours_of_the_ground() -> None:
-    found = _with_ground(_coarse(0.9 * FAR))
+@pytest.mark.parametrize("depth", [1.1 * MIDDLE, 0.9 * FAR])
+def test_far_cells_have_the_colours_of_the_ground(depth: float) -> None:
+    found = _with_ground(_coarse(depth))
     torch.testing.assert_close(found.rgb, BLUE.expand(CELLS, CELLS, 3))
 
 
-def test_cells_right_behind_the_object_keep_its_colours() -> None:
-    coarse = _coarse(1.1 * NEAR)
+@pytest.mark.parametrize("depth", [1.1 * NEAR, 0.9 * MIDDLE])
+def test_cells_nearer_to_the_object_keep_its_colours(depth: float) -> None:
+    coarse = _coarse(depth)
     assert torch.equal(_with_ground(coarse).rgb, coarse.rgb)
 
 
