@@ -41,7 +41,11 @@ from diff4splat.generation.layered_image.disocclusion import (
     inpaint_border,
     without_disoccluded,
 )
-from diff4splat.generation.layered_image.ground_colors import with_ground_colors
+from diff4splat.generation.layered_image.ground_colors import (
+    GROUND_SHARE,
+    INPAINTED_SHARE,
+    with_ground_colors,
+)
 from diff4splat.generation.layered_image.inpainting import Inpaint
 from diff4splat.generation.layered_image.pixel_maps.image_maps import (
     ImageMaps,
@@ -85,7 +89,8 @@ def build_layered_image(
     if reduced:
         hidden = [replace(layer, pixel_index=None) for layer in hidden]
     if occluded.ground is not None:
-        hidden = [with_ground_colors(layer, pixels, occluded.ground) for layer in hidden]
+        share = GROUND_SHARE if inpaint is None else INPAINTED_SHARE
+        hidden = [with_ground_colors(layer, pixels, occluded.ground, share) for layer in hidden]
     inpaint_behind = textured if inpaint is None else with_patch_texture(inpaint)
     if (disoccluded := disoccluded_layer(pixels, inpaint_behind)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)

@@ -8,6 +8,7 @@ from image_layers import FAR_RANGES, input_image, is_finite, layer, random_depth
 from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import downsample
+from diff4splat.generation.layered_image import build
 from diff4splat.generation.layered_image.build import (
     build_layered_image,
     farthest_depth,
@@ -20,12 +21,13 @@ from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sh
 from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
+from diff4splat.generation.layered_image.ground_colors import GROUND_SHARE, INPAINTED_SHARE
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
 from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
     PIXEL_FOOTPRINT_PX,
     pixel_layer,
 )
-from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage
+from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
@@ -254,6 +256,24 @@ def test_a_network_colours_every_layer_of_what_is_hidden_at_the_size_of_the_imag
         assert torch.equal(one.depth, other.depth) and torch.equal(one.mask, other.mask)
     for hidden in found[5:]:
         assert bool((hidden.rgb[hidden.mask] == 0.5).all(-1).any())
+
+
+def test_inpainted_ground_colours_cells_that_are_farther_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shares: list[float] = []
+
+    def noted(
+        layer: ImageLayer, pixels: ImageLayer, ground: ImageLayer, share: float
+    ) -> ImageLayer:
+        del pixels, ground
+        shares.append(share)
+        return layer
+
+    monkeypatch.setattr(build, "with_ground_colors", noted)
+    with_box()
+    with_box(inpaint=lambda rgb, known: rgb)
+    assert shares == [GROUND_SHARE, GROUND_SHARE, INPAINTED_SHARE, INPAINTED_SHARE]
 
 
 def test_behind_what_moves_lie_the_texture_of_patches_and_sharp_colours() -> None:

@@ -6,7 +6,7 @@ import pytest
 import torch
 from image_layers import layer
 
-from diff4splat.generation.layered_image.ground_colors import with_ground_colors
+from diff4splat.generation.layered_image.ground_colors import INPAINTED_SHARE, with_ground_colors
 from diff4splat.generation.layered_image.types import ImageLayer
 
 SIDE, CELLS = 32, 8
@@ -29,14 +29,22 @@ def _with_ground(coarse: ImageLayer) -> ImageLayer:
     return with_ground_colors(coarse, _flat(SIDE, NEAR, RED), _flat(SIDE, FAR, BLUE))
 
 
-@pytest.mark.parametrize("depth", [1.1 * MIDDLE, 0.9 * FAR])
-def test_far_cells_have_the_colours_of_the_ground(depth: float) -> None:
-    found = _with_ground(_coarse(depth))
+def test_far_cells_have_the_colours_of_the_ground() -> None:
+    found = _with_ground(_coarse(0.9 * FAR))
     torch.testing.assert_close(found.rgb, BLUE.expand(CELLS, CELLS, 3))
 
 
-@pytest.mark.parametrize("depth", [1.1 * NEAR, 0.9 * MIDDLE])
-def test_cells_nearer_to_the_object_keep_its_colours(depth: float) -> None:
+@pytest.mark.parametrize(("depth", "expected"), [(1.1 * MIDDLE, BLUE), (0.9 * MIDDLE, RED)])
+def test_inpainted_ground_gives_colours_to_cells_that_are_nearer_to_it(
+    depth: float, expected: torch.Tensor
+) -> None:
+    pixels, ground = _flat(SIDE, NEAR, RED), _flat(SIDE, FAR, BLUE)
+    found = with_ground_colors(_coarse(depth), pixels, ground, INPAINTED_SHARE)
+    torch.testing.assert_close(found.rgb, expected.expand(CELLS, CELLS, 3))
+
+
+@pytest.mark.parametrize("depth", [1.1 * NEAR, 1.1 * MIDDLE])
+def test_cells_between_object_and_ground_keep_its_colours(depth: float) -> None:
     coarse = _coarse(depth)
     assert torch.equal(_with_ground(coarse).rgb, coarse.rgb)
 
