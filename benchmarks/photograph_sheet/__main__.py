@@ -62,12 +62,12 @@ def main() -> None:
     cv2.imwrite(str(arguments.out), sheet[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
 
 
-def prepared(photograph: Photograph, model: str) -> InputImage:
-    """The photograph as ``generate --size 256`` takes it."""
+def prepared(photograph: Photograph, model: str, side_px: int = SIDE_PX) -> InputImage:
+    """The photograph as ``generate --size 256`` takes it, or with another size."""
     pixels = load(photograph)
     focal = choose_focal(pixels.shape[:2], photograph.fov_deg, None)
     rgb = torch.from_numpy(pixels).float() / 255
-    return prepare_image(rgb, focal, *find_image_size(model, SIDE_PX))
+    return prepare_image(rgb, focal, *find_image_size(model, side_px))
 
 
 @torch.no_grad()

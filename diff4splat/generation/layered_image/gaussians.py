@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from diff4splat.generation.layered_image.steep_surface import in_steep_surface
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
 from diff4splat.geometry.camera import stack_cameras
 from diff4splat.geometry.depth import distance_from_depth
@@ -57,10 +58,15 @@ def layer_gaussians(layer: ImageLayer) -> Gaussians:
 def image_gaussians(image: LayeredImage, key_times_s: Float[Tensor, " k"]) -> GaussianSet:
     """All layers as Gaussians; displacements are linear between the times of latent frames."""
     return GaussianSet(
-        gaussians=concatenate([layer_gaussians(layer) for layer in image.layers]),
+        gaussians=concatenate([_layer_gaussians(layer) for layer in image.layers]),
         motion=layers_motion(image, key_times_s),
         pixel_index=torch.cat([_pixel_index(layer) for layer in image.layers]),
     )
+
+
+def _layer_gaussians(layer: ImageLayer) -> Gaussians:
+    found = layer_gaussians(layer)
+    return in_steep_surface(found, layer) if layer.in_surface else found
 
 
 def layers_motion(image: LayeredImage, key_times_s: Float[Tensor, " k"]) -> Motion:

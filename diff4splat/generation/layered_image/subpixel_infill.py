@@ -51,6 +51,7 @@ def subpixel_infill(image: ImageLayer, least_slope: float = 0.0) -> ImageLayer:
         footprint_px=2 * image.footprint_px,
         displacement=displacement,
         in_image=image.in_image,
+        in_surface=image.in_surface,
     )
 
 

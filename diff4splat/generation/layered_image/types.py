@@ -39,6 +39,8 @@ class ImageLayer:
     """Pixel of the image, row by row, whose colour each cell has; ``NO_PIXEL`` where none."""
     in_image: bool = False
     """Whether the image shows this layer; the others extend it into what the image hides."""
+    in_surface: bool = False
+    """Whether Gaussians of steep cells lie in the surface; the others are round."""
 
     def __post_init__(self) -> None:
         size = self.camera.size_px

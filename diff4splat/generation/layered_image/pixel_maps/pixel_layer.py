@@ -47,6 +47,7 @@ def pixel_layer(small: InputImage, image: InputImage, maps: ImageMaps) -> ImageL
         displacement=displacement,
         pixel_index=torch.arange(depth.numel(), device=depth.device).view_as(depth),
         in_image=True,
+        in_surface=reduced,
     )
 
 

@@ -59,6 +59,12 @@ def with_box(border_cells: int = MARGIN, **changes: Any) -> LayeredImage:
     return build_layered_image(downsample(image, FACTOR), image, maps, border_cells, **changes)
 
 
+def test_gaussians_lie_in_the_surface_of_what_the_image_shows_alone() -> None:
+    layers = with_box().layers
+    assert [layer.in_surface for layer in layers] == [layer.in_image for layer in layers]
+    assert {layer.in_image for layer in layers} == {True, False}
+
+
 def moving_block() -> Tensor:
     """Four cells move to the right."""
     displacement = torch.zeros(3, *SMALL, 3)
