@@ -12,11 +12,10 @@ from torch import Tensor
 
 from diff4splat.generation.layered_image.steep_surface import in_steep_surface
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
-from diff4splat.geometry.camera import stack_cameras
-from diff4splat.geometry.depth import distance_from_depth
-from diff4splat.models.config.networks import GAUSSIAN_SPLIT, ActivationConfig
-from diff4splat.models.ldrm.gaussian_head import PixelBase, activate
+from diff4splat.geometry import quaternion
+from diff4splat.geometry.depth import unproject
 from diff4splat.scene.gaussians import Gaussians, concatenate
+from diff4splat.scene.harmonics import dc_from_color
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.static import StaticMotion
@@ -41,18 +40,17 @@ class GaussianSet:
 
 
 def layer_gaussians(layer: ImageLayer) -> Gaussians:
-    """One Gaussian per valid cell, facing the camera."""
-    cameras = stack_cameras([layer.camera])
-    depth = layer.depth.where(layer.mask, 1.0)[None]
-    base = PixelBase(
-        rgb=layer.rgb[None],
-        distance=distance_from_depth(cameras, depth),
-        opacity=torch.full_like(depth, layer.opacity),
-        cameras=cameras,
+    """One round Gaussian per valid cell."""
+    camera, depth = layer.camera, layer.depth[layer.mask]
+    radius = layer.footprint_px * depth / camera.focal_px.prod().sqrt()
+    facing = quaternion.from_matrix(camera.world_from_camera[:3, :3])
+    return Gaussians(
+        means=unproject(camera, layer.depth)[layer.mask],
+        quats=facing.repeat(len(depth), 1),
+        scales=radius[:, None].repeat(1, 3),
+        opacities=torch.full_like(depth, layer.opacity),
+        sh=dc_from_color(layer.rgb[layer.mask])[:, None],
     )
-    zero = depth.new_zeros(sum(GAUSSIAN_SPLIT), *depth.shape)
-    config = ActivationConfig(footprint_px=layer.footprint_px)
-    return activate(zero, base, config).select(layer.mask.flatten())
 
 
 def image_gaussians(image: LayeredImage, key_times_s: Float[Tensor, " k"]) -> GaussianSet:
