@@ -104,7 +104,15 @@ def _steps_apart(log_depth: Float[Tensor, "h w"]) -> Bool[Tensor, "h v"]:
 
 def _largest_neighbour(values: Float[Tensor, "h w"]) -> Float[Tensor, "hh ww"]:
     """Of the two or four pixels around each lattice point."""
-    return values.flatten()[_farthest_neighbour(values)]
+    return _with_larger_between(_with_larger_between(values).mT).mT
+
+
+def _with_larger_between(values: Float[Tensor, "h w"]) -> Float[Tensor, "hh w"]:
+    """The rows, and between every two of them the larger values."""
+    rows = values.new_empty(2 * len(values) - 1, values.shape[1])
+    rows[::2] = values
+    rows[1::2] = torch.maximum(values[:-1], values[1:])
+    return rows
 
 
 def _farthest_neighbour(depth: Float[Tensor, "h w"]) -> Int[Tensor, "hh ww"]:
