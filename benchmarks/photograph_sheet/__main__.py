@@ -1,6 +1,7 @@
 """Command line of the sheet: ``python -m benchmarks.photograph_sheet --out sheet.jpg``."""
 
 import argparse
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load
+from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load, of_folder
 from diff4splat.generation.inputs.image_size import find_image_size
 from diff4splat.generation.inputs.input_image import (
     InputImage,
@@ -42,24 +43,37 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="small")
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--photographs", type=Path, help="folder of others than the twelve")
+    parser.add_argument("--side", type=int, default=SIDE_PX, help="of the scenes, in pixels")
     parser.add_argument("--uncertainty", action="store_true", help="depth and how unsure it is")
     arguments = parser.parse_args()
-    if arguments.uncertainty:
-        model = load_model(arguments.model, parts=("monocular_depth",))
-        if not model.config.monocular_depth.uncertainty:
-            parser.error(f"--uncertainty: {arguments.model} does not predict it; take small")
-        row = partial(uncertainty_row, model)
-    else:
-        row = partial(view_row, Diff4SplatPipeline.from_pretrained(arguments.model))
-    rows = []
-    for photograph in PHOTOGRAPHS:
-        rows.append(row(prepared(photograph, arguments.model)))
+    folder = arguments.photographs
+    photographs = PHOTOGRAPHS if folder is None else of_folder(folder)
+    if not photographs:
+        parser.error(f"--photographs: {folder} has no .jpg or .png file; name another folder")
+    row, rows = drawing(arguments.model, arguments.uncertainty), []
+    for photograph in photographs:
+        rows.append(row(prepared(photograph, arguments.model, arguments.side)))
         print(photograph.name, flush=True)
+    sheet = in_columns(rows)[..., ::-1]
+    cv2.imwrite(str(arguments.out), sheet, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+
+
+def drawing(model: str, uncertainty: bool) -> Callable[[InputImage], UInt8[np.ndarray, "h w 3"]]:
+    """What makes a row of an image."""
+    if not uncertainty:
+        return partial(view_row, Diff4SplatPipeline.from_pretrained(model))
+    depth = load_model(model, parts=("monocular_depth",))
+    if not depth.config.monocular_depth.uncertainty:
+        raise SystemExit(f"--uncertainty: {model} does not predict it; take small")
+    return partial(uncertainty_row, depth)
+
+
+def in_columns(rows: list[UInt8[np.ndarray, "h w 3"]]) -> UInt8[np.ndarray, "y x 3"]:
+    """The rows, the first half of them at the left."""
     half = -(-len(rows) // COLUMNS)
-    sheet = np.hstack(
-        [np.vstack(rows[start : start + half]) for start in range(0, len(rows), half)]
-    )
-    cv2.imwrite(str(arguments.out), sheet[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+    rows = [*rows, *[np.full_like(rows[0], 255)] * (half * COLUMNS - len(rows))]
+    return np.hstack([np.vstack(rows[start : start + half]) for start in range(0, len(rows), half)])
 
 
 def prepared(photograph: Photograph, model: str, side_px: int = SIDE_PX) -> InputImage:

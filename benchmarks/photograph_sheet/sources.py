@@ -5,6 +5,7 @@ Axes: ``h w`` pixels.
 
 import importlib.resources
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -24,6 +25,7 @@ class Photograph:
 
     name: str
     package: str
+    """Empty for a file outside of packages."""
     file: str
     yaw_deg: float | None = None
     """To the right of the middle of a panorama."""
@@ -65,6 +67,12 @@ PHOTOGRAPHS = (
 """Portraits, close-ups, animals, machines, interiors, streets, woods."""
 
 
+def of_folder(folder: Path) -> tuple[Photograph, ...]:
+    """Every JPEG and PNG image in it, by name."""
+    files = sorted(file for file in folder.iterdir() if file.suffix in (".jpg", ".png"))
+    return tuple(Photograph(name=file.stem, package="", file=str(file)) for file in files)
+
+
 def load(photograph: Photograph) -> Image:
     """Its pixels, red first.
 
@@ -72,7 +80,9 @@ def load(photograph: Photograph) -> Image:
         InputError: the package that has the file is not installed.
     """
     try:
-        file = importlib.resources.files(photograph.package).joinpath(photograph.file)
+        package = photograph.package
+        root = importlib.resources.files(package) if package else Path()
+        file = root.joinpath(photograph.file)
         pixels = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     except (ModuleNotFoundError, FileNotFoundError) as error:
         raise InputError(
