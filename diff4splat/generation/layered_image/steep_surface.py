@@ -7,7 +7,8 @@ slope k along the unit ray r, in the direction w across it in which the surface 
     x → x + k r (w · x),   σ = (k + √(k² + 4)) / 2,
     axes  (w + σ r) / √(1 + σ²),  (σ w − r) / √(1 + σ²),  w × r   with scales σ, 1 / σ, 1,
 
-moves along the ray alone: the input view sees what it saw.
+moves along the ray alone: the input view sees what it saw. What moves stays round: displacements
+turn no Gaussian.
 """
 
 from dataclasses import replace
@@ -17,7 +18,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer
+from diff4splat.generation.layered_image.types import DEPTH_STEP, ImageLayer, moving_mask
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.rays import camera_rays, world_rays
 from diff4splat.scene.gaussians import Gaussians
@@ -31,11 +32,11 @@ def in_steep_surface(gaussians: Gaussians, layer: ImageLayer) -> Gaussians:
     """The round ``gaussians`` of the valid cells of ``layer``, sheared where it is steep."""
     slope, direction = _slopes(layer)
     _, rays = world_rays(layer.camera)
-    steep = slope[layer.mask] > LEAST_SLOPE
-    found = layer.mask & (slope > LEAST_SLOPE)
+    steep = (slope > LEAST_SLOPE) & ~moving_mask(layer.depth, layer.displacement)
+    found, chosen = layer.mask & steep, steep[layer.mask]
     quats, factors = _shear(slope[found], direction[found], rays[found])
     scales, rotations = gaussians.scales.clone(), gaussians.quats.clone()
-    scales[steep], rotations[steep] = scales[steep] * factors, quats
+    scales[chosen], rotations[chosen] = scales[chosen] * factors, quats
     return replace(gaussians, scales=scales, quats=rotations)
 
 

@@ -129,6 +129,17 @@ def test_pixels_and_infill_are_sheared_where_networks_see_a_smaller_copy() -> No
         assert pixels.in_surface == subpixel_infill(pixels).in_surface == is_reduced
 
 
+def test_what_moves_stays_round() -> None:
+    image = slanted(0.05)
+    moving = torch.arange(SIZE_PX[1]).expand(SIZE_PX) < 8
+    displacement = torch.zeros(3, *SIZE_PX, 3)
+    displacement[1, moving] = torch.tensor([0.1, 0.0, 0.0])
+    every, found = sheared(image), sheared(replace(image, displacement=displacement))
+    is_static = ~moving.flatten()
+    assert found.scales[is_static].equal(every.scales[is_static])
+    assert found.scales[~is_static].equal(layer_gaussians(image).scales[~is_static])
+
+
 def test_cells_without_a_surface_have_no_gaussian() -> None:
     image = slanted(0.05)
     mask = torch.arange(SIZE_PX[0] * SIZE_PX[1]).view(SIZE_PX) % 3 > 0
