@@ -1,6 +1,6 @@
 """From layers to Gaussians: order, masks, and displacements at key times."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import pytest
 import torch
@@ -13,7 +13,11 @@ from diff4splat.generation.layered_image.gaussians import (
     layers_motion,
 )
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer
-from diff4splat.geometry.camera import project
+from diff4splat.geometry import quaternion, rigid
+from diff4splat.geometry.camera import pinhole, project, stack_cameras
+from diff4splat.geometry.depth import distance_from_depth
+from diff4splat.models.config.networks import GAUSSIAN_SPLIT, ActivationConfig
+from diff4splat.models.ldrm.gaussian_head import PixelBase, activate
 from diff4splat.scene.harmonics import color_from_dc
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.static import StaticMotion
@@ -43,6 +47,25 @@ def test_each_valid_cell_is_a_gaussian_at_its_place_in_row_order() -> None:
     torch.testing.assert_close(gaussians.opacities, torch.full((16,), image.opacity))
     footprint = image.footprint_px * z / FOCAL_PX
     torch.testing.assert_close(gaussians.scales, footprint[:, None].expand(-1, 3))
+
+
+def test_gaussians_are_those_of_the_reconstruction_head_before_it_corrects_them() -> None:
+    turned = quaternion.to_matrix(torch.tensor([0.9, 0.2, -0.3, 0.1]))
+    pose = rigid.from_parts(turned, torch.tensor([0.4, -1.0, 2.0]))
+    camera = replace(pinhole(FOCAL_PX, SIZE_PX), focal_px=torch.tensor([18.0, 26.0]))
+    image = some_layer(mask=checkered(), camera=camera.with_pose(pose))
+    cameras = stack_cameras([image.camera])
+    base = PixelBase(
+        rgb=image.rgb[None],
+        distance=distance_from_depth(cameras, image.depth[None]),
+        opacity=torch.full((1, *SIZE_PX), image.opacity),
+        cameras=cameras,
+    )
+    config = ActivationConfig(footprint_px=image.footprint_px)
+    head = activate(torch.zeros(sum(GAUSSIAN_SPLIT), 1, *SIZE_PX), base, config)
+    found, wanted = layer_gaussians(image), head.select(checkered().flatten())
+    for field in fields(wanted):
+        torch.testing.assert_close(getattr(found, field.name), getattr(wanted, field.name))
 
 
 def test_layers_follow_one_another_with_their_pixels() -> None:
