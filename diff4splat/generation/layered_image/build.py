@@ -1,8 +1,8 @@
 """From an image, its depth and its displacement to all layers.
 
     image and maps ─ upsample ─ smooth, align edges ─ grow foreground ─ pixels ─ infill  these show
-    pixels ─┬─ occluded layers ─┬─ infill                        the image; all others extend
-            │                   └─ ground                            it into what it hides
+    pixels ─┬─ occluded layers ── ground                         the image; all others extend
+            │                                                        it into what it hides
             └─ disoccluded layer ─┬─ fine border
                                   └─ sharp colours
     smaller copy and maps ─┬─ background layer ─┬─ inpaint what moving ─ colours of the ground
@@ -59,10 +59,6 @@ from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, moving_mask
 
-STEEP_SHARE = 2.0
-"""Difference of log depth over the longer side of the image: a camera 15 degrees beside the first
-sees cells so far apart that half a pixel is between them."""
-
 
 def build_layered_image(
     small: InputImage,
@@ -96,26 +92,13 @@ def build_layered_image(
         moving = moving_mask(maps.depth, maps.displacement)
         layer = disoccluded if inpaint is None else with_sharp_colors(disoccluded)
         hidden = [layer, *(without_disoccluded(each, moving) for each in hidden)]
-    hidden += with_infill(occluded.all, maps)
+    hidden += occluded.all
     if border_cells:
         hidden += fine_borders(pixels, disoccluded, rings, inpaint)
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
         return LayeredImage(layers=(wide, *hidden))
     return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
-
-
-def with_infill(layers: list[ImageLayer], maps: ImageMaps) -> list[ImageLayer]:
-    """Layers behind depth edges, with infill where depth is predicted.
-
-    Predicted depth is steep beside an edge: cells alone would part into stripes.
-    """
-    is_predicted = maps.fine is None or maps.fine.smooth
-    if not is_predicted:
-        return layers
-    steps = [STEEP_SHARE / max(layer.depth.shape) for layer in layers]
-    infill = [subpixel_infill(layer, step) for layer, step in zip(layers, steps, strict=True)]
-    return [*layers, *infill]
 
 
 def hidden_layers(

@@ -24,19 +24,16 @@ SLOPE_FACTOR = 2.0
 """An edge is so many times as high as the steps beside it."""
 
 
-def subpixel_infill(image: ImageLayer, least_slope: float = 0.0) -> ImageLayer:
+def subpixel_infill(image: ImageLayer) -> ImageLayer:
     """The lattice without pixels and outlines; each point moves as the nearest pixel.
 
-    Where the layer has no cells, neither has the lattice; nor where log depth differs by less than
-    ``least_slope`` from cell to cell.
+    Where the layer has no cells, neither has the lattice.
     """
     depth, rgb = _lattice_maps(image)
     rows, columns = _nearest(image, depth)
     between = torch.ones_like(depth, dtype=torch.bool)
     between[::2, ::2] = False
     between &= -_largest_neighbour(-image.mask.to(depth)) > 0
-    log_depth = image.depth.log()
-    between &= _largest_neighbour(log_depth) + _largest_neighbour(-log_depth) >= least_slope
     displacement = image.displacement
     between &= ~_between_moving_and_static(moving_mask(image.depth, displacement))
     if displacement is not None:

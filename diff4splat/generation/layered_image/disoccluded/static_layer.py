@@ -39,5 +39,4 @@ def static_layer(
         displacement=None,
         pixel_index=torch.full_like(known, NO_PIXEL, dtype=torch.long),
         in_image=False,
-        in_surface=False,
     )

@@ -12,13 +12,11 @@ from diff4splat.generation.layered_image import build
 from diff4splat.generation.layered_image.build import (
     build_layered_image,
     farthest_depth,
-    with_infill,
 )
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layers
 from diff4splat.generation.layered_image.disoccluded.patch_texture import with_patch_texture
 from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sharp_colors
-from diff4splat.generation.layered_image.disoccluded.texture import textured
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
 from diff4splat.generation.layered_image.ground_colors import GROUND_SHARE, INPAINTED_SHARE
@@ -59,10 +57,12 @@ def with_box(border_cells: int = MARGIN, **changes: Any) -> LayeredImage:
     return build_layered_image(downsample(image, FACTOR), image, maps, border_cells, **changes)
 
 
-def test_gaussians_lie_in_the_surface_of_what_the_image_shows_alone() -> None:
+def test_steep_gaussians_lie_in_the_surface_of_all_layers_with_cells_of_a_pixel() -> None:
     layers = with_box().layers
-    assert [layer.in_surface for layer in layers] == [layer.in_image for layer in layers]
-    assert {layer.in_image for layer in layers} == {True, False}
+    lattice = tuple(2 * side - 1 for side in SIZE_PX)
+    fine = [tuple(layer.depth.shape) in (SIZE_PX, lattice) for layer in layers]
+    assert [layer.in_surface for layer in layers] == fine
+    assert {layer.in_image for layer in layers if layer.in_surface} == {True, False}
 
 
 def moving_block() -> Tensor:
@@ -73,16 +73,15 @@ def moving_block() -> Tensor:
 
 
 def test_the_image_shows_pixels_and_infill_and_the_others_extend_it() -> None:
-    pixels, infill, background, border, occluded, between, near, far = with_box().layers
-    assert [layer.in_image for layer in with_box().layers] == [True, True, *[False] * 6]
+    pixels, infill, background, border, occluded, near, far = with_box().layers
+    assert [layer.in_image for layer in with_box().layers] == [True, True, *[False] * 5]
     assert torch.equal(built().layers[0].rgb, random_rgb(*SIZE_PX))
     assert (pixels.opacity, pixels.footprint_px) == (OPAQUE, PIXEL_FOOTPRINT_PX)
     assert pixels.pixel_index.flatten().tolist() == list(range(16 * 24))
     assert infill.depth.shape == (31, 47)
     assert background.depth.shape == SMALL
     assert border.depth.shape == (2 + 2 * MARGIN, 3 + 2 * MARGIN)
-    assert occluded.depth.shape == SIZE_PX and between.depth.shape == (31, 47)
-    assert 0 < int(between.mask.sum()) < 3 * int(occluded.mask.sum())
+    assert occluded.depth.shape == SIZE_PX
     assert near.depth.shape == (16 + 2 * 3, 24 + 2 * 3)
     assert far.depth.shape == (16 + 2 * 12, 24 + 2 * 12)
     assert built().visible_count == 31 * 47
@@ -119,30 +118,6 @@ def test_the_farthest_pixel_decides() -> None:
     assert farthest_depth(small, pixels).tolist() == [[2.0, 5.0]]
 
 
-def test_behind_the_edges_of_given_depth_is_no_infill() -> None:
-    image = input_image(random_rgb(64, 96))
-    depth = torch.full((64, 96), 9.0)
-    depth[16:48, 32:64] = 2.0
-    counts = []
-    for smooth in (False, True):
-        fine = FineMaps(rgb=image.rgb, depth=depth, smooth=smooth)
-        maps = ImageMaps(depth=depth[::4, ::4], displacement=None, fine=fine)
-        counts.append(len(build_layered_image(downsample(image, 4), image, maps, 0).layers))
-    assert counts == [4, 5]
-
-
-def test_infill_behind_edges_is_where_the_layer_is_steep() -> None:
-    shares = []
-    for far in (torch.tensor(9.0), torch.linspace(2.2, 6.0, 96).exp()):
-        depth = torch.ones(64, 96) * far
-        depth[16:48, 32:64] = 2.0
-        pixels = layer(depth, pixel_index=torch.zeros(64, 96).long())
-        maps = ImageMaps(depth=depth, displacement=None)
-        occluded, infill = with_infill(occluded_layers(pixels, textured).all, maps)
-        shares.append(int(infill.mask.sum()) / int(occluded.mask.sum()))
-    assert shares[0] < 0.5 and shares[1] > 1
-
-
 def test_images_that_networks_see_whole_have_no_occluded_layer() -> None:
     image = input_image(random_rgb(*SIZE_PX))
     depth = torch.full(SIZE_PX, 9.0)
@@ -167,7 +142,7 @@ def test_the_foreground_grows_by_a_pixel(side: int) -> None:
 
 
 def test_without_border_cells_there_is_no_border_layer() -> None:
-    assert len(with_box(border_cells=0).layers) == 5
+    assert len(with_box(border_cells=0).layers) == 4
 
 
 def test_coarse_layers_match_no_pixel_of_a_larger_image() -> None:
@@ -257,7 +232,7 @@ def test_a_network_colours_every_layer_of_what_is_hidden_at_the_size_of_the_imag
     plain = with_box(displacement=moving).layers
     found = with_box(displacement=moving, inpaint=grey).layers
     changed = [not torch.equal(a.rgb, b.rgb) for a, b in zip(plain, found, strict=True)]
-    assert changed == [False, False, True, True, True, True, True, True, True]
+    assert changed == [False, False, *[True] * 6]
     for one, other in zip(plain, found, strict=True):
         assert torch.equal(one.depth, other.depth) and torch.equal(one.mask, other.mask)
     for hidden in found[5:]:

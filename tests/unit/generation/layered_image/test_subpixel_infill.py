@@ -188,13 +188,3 @@ def test_a_layer_that_is_not_everywhere_is_filled_where_all_neighbours_are() -> 
         subpixel_infill(pixels(plane())).mask[:, 6:].sum()
     )
     assert not infill.in_image
-
-
-def test_flat_parts_may_do_without() -> None:
-    depth = torch.ones(SIZE_PX)
-    depth[:, 3:] = torch.tensor([1.01, 1.02, 1.03])
-    mask = subpixel_infill(pixels(depth), 0.005).mask
-    _, columns = lattice()
-    assert not bool(mask[columns <= 2].any()) and bool(
-        mask[(columns > 2) & (columns % 1 > 0)].all()
-    )
