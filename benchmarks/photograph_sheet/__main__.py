@@ -50,7 +50,7 @@ def main() -> None:
     folder = arguments.photographs
     photographs = PHOTOGRAPHS if folder is None else of_folder(folder)
     if not photographs:
-        parser.error(f"--photographs: {folder} has no .jpg or .png file; name another folder")
+        parser.error(f"--photographs: {folder} has no JPEG or PNG file; name another folder")
     row, rows = drawing(arguments.model, arguments.uncertainty), []
     for photograph in photographs:
         rows.append(row(prepared(photograph, arguments.model, arguments.side)))

@@ -69,7 +69,8 @@ PHOTOGRAPHS = (
 
 def of_folder(folder: Path) -> tuple[Photograph, ...]:
     """Every JPEG and PNG image in it, by name."""
-    files = sorted(file for file in folder.iterdir() if file.suffix in (".jpg", ".png"))
+    endings = (".jpg", ".jpeg", ".png")
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in endings)
     return tuple(Photograph(name=file.stem, package="", file=str(file)) for file in files)
 
 
