@@ -12,6 +12,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, load, of_folder
+from diff4splat.errors import InputError
 from diff4splat.generation.inputs.image_size import find_image_size
 from diff4splat.generation.inputs.input_image import (
     InputImage,
@@ -26,6 +27,7 @@ from diff4splat.paths.build import build_path
 from diff4splat.paths.settings import PathSettings
 from diff4splat.render.api import render
 from diff4splat.scene.extent import scene_frame
+from diff4splat.scene.scene import Scene
 
 SIDE_PX = 256
 ORBITS = ("orbit:0.0417", "orbit:-0.0417")
@@ -47,11 +49,12 @@ def main() -> None:
     parser.add_argument("--side", type=int, default=SIDE_PX, help="of the scenes, in pixels")
     parser.add_argument("--uncertainty", action="store_true", help="depth and how unsure it is")
     arguments = parser.parse_args()
-    folder = arguments.photographs
-    photographs = PHOTOGRAPHS if folder is None else of_folder(folder)
-    if not photographs:
-        parser.error(f"--photographs: {folder} has no JPEG or PNG file; name another folder")
-    row, rows = drawing(arguments.model, arguments.uncertainty), []
+    folder, rows = arguments.photographs, []
+    try:
+        photographs = PHOTOGRAPHS if folder is None else of_folder(folder)
+        row = drawing(arguments.model, arguments.uncertainty)
+    except InputError as error:
+        parser.error(str(error))
     for photograph in photographs:
         rows.append(row(prepared(photograph, arguments.model, arguments.side)))
         print(photograph.name, flush=True)
@@ -65,7 +68,7 @@ def drawing(model: str, uncertainty: bool) -> Callable[[InputImage], UInt8[np.nd
         return partial(view_row, Diff4SplatPipeline.from_pretrained(model))
     depth = load_model(model, parts=("monocular_depth",))
     if not depth.config.monocular_depth.uncertainty:
-        raise SystemExit(f"--uncertainty: {model} does not predict it; take small")
+        raise InputError(f"--uncertainty: {model} does not predict it; take small")
     return partial(uncertainty_row, depth)
 
 
@@ -88,13 +91,17 @@ def prepared(photograph: Photograph, model: str, side_px: int = SIDE_PX) -> Inpu
 def view_row(pipeline: Diff4SplatPipeline, picture: InputImage) -> UInt8[np.ndarray, "h w 3"]:
     """The photograph, 15 degrees to one side and to the other, depth."""
     scene = pipeline(picture, "static")
-    view, images = scene_frame(scene, picture.camera), [picture.rgb]
-    for orbit in ORBITS:
-        camera = build_path(orbit, view, PathSettings(frames=2, fps=1)).cameras[1]
-        images.append(render(scene, camera).rgb.clamp(0, 1))
+    images = [picture.rgb, *(from_beside(scene, picture, orbit) for orbit in ORBITS)]
     depth = render(scene, picture.camera, outputs=("rgb", "depth")).depth
     cells = [(255 * image).round().byte().numpy() for image in images]
     return np.hstack([in_cell(cell) for cell in (*cells, depth_colors(depth))])
+
+
+@torch.no_grad()
+def from_beside(scene: Scene, picture: InputImage, orbit: str) -> Float[Tensor, "h w 3"]:
+    """What a camera sees that has gone along the orbit."""
+    path = build_path(orbit, scene_frame(scene, picture.camera), PathSettings(frames=2, fps=1))
+    return render(scene, path.cameras[1]).rgb.clamp(0, 1)
 
 
 @torch.no_grad()

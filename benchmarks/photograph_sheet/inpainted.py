@@ -13,15 +13,12 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from benchmarks.photograph_sheet.__main__ import ORBITS, QUALITY, in_cell, prepared
+from benchmarks.photograph_sheet.__main__ import ORBITS, QUALITY, from_beside, in_cell, prepared
 from benchmarks.photograph_sheet.sources import PHOTOGRAPHS
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.pipeline import Diff4SplatPipeline
 from diff4splat.generation.settings import GenerationSettings
-from diff4splat.paths.build import build_path
-from diff4splat.paths.settings import PathSettings
 from diff4splat.render.api import render
-from diff4splat.scene.extent import scene_frame
 
 ROWS = (
     ("camera", None),
@@ -58,8 +55,7 @@ def changed(
     scene = pipeline(picture, "static", prompt, settings=settings)
     if prompt is not None:
         return render(scene, picture.camera, float(scene.motion.time_range_s[1])).rgb.clamp(0, 1)
-    path = build_path(ORBITS[0], scene_frame(scene, picture.camera), PathSettings(frames=2, fps=1))
-    return render(scene, path.cameras[1]).rgb.clamp(0, 1)
+    return from_beside(scene, picture, ORBITS[0])
 
 
 def _cell(rgb: Float[Tensor, "h w 3"]) -> UInt8[np.ndarray, "y x 3"]:

@@ -68,9 +68,17 @@ PHOTOGRAPHS = (
 
 
 def of_folder(folder: Path) -> tuple[Photograph, ...]:
-    """Every JPEG and PNG image in it, by name."""
+    """Every JPEG and PNG image in it, by name.
+
+    Raises:
+        InputError: there is none.
+    """
     endings = (".jpg", ".jpeg", ".png")
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in endings)
+    files = sorted(file for file in folder.glob("*") if file.suffix.lower() in endings)
+    if not files:
+        raise InputError(
+            f"photographs: expected JPEG or PNG files in {folder}, got none; name another folder"
+        )
     return tuple(Photograph(name=file.stem, package="", file=str(file)) for file in files)
 
 

@@ -12,19 +12,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from benchmarks.photograph_sheet.__main__ import ORBITS, QUALITY, prepared
+from benchmarks.photograph_sheet.__main__ import ORBITS, QUALITY, from_beside, prepared
 from benchmarks.photograph_sheet.sources import Photograph
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image import steep_surface
 from diff4splat.generation.pipeline import Diff4SplatPipeline
-from diff4splat.paths.build import build_path
-from diff4splat.paths.settings import PathSettings
-from diff4splat.render.api import render
-from diff4splat.scene.extent import scene_frame
 
 PHOTOGRAPHS = (
     Photograph(name="flower", package="sklearn", file="datasets/images/flower.jpg"),
@@ -46,8 +41,8 @@ def main() -> None:
     for photograph in PHOTOGRAPHS:
         picture = prepared(photograph, arguments.model, SIDE_PX)
         with round_gaussians():
-            before = from_beside(pipeline, picture)
-        views = (picture.rgb, before, from_beside(pipeline, picture))
+            before = view(pipeline, picture)
+        views = (picture.rgb, before, view(pipeline, picture))
         rows.append(np.hstack([_cell(rgb) for rgb in views]))
     sheet = np.vstack(rows)[..., ::-1]
     cv2.imwrite(str(arguments.out), sheet, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
@@ -64,13 +59,9 @@ def round_gaussians() -> Iterator[None]:
         steep_surface.LEAST_SLOPE = least
 
 
-@torch.no_grad()
-def from_beside(pipeline: Diff4SplatPipeline, picture: InputImage) -> Float[Tensor, "h w 3"]:
-    """The scene as a camera 15 degrees beside the first sees it."""
-    scene = pipeline(picture, "static")
-    frame = scene_frame(scene, picture.camera)
-    path = build_path(ORBITS[1], frame, PathSettings(frames=2, fps=1))
-    return render(scene, path.cameras[1]).rgb.clamp(0, 1)
+def view(pipeline: Diff4SplatPipeline, picture: InputImage) -> Float[Tensor, "h w 3"]:
+    """A scene of the photograph, from 15 degrees beside."""
+    return from_beside(pipeline(picture, "static"), picture, ORBITS[1])
 
 
 def _cell(rgb: Float[Tensor, "h w 3"]) -> UInt8[np.ndarray, "y x 3"]:
