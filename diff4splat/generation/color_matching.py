@@ -21,7 +21,8 @@ from torch import Tensor
 from diff4splat.generation.layered_image.types import NO_PIXEL
 from diff4splat.geometry.camera import Camera
 from diff4splat.progress.run_log import RunLog
-from diff4splat.render.api import DEFAULTS, render
+from diff4splat.render.api import DEFAULTS
+from diff4splat.render.other_colors import open_view
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import color_from_dc, dc_from_color
@@ -64,14 +65,16 @@ def matched_colors(
 ) -> Float[Tensor, "n c 3"]:
     """Harmonics with which ``gaussians``, as they are at the first time, show the image."""
     rows = (view.pixel_index != NO_PIXEL).nonzero()[:, 0]
-    step = torch.zeros_like(gaussians.sh[rows, 0])
+    sh = gaussians.sh.clone()
+    draw = open_view(gaussians, view.camera, settings=settings)
+    step = torch.zeros_like(sh[rows, 0])
     for momentum, rate in chebyshev_factors(steps):
-        seen = render(gaussians, view.camera, settings=settings).rgb
+        seen = draw(sh)
         residual = _per_cell(view.rgb.to(seen) - seen, view.stride)
         step = momentum * step + rate * residual[view.pixel_index[rows]]
-        gaussians = _add_color(gaussians, rows, step)
+        sh[rows, 0] = dc_from_color((color_from_dc(sh[rows, 0]) + step).clamp(0, 1))
         advance()
-    return gaussians.sh
+    return sh
 
 
 def chebyshev_factors(steps: int) -> Iterator[tuple[float, float]]:
@@ -91,11 +94,3 @@ def _per_cell(image: Float[Tensor, "h w 3"], stride: int) -> Float[Tensor, "c 3"
     """Mean over the pixels of each cell."""
     means = torch.nn.functional.avg_pool2d(image.movedim(-1, 0)[None], stride)[0]
     return means.flatten(1).mT
-
-
-def _add_color(
-    gaussians: Gaussians, rows: Int[Tensor, " m"], change: Float[Tensor, "m 3"]
-) -> Gaussians:
-    sh = gaussians.sh.clone()
-    sh[rows, 0] = dc_from_color((color_from_dc(sh[rows, 0]) + change).clamp(0, 1))
-    return replace(gaussians, sh=sh)

@@ -4,16 +4,16 @@ Axes: ``h w`` pixels, ``t`` frames. Times are seconds.
 """
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 
-import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from diff4splat.errors import ConfigError, InputError, ShapeError
+from diff4splat.errors import ConfigError
 from diff4splat.geometry.camera import Camera
 from diff4splat.paths.camera_path import CameraPath
 from diff4splat.render.backends import choose
+from diff4splat.render.jobs import checked_camera, make_job, one_by_one, state_of
 from diff4splat.render.resolution import (
     averaged,
     averaging_factor,
@@ -29,7 +29,6 @@ from diff4splat.render.settings import (
     require_outputs,
     stack_outputs,
 )
-from diff4splat.render.support import renderable_gaussians, require_finite_camera
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.static import StaticMotion
 from diff4splat.scene.scene import Scene
@@ -69,12 +68,12 @@ def render(
     if settings.dilation_px2 is None and isinstance(scene_or_gaussians, Scene):
         return _render_scene(scene_or_gaussians, camera, time_s, wanted, settings, backend)
     if camera.batch_shape == () and not isinstance(time_s, Tensor):
-        job = _job(scene_or_gaussians, camera, time_s, wanted, settings)
+        job = make_job(scene_or_gaussians, camera, time_s, wanted, settings)
         return choose(backend, job).render(job)
-    cameras, times_s = _batch(camera, time_s)
+    cameras, times_s = one_by_one(camera, time_s)
     if len(set(times_s)) == 1 and "flow" not in wanted:
         # One state serves all cameras.
-        scene_or_gaussians = _state(scene_or_gaussians, times_s[0])
+        scene_or_gaussians = state_of(scene_or_gaussians, times_s[0])
     frames = [
         render(scene_or_gaussians, one, at, outputs=wanted, settings=settings, backend=backend)
         for one, at in zip(cameras, times_s, strict=True)
@@ -98,47 +97,6 @@ def _render_scene(
     settings = with_default_dilation(scene, camera, settings)
     image = render(scene, camera, time_s, outputs=outputs, settings=settings, backend=backend)
     return image if factor == 1 else averaged(image, factor, wanted)
-
-
-def _job(
-    subject: Scene | Gaussians,
-    camera: Camera,
-    time_s: float,
-    outputs: frozenset[str],
-    settings: RenderSettings,
-) -> RenderJob:
-    """One image, with both ends of the flow."""
-    later_s = time_s if settings.flow_time_s is None else settings.flow_time_s
-    gaussians = _uniform(_state(subject, time_s))
-    later = gaussians
-    if "flow" in outputs and later_s != time_s:
-        later = _uniform(_state(subject, later_s))
-    later_camera = camera if settings.flow_camera is None else settings.flow_camera
-    return RenderJob(
-        gaussians=gaussians,
-        camera=_usable(camera, gaussians),
-        outputs=outputs,
-        settings=_matching(settings, gaussians),
-        flow_gaussians=later,
-        flow_camera=_usable(later_camera, gaussians),
-    )
-
-
-def _batch(camera: Camera, time_s: float | Float[Tensor, " b"]) -> tuple[list[Camera], list[float]]:
-    """Cameras and times one by one; one of either serves all of the other."""
-    if len(camera.batch_shape) > 1:
-        raise ShapeError(
-            f"camera: expected at most one batch axis, got shape {camera.batch_shape}; flatten it"
-        )
-    times_s = time_s.tolist() if isinstance(time_s, Tensor) else [float(time_s)]
-    times_s = times_s if isinstance(times_s, list) else [times_s]
-    cameras = [camera] if camera.batch_shape == () else [camera[i] for i in range(len(camera))]
-    if not cameras or not times_s:
-        raise ShapeError("camera and time_s: expected at least one of each, got an empty batch")
-    count = len(times_s) if len(cameras) == 1 else len(cameras)
-    if len(times_s) not in (1, count):
-        raise ShapeError(f"time_s: expected 1 or {count} times for the cameras, got {len(times_s)}")
-    return cameras * (count // len(cameras)), times_s * (count // len(times_s))
 
 
 def render_video(
@@ -185,7 +143,7 @@ def _frames(
     subject = scene.gaussians if isinstance(scene.motion, StaticMotion) else scene
     shared = None
     if last > 0 and "flow" not in outputs:
-        first = _job(subject, path.cameras[0], times_s[0], outputs, settings)
+        first = make_job(subject, path.cameras[0], times_s[0], outputs, settings)
         shared = _shared(scene, first, backend)
     for index in range(last + 1):
         camera, own = path.cameras[index], settings
@@ -222,25 +180,6 @@ def _require_sources(outputs: frozenset[str], settings: RenderSettings) -> froze
     return outputs
 
 
-def _matching(settings: RenderSettings, gaussians: Gaussians) -> RenderSettings:
-    """Settings whose features belong to ``gaussians``, in their dtype and on their device."""
-    features = settings.features
-    if features is None:
-        return settings
-    if features.ndim != 2 or len(features) != len(gaussians):
-        raise ShapeError(
-            f"settings.features: expected ({len(gaussians)}, channels), got {tuple(features.shape)}"
-        )
-    finite = torch.isfinite(features)
-    if not bool(finite.all()):
-        # Gaussians that are left out anyway may have any features.
-        usable, _ = renderable_gaussians(gaussians)
-        if not bool(finite[usable].all()):
-            raise InputError("settings.features: expected finite numbers, got NaN or infinity")
-        features = torch.where(finite, features, 0.0)
-    return replace(settings, features=features.to(gaussians.means))
-
-
 def _shared(
     scene: Scene, first: RenderJob, backend: str
 ) -> Callable[[Camera, float], RenderOutput] | None:
@@ -249,35 +188,4 @@ def _shared(
     draw = opener(scene, first) if opener else None
     if draw is None:
         return None
-    return lambda camera, time_s: draw(_usable(camera, first.gaussians), time_s)
-
-
-def _state(scene_or_gaussians: Scene | Gaussians, time_s: float) -> Gaussians:
-    if isinstance(scene_or_gaussians, Scene):
-        return scene_or_gaussians.state_at(time_s)
-    return scene_or_gaussians
-
-
-def _uniform(gaussians: Gaussians) -> Gaussians:
-    """``gaussians`` when one arithmetic fits all of it."""
-    tensors = [getattr(gaussians, field.name) for field in fields(gaussians)]
-    kinds = {(tensor.dtype, tensor.device) for tensor in tensors}
-    if len(kinds) != 1:
-        got = ", ".join(sorted(f"{dtype} on {device}" for dtype, device in kinds))
-        raise ShapeError(f"Gaussians: expected one dtype and device, got {got}; call .to()")
-    if tensors[0].dtype not in (torch.float32, torch.float64):
-        raise ShapeError(
-            f"Gaussians: expected float32 or float64, got {tensors[0].dtype}; "
-            "call .to(torch.float32)"
-        )
-    return gaussians
-
-
-def _usable(camera: Camera, gaussians: Gaussians) -> Camera:
-    """One finite camera in the arithmetic of ``gaussians``."""
-    if camera.batch_shape != ():
-        raise ShapeError(
-            f"settings.flow_camera: expected one camera, got a batch of shape {camera.batch_shape}"
-        )
-    require_finite_camera(camera)
-    return camera.to(gaussians.means.dtype).to(gaussians.means.device)
+    return lambda camera, time_s: draw(checked_camera(camera, first.gaussians), time_s)

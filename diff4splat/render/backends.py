@@ -12,7 +12,7 @@ from diff4splat.errors import ConfigError
 from diff4splat.render.settings import RenderJob, RenderOutput
 
 BACKENDS = {
-    "gsplat": "diff4splat.render.gsplat_backend",
+    "gsplat": "diff4splat.render.gsplat.backend",
     "raster": "diff4splat.render.raster.backend",
     "reference": "diff4splat.render.reference",
 }
@@ -24,7 +24,8 @@ class Backend(Protocol):
     """What the module of a back end offers.
 
     It may also have ``open_sequence(scene, first_job)``, which gives a function of camera and time
-    that draws frames of one scene with shared work, or None where it cannot.
+    that draws frames of one scene with shared work, or None where it cannot. And
+    ``open_view(job)``, which gives a function of harmonics that draws one view in these colours.
     """
 
     def unsupported_reason(self, job: RenderJob) -> str | None:

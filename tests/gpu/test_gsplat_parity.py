@@ -8,8 +8,8 @@ import pytest
 import torch
 from oracles_gsplat import EXTREMES, MADE, View, aligned_view, both, everything, on, random_view
 
-from diff4splat.render import gsplat_backend
 from diff4splat.render.api import render
+from diff4splat.render.gsplat import backend as gsplat_backend
 from diff4splat.render.settings import RenderSettings
 
 pytestmark = [

@@ -1,6 +1,6 @@
 """The back end ``raster``: float32 on CPUs, compiled on first use.
 
-Axes: ``n`` Gaussians, ``h w`` pixels, ``c`` channels.
+Axes: ``n`` Gaussians, ``k`` harmonics, ``h w`` pixels, ``c`` channels.
 """
 
 from collections.abc import Callable
@@ -88,6 +88,17 @@ def open_sequence(scene: Scene, job: RenderJob) -> Callable[[Camera, float], Ren
         return _named(job, raster, median_depth)
 
     return draw
+
+
+def open_view(job: RenderJob) -> Callable[[Float[Tensor, "n k 3"]], RenderOutput]:
+    """A renderer of the colours of ``job`` with other harmonics, without gradients."""
+    from diff4splat.render.raster.fixed_view import FixedView
+    from diff4splat.render.raster.jit import GROUP
+
+    GROUP.ensure_compiled()
+    plan = make_raster_settings(job.camera, job.settings, colors=True, medians=False)
+    view = FixedView(plan, job.gaussians, job.camera, job.settings.memory_bytes)
+    return lambda sh: _named(job, view.draw(sh), None)
 
 
 def _wants_gradient(job: RenderJob) -> bool:

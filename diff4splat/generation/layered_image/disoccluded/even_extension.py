@@ -32,12 +32,25 @@ def extended_evenly(
         start = _enlarged(extended_evenly(coarse, share > 0), size, values.shape)
     else:
         start = values[known].mean().expand_as(values)
-    filled = torch.where(known, values, start)
+    return _averaged(values, known, start)
+
+
+def _averaged(
+    values: Float[Tensor, "h w"], known: Bool[Tensor, "h w"], start: Float[Tensor, "h w"]
+) -> Float[Tensor, "h w"]:
+    """``SWEEPS`` means of the four neighbours where not ``known``, in place: arrays are large."""
+    height, width = values.shape
+    padded, mean = values.new_empty(height + 2, width + 2), torch.empty_like(values)
+    filled = padded[1:-1, 1:-1]
+    torch.where(known, values, start, out=filled)
     for _ in range(SWEEPS):
-        padded = torch.nn.functional.pad(filled[None, None], (1, 1, 1, 1), mode="replicate")[0, 0]
-        mean = (padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]) / 4
-        filled = torch.where(known, values, mean)
-    return filled
+        # Beyond the border lie its own pixels.
+        padded[0], padded[-1] = padded[1], padded[-2]
+        padded[:, 0], padded[:, -1] = padded[:, 1], padded[:, -2]
+        torch.add(padded[:-2, 1:-1], padded[2:, 1:-1], out=mean)
+        mean.add_(padded[1:-1, :-2]).add_(padded[1:-1, 2:]).div_(4)
+        torch.where(known, values, mean, out=filled)
+    return filled.clone()
 
 
 def even_colors(rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]) -> Float[Tensor, "h w 3"]:

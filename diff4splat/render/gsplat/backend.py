@@ -23,8 +23,9 @@ from torch.nn.functional import normalize
 
 from diff4splat.geometry import quaternion
 from diff4splat.geometry.camera import Camera
-from diff4splat.render import gsplat_limits, reference
+from diff4splat.render import reference
 from diff4splat.render.channels import extra_channels, name_outputs
+from diff4splat.render.gsplat import limits
 from diff4splat.render.projection import camera_space, to_pixels
 from diff4splat.render.settings import RenderJob, RenderOutput
 from diff4splat.render.support import renderable_gaussians
@@ -35,13 +36,13 @@ def unsupported_reason(job: RenderJob) -> str | None:
     """Why gsplat cannot do ``job``, or None; the first job that it might do loads the kernels."""
     with torch.autocast(job.gaussians.means.device.type, enabled=False):
         return (
-            gsplat_limits.tensor_limit(job)
-            or gsplat_limits.output_limit(job)
-            or gsplat_limits.setting_limit(job)
-            or gsplat_limits.gradient_limit(job)
+            limits.tensor_limit(job)
+            or limits.output_limit(job)
+            or limits.setting_limit(job)
+            or limits.gradient_limit(job)
             or loading_problem()
             or _version_limit(job)
-            or gsplat_limits.range_limit(job)
+            or limits.range_limit(job)
         )
 
 

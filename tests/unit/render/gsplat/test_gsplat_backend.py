@@ -9,8 +9,9 @@ import pytest
 import torch
 from oracles_gsplat import EXTREMES, MADE, View, aligned_view, both, everything, random_view
 
-from diff4splat.render import backends, gsplat_backend, gsplat_limits
+from diff4splat.render import backends
 from diff4splat.render.api import render
+from diff4splat.render.gsplat import backend, limits
 from diff4splat.render.settings import RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
@@ -22,13 +23,13 @@ CLOSE_DECIBELS = 110.0
 @pytest.fixture(autouse=True)
 def calls(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict]]:
     """The stand-in is installed and takes CPU tensors; what it is called with."""
-    table = {"gsplat": "diff4splat.render.gsplat_backend"}
+    table = {"gsplat": "diff4splat.render.gsplat.backend"}
     table["reference"] = backends.BACKENDS["reference"]
     monkeypatch.setattr(backends, "BACKENDS", table)
-    monkeypatch.setattr(gsplat_limits, "DEVICE_TYPE", "cpu")
-    gsplat_backend.loading_problem.cache_clear()
+    monkeypatch.setattr(limits, "DEVICE_TYPE", "cpu")
+    backend.loading_problem.cache_clear()
     yield fake_gsplat.install(monkeypatch)
-    gsplat_backend.loading_problem.cache_clear()
+    backend.loading_problem.cache_clear()
 
 
 def spoilt(gaussians: Gaussians, name: str, value: float) -> Gaussians:
@@ -76,11 +77,11 @@ def test_gradients_are_those_of_the_reference(antialias: bool, outputs: tuple[st
 @pytest.mark.parametrize("name", ["background", "features"])
 def test_settings_get_gradients_too(name: str) -> None:
     found = []
-    for backend in ("gsplat", "reference"):
+    for chosen in ("gsplat", "reference"):
         values = {"background": torch.tensor([0.2, 0.5, 0.8]), "features": SMALL[0].means.clone()}
         leaf = values[name].requires_grad_()
         settings = replace(everything(SMALL), **{name: leaf})
-        made = render(*SMALL, outputs=("rgb", "features"), settings=settings, backend=backend)
+        made = render(*SMALL, outputs=("rgb", "features"), settings=settings, backend=chosen)
         (made.rgb.square().sum() + made.features.square().sum()).backward()
         found.append({name: leaf.grad})
     oracles.assert_same_gradients(*found, 1e-4)

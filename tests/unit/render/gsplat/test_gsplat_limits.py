@@ -13,7 +13,7 @@ import torch
 from oracles_gsplat import extreme_view, random_view
 from torch._subclasses.fake_tensor import FakeTensorMode
 
-from diff4splat.render import gsplat_backend, gsplat_limits
+from diff4splat.render.gsplat import backend, limits
 from diff4splat.render.settings import RenderJob, RenderSettings
 from diff4splat.scene.gaussians import Gaussians
 
@@ -33,16 +33,16 @@ UNUSABLE = (float("nan"), float("inf"), 1e30)
 @pytest.fixture(autouse=True)
 def _forgetful() -> Iterator[None]:
     """What was found out about the installation does not outlive a test."""
-    gsplat_backend.loading_problem.cache_clear()
+    backend.loading_problem.cache_clear()
     yield
-    gsplat_backend.loading_problem.cache_clear()
+    backend.loading_problem.cache_clear()
 
 
 @pytest.fixture
 def _installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """The stand-in for gsplat 1.5 is there and takes CPU tensors."""
     fake_gsplat.install(monkeypatch)
-    monkeypatch.setattr(gsplat_limits, "DEVICE_TYPE", "cpu")
+    monkeypatch.setattr(limits, "DEVICE_TYPE", "cpu")
 
 
 def with_settings(**changes: object) -> RenderJob:
@@ -55,7 +55,7 @@ def with_gaussians(**changes: object) -> RenderJob:
 
 @pytest.mark.usefixtures("_installed")
 def test_the_defaults_are_not_refused() -> None:
-    assert gsplat_backend.unsupported_reason(JOB) is None
+    assert backend.unsupported_reason(JOB) is None
 
 
 def test_tensors_on_a_cpu_are_refused_before_gsplat_is_imported(
@@ -67,7 +67,7 @@ def test_tensors_on_a_cpu_are_refused_before_gsplat_is_imported(
 
     original = builtins.__import__
     monkeypatch.setattr(builtins, "__import__", never)
-    assert gsplat_backend.unsupported_reason(JOB) == "expected a CUDA tensor, got cpu"
+    assert backend.unsupported_reason(JOB) == "expected a CUDA tensor, got cpu"
 
 
 def test_tensors_on_a_gpu_are_taken() -> None:
@@ -75,7 +75,7 @@ def test_tensors_on_a_gpu_are_taken() -> None:
         shapes = {field.name: getattr(GAUSSIANS, field.name).shape for field in fields(GAUSSIANS)}
         there = {name: torch.empty(shape, device="cuda") for name, shape in shapes.items()}
         job = replace(JOB, gaussians=Gaussians(**there))
-    assert gsplat_limits.tensor_limit(job) is None
+    assert limits.tensor_limit(job) is None
 
 
 @pytest.mark.usefixtures("_installed")
@@ -106,7 +106,7 @@ def test_tensors_on_a_gpu_are_taken() -> None:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_what_is_refused_is_said(job: RenderJob, reason: str) -> None:
-    assert re.fullmatch(reason + ".*", gsplat_backend.unsupported_reason(job))
+    assert re.fullmatch(reason + ".*", backend.unsupported_reason(job))
 
 
 @pytest.mark.usefixtures("_installed")
@@ -124,7 +124,7 @@ def test_what_is_refused_is_said(job: RenderJob, reason: str) -> None:
     ],
 )
 def test_what_does_no_harm_is_not_refused(job: RenderJob) -> None:
-    assert gsplat_backend.unsupported_reason(job) is None
+    assert backend.unsupported_reason(job) is None
 
 
 @pytest.mark.usefixtures("_installed")
@@ -133,10 +133,10 @@ def test_lenses_that_want_a_gradient_are_refused(name: str) -> None:
     leaf = getattr(CAMERA, name).clone().requires_grad_()
     job = replace(JOB, camera=replace(CAMERA, **{name: leaf}))
     reason = "expected focal_px and center_px that need no gradient, got requires_grad"
-    assert gsplat_backend.unsupported_reason(job) == reason
+    assert backend.unsupported_reason(job) == reason
     with torch.no_grad():
-        assert gsplat_backend.unsupported_reason(job) is None
-    assert gsplat_backend.unsupported_reason(replace(JOB, flow_camera=job.camera)) is None
+        assert backend.unsupported_reason(job) is None
+    assert backend.unsupported_reason(replace(JOB, flow_camera=job.camera)) is None
 
 
 @pytest.mark.parametrize(("alpha_max", "refused"), [(0.999, True), (0.99, False)])
@@ -144,18 +144,18 @@ def test_another_version_has_other_constants(
     monkeypatch: pytest.MonkeyPatch, alpha_max: float, refused: bool
 ) -> None:
     fake_gsplat.install(monkeypatch, "1.6.0")
-    monkeypatch.setattr(gsplat_limits, "DEVICE_TYPE", "cpu")
+    monkeypatch.setattr(limits, "DEVICE_TYPE", "cpu")
     job = with_settings(alpha_max=alpha_max)
     reason = "expected alpha_max 0.99, which gsplat 1.6.0 fixes, got 0.999"
-    assert gsplat_backend.unsupported_reason(job) == (reason if refused else None)
+    assert backend.unsupported_reason(job) == (reason if refused else None)
 
 
 def test_a_version_that_dims_only_so_far_is_not_used_for_antialias(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fake_gsplat.install(monkeypatch, "1.6.0")
-    monkeypatch.setattr(gsplat_limits, "DEVICE_TYPE", "cpu")
-    reason = gsplat_backend.unsupported_reason(with_settings(alpha_max=0.99, antialias=True))
+    monkeypatch.setattr(limits, "DEVICE_TYPE", "cpu")
+    reason = backend.unsupported_reason(with_settings(alpha_max=0.99, antialias=True))
     assert reason == "expected no antialias, because gsplat 1.6.0 never dims below 0.005, got it"
 
 
@@ -168,18 +168,18 @@ class Nowhere:
 
 
 def test_a_missing_library_is_answered_with_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gsplat_limits, "DEVICE_TYPE", "cpu")
+    monkeypatch.setattr(limits, "DEVICE_TYPE", "cpu")
     monkeypatch.setattr(sys, "meta_path", [Nowhere(), *sys.meta_path])
     for name in [name for name in sys.modules if name.partition(".")[0] == "gsplat"]:
         monkeypatch.delitem(sys.modules, name)
     reason = "gsplat is not installed: pip install 'diff4splat[cuda]'"
-    assert gsplat_backend.unsupported_reason(JOB) == reason
+    assert backend.unsupported_reason(JOB) == reason
 
 
 @pytest.mark.usefixtures("_installed")
 def test_a_library_without_kernels_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["gsplat.cuda._backend"], "_C", None)
-    assert "expected gsplat with CUDA kernels, got none" in gsplat_backend.unsupported_reason(JOB)
+    assert "expected gsplat with CUDA kernels, got none" in backend.unsupported_reason(JOB)
 
 
 @pytest.mark.usefixtures("_installed")
@@ -201,9 +201,6 @@ def test_a_compiler_that_fails_is_asked_once_and_quoted_in_one_line(
 
     monkeypatch.setitem(sys.modules, "gsplat.cuda._backend", Failing("gsplat.cuda._backend"))
     for _ in range(2):
-        assert (
-            gsplat_backend.unsupported_reason(JOB)
-            == "expected gsplat with CUDA kernels, got no nvcc"
-        )
+        assert backend.unsupported_reason(JOB) == "expected gsplat with CUDA kernels, got no nvcc"
     assert len(asked) == 1
     assert capsys.readouterr() == ("", "compiling\n")
