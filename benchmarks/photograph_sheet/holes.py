@@ -1,25 +1,27 @@
 """Holes in photographs, filled by patches, by the network and by both, against the truth.
 
 Run ``python -m benchmarks.photograph_sheet.holes`` (needs the photographs' packages); prints
-Markdown. Each photograph loses rounded boxes, as behind an object that moves away.
+Markdown. Each photograph loses rounded boxes, as behind an object that moves away. The last row is
+what ships: both, at two scales in images of more than 256 px.
 
     PSNR        of the pixels of the hole: a blur is best
     distance    perceptual distance of the hole and a margin around it
-    better      share of the holes whose distance is less than the network's
+    better      share of the holes whose distance is less than the network's by itself
     detail      mean difference of neighbouring pixels in the hole, over that of the truth
     as drawn    the same of the layer's Gaussians; then with sharp colours
 """
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from benchmarks.photograph_sheet.__main__ import prepared
-from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph
+from benchmarks.photograph_sheet.__main__ import SIDE_PX, prepared
+from benchmarks.photograph_sheet.sources import PHOTOGRAPHS, Photograph, of_folder
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.layered_image.disoccluded.patch_texture import with_patch_texture
 from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sharp_colors
@@ -28,6 +30,7 @@ from diff4splat.generation.layered_image.disoccluded.texture import (
     means_within_objects,
     textured,
 )
+from diff4splat.generation.layered_image.disoccluded.two_scales import agreeing_scales
 from diff4splat.generation.layered_image.gaussians import layer_gaussians
 from diff4splat.generation.layered_image.inpainting import Inpaint, NetworkInpainting
 from diff4splat.generation.layered_image.types import ImageLayer
@@ -75,11 +78,21 @@ class Hole:
 
 def main() -> None:
     """One row of Markdown for each way to fill a hole, of all holes and of the most even third."""
-    argparse.ArgumentParser(description=__doc__).parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--photographs", type=Path, help="folder of others than the twelve")
+    parser.add_argument("--side", type=int, default=SIDE_PX, help="of the images, in pixels")
+    options = parser.parse_args()
+    folder = options.photographs
+    photographs = PHOTOGRAPHS if folder is None else of_folder(folder)
     model = with_parts(load_model(MODEL), {"image_inpainting"})
     network = NetworkInpainting(network=model.networks.image_inpainting)
-    fills = {"patches": textured, "network": network, "both": with_patch_texture(network)}
-    cases = list(holes())
+    fills = {
+        "patches": textured,
+        "network": network,
+        "both": with_patch_texture(network),
+        "both, two scales": with_patch_texture(agreeing_scales(network)),
+    }
+    cases = list(holes(photographs, options.side))
     found = measured(fills, cases)
     even = torch.tensor([case.unevenness for case in cases]).argsort()[: len(cases) // 3]
     print("| holes | filled by | PSNR [dB] | distance | better | detail | as drawn | sharp |")
@@ -104,19 +117,19 @@ def measured(fills: Mapping[str, Inpaint], cases: list[Hole]) -> dict[str, Float
     }
 
 
-def holes() -> Iterator[Hole]:
+def holes(photographs: Sequence[Photograph], side_px: int) -> Iterator[Hole]:
     """Some in every photograph, and in views of panoramas to four sides."""
     generator = torch.Generator().manual_seed(SEED)
-    for photograph in PHOTOGRAPHS:
-        for picture in _views(photograph):
+    for photograph in photographs:
+        for picture in _views(photograph, side_px):
             for _ in range(HOLES):
                 yield Hole(picture=picture, known=~_rounded_box(picture, generator))
 
 
-def _views(photograph: Photograph) -> list[InputImage]:
+def _views(photograph: Photograph, side_px: int) -> list[InputImage]:
     if photograph.yaw_deg is None:
-        return [prepared(photograph, MODEL)]
-    return [prepared(replace(photograph, yaw_deg=yaw), MODEL) for yaw in YAWS_DEG]
+        return [prepared(photograph, MODEL, side_px)]
+    return [prepared(replace(photograph, yaw_deg=yaw), MODEL, side_px) for yaw in YAWS_DEG]
 
 
 def _rounded_box(picture: InputImage, generator: torch.Generator) -> Bool[Tensor, "h w"]:

@@ -36,6 +36,7 @@ from diff4splat.generation.layered_image.disoccluded.occluded_layer import (
 from diff4splat.generation.layered_image.disoccluded.patch_texture import with_patch_texture
 from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sharp_colors
 from diff4splat.generation.layered_image.disoccluded.texture import textured
+from diff4splat.generation.layered_image.disoccluded.two_scales import agreeing_scales
 from diff4splat.generation.layered_image.disocclusion import (
     inpaint_background,
     inpaint_border,
@@ -87,7 +88,7 @@ def build_layered_image(
     if occluded.ground is not None:
         share = GROUND_SHARE if inpaint is None else INPAINTED_SHARE
         hidden = [with_ground_colors(layer, pixels, occluded.ground, share) for layer in hidden]
-    inpaint_behind = textured if inpaint is None else with_patch_texture(inpaint)
+    inpaint_behind = textured if inpaint is None else with_patch_texture(agreeing_scales(inpaint))
     if (disoccluded := disoccluded_layer(pixels, inpaint_behind)) is not None:
         moving = moving_mask(maps.depth, maps.displacement)
         layer = disoccluded if inpaint is None else with_sharp_colors(disoccluded)

@@ -18,6 +18,7 @@ from diff4splat.generation.motion.local_motion.hidden_side import (
     hidden_side,
     interior_colors,
 )
+from diff4splat.generation.motion.local_motion.mixed_rim import has_other_color
 from diff4splat.generation.motion.local_motion.moving_object import MovingObject, MovingObjects
 from diff4splat.generation.scene_assembly import joined
 from diff4splat.geometry.camera import Camera, project
@@ -25,8 +26,6 @@ from diff4splat.geometry.depth import unproject
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 
-OTHER_COLOR = 0.15
-"""Difference from the object's colours near by, in [0, 1], of a pixel that is not all of it."""
 GONE = math.log(0.02)
 """Growth of what vanishes."""
 
@@ -115,6 +114,8 @@ class _VisibleSide:
     inside: Bool[Tensor, "h w"]
     colors: Float[Tensor, "h w 3"]
     """Those of the image, but at the outline, where they may be mixed, of the interior."""
+    rim: Bool[Tensor, "h w"]
+    """Pixels whose colours are none of the object's."""
 
 
 def _visible_side(pixels: ImageLayer, number: int, objects: MovingObjects) -> _VisibleSide:
@@ -123,17 +124,18 @@ def _visible_side(pixels: ImageLayer, number: int, objects: MovingObjects) -> _V
     inside = (numbers == number) & pixels.displacement.any(-1).any(0)
     # The mask is known to a pixel of the copy.
     cell_px = math.ceil(len(pixels.rgb) / len(objects.number))
-    colors = interior_colors(pixels, inside, RIM_PX + 2 * cell_px)
-    return _VisibleSide(pixels=pixels, inside=inside, colors=colors)
+    mixed_px = RIM_PX + 2 * cell_px
+    colors = interior_colors(pixels, inside, mixed_px)
+    rim = has_other_color(pixels.rgb, inside, colors, mixed_px)
+    return _VisibleSide(pixels=pixels, inside=inside, colors=colors, rim=rim)
 
 
 def _without_rim(gaussian_set: GaussianSet, visible: _VisibleSide) -> KeyframeMotion:
     """The motion in which pixels of other colours at the outline vanish once the object turns."""
     motion, pixels = gaussian_set.motion, visible.pixels
-    rim = visible.inside & ((pixels.rgb - visible.colors).abs().amax(-1) > OTHER_COLOR)
     means = gaussian_set.gaussians.means[motion.moving_index]
     growth = motion.log_scale_offsets.clone()
-    growth[1:, _at_pixels(rim, pixels.camera, means)] = GONE
+    growth[1:, _at_pixels(visible.rim, pixels.camera, means)] = GONE
     return replace(motion, log_scale_offsets=growth)
 
 

@@ -13,10 +13,12 @@ from diff4splat.generation.layered_image.build import (
     build_layered_image,
     farthest_depth,
 )
+from diff4splat.generation.layered_image.disoccluded import two_scales
 from diff4splat.generation.layered_image.disoccluded.layer import disoccluded_layer
 from diff4splat.generation.layered_image.disoccluded.occluded_layer import occluded_layers
 from diff4splat.generation.layered_image.disoccluded.patch_texture import with_patch_texture
 from diff4splat.generation.layered_image.disoccluded.sharp_colors import with_sharp_colors
+from diff4splat.generation.layered_image.disoccluded.two_scales import agreeing_scales
 from diff4splat.generation.layered_image.disocclusion import grown
 from diff4splat.generation.layered_image.gaussians import image_gaussians
 from diff4splat.generation.layered_image.ground_colors import GROUND_SHARE, INPAINTED_SHARE
@@ -257,16 +259,22 @@ def test_inpainted_ground_colours_cells_that_are_farther_before_it(
     assert shares == [GROUND_SHARE, GROUND_SHARE, INPAINTED_SHARE, INPAINTED_SHARE]
 
 
-def test_behind_what_moves_lie_the_texture_of_patches_and_sharp_colours() -> None:
+def test_behind_what_moves_lie_the_texture_of_patches_and_sharp_colours(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(two_scales, "COARSE_PX", 12)
+
     def grey(rgb: Tensor, known: Tensor) -> Tensor:
         return torch.where(known[..., None], rgb, 0.5)
 
     moving = torch.zeros(3, *SMALL, 3)
     moving[1:, 3:5, 10:12, 0] = 0.5
     layers = with_box(displacement=moving, inpaint=grey).layers
+    twice = agreeing_scales(grey)
     plain, textured = (
-        disoccluded_layer(layers[0], each) for each in (grey, with_patch_texture(grey))
+        disoccluded_layer(layers[0], each) for each in (twice, with_patch_texture(twice))
     )
+    assert not torch.equal(plain.rgb, disoccluded_layer(layers[0], grey).rgb)
     expected = with_sharp_colors(textured).rgb
     assert torch.equal(layers[2].rgb, expected)
     assert not torch.equal(expected, textured.rgb) and not torch.equal(textured.rgb, plain.rgb)
