@@ -19,7 +19,7 @@ from diff4splat.metrics.image import psnr
 from diff4splat.progress.run_log import RunLog
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
-from diff4splat.scene.harmonics import color_from_dc
+from diff4splat.scene.harmonics import color_from_dc, dc_from_color
 from diff4splat.scene.scene import Provenance, Scene
 
 SIZE_PX = (12, 16)
@@ -72,6 +72,20 @@ def test_one_step_adds_the_residual_of_each_pixel() -> None:
     after = color_from_dc(matched_colors(gathered.gaussians, image, 1)[:, 0])
     wanted = (before + FIRST_RATE * residual.flatten(0, 1)).clamp(0, 1)
     torch.testing.assert_close(after, wanted, atol=1e-5, rtol=0)
+
+
+def test_a_later_step_keeps_a_part_of_the_one_before() -> None:
+    gathered, image = blurred(), view(blurred())
+    # In the middle of the range no colour is cut off.
+    image = replace(image, rgb=0.45 + 0.1 * image.rgb)
+    grey = replace(gathered.gaussians, sh=torch.zeros_like(gathered.gaussians.sh))
+    once, twice = (color_from_dc(matched_colors(grey, image, steps)[:, 0]) for steps in (1, 2))
+    after_one = replace(grey, sh=dc_from_color(once)[:, None])
+    residual = (image.rgb - render(after_one, image.camera).rgb).flatten(0, 1)
+    momentum, rate = list(chebyshev_factors(2))[1]
+    assert momentum > 0.05
+    wanted = once + momentum * (once - 0.5) + rate * residual
+    torch.testing.assert_close(twice, wanted, atol=1e-5, rtol=0)
 
 
 def test_cells_of_several_pixels_take_their_mean_residual() -> None:
