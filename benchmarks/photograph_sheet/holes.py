@@ -2,7 +2,7 @@
 
 Run ``python -m benchmarks.photograph_sheet.holes`` (needs the photographs' packages); prints
 Markdown. Each photograph loses rounded boxes, as behind an object that moves away. The last row is
-what ships: both, at two scales in images of more than 256 px.
+what ships: both, at two scales in images of 384 px and more.
 
     PSNR        of the pixels of the hole: a blur is best
     distance    perceptual distance of the hole and a margin around it

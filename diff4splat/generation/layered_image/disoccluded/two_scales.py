@@ -14,9 +14,9 @@ from torch import Tensor
 from diff4splat.generation.layered_image.inpainting import Inpaint, on_copy
 from diff4splat.generation.layered_image.windows import means_around
 
-COARSE_PX = 256
-"""Longer side of the copy. Images that are no larger have no other scale: a copy of 128 px shows
-too little."""
+COARSE_PX, LEAST_SIDE_PX = 256, 384
+"""Longer side of the copy, and of images that have a second scale: that of smaller ones would be
+nearly the same, or show too little."""
 WINDOW_SHARE = 1 / 24
 """Of the longer side: how far the square reaches over whose mean colours both are compared."""
 COLOR_SIGMA = 0.1
@@ -30,7 +30,7 @@ def agreeing_scales(inpaint: Inpaint) -> Inpaint:
         rgb: Float[Tensor, "h w 3"], known: Bool[Tensor, "h w"]
     ) -> Float[Tensor, "h w 3"]:
         fine = inpaint(rgb, known)
-        if bool(known.all()) or max(known.shape) <= COARSE_PX:
+        if bool(known.all()) or max(known.shape) < LEAST_SIDE_PX:
             return fine
         coarse = on_copy(inpaint, COARSE_PX)(rgb, known)
         mixed = torch.lerp(coarse, fine, _agreement(fine, coarse))

@@ -263,6 +263,7 @@ def test_behind_what_moves_lie_the_texture_of_patches_and_sharp_colours(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(two_scales, "COARSE_PX", 12)
+    monkeypatch.setattr(two_scales, "LEAST_SIDE_PX", 24)
 
     def grey(rgb: Tensor, known: Tensor) -> Tensor:
         return torch.where(known[..., None], rgb, 0.5)

@@ -18,6 +18,7 @@ STRIPES = 0.2 * (torch.arange(SIDE) % 2).float()[:, None] - 0.1
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(two_scales, "COARSE_PX", SIDE // 2)
+    monkeypatch.setattr(two_scales, "LEAST_SIDE_PX", SIDE)
 
 
 def paint(fine: float, coarse: float) -> Inpaint:
@@ -48,11 +49,11 @@ def test_a_small_difference_is_a_mean_of_both() -> None:
     assert 0.5 < float(middle.mean()) < 0.55
 
 
-@pytest.mark.parametrize("case", ["all known", "no larger than the copy"])
+@pytest.mark.parametrize("case", ["all known", "a small image"])
 def test_there_is_no_other_scale(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     known, calls = torch.ones_like(KNOWN) if case == "all known" else KNOWN, []
     if case != "all known":
-        monkeypatch.setattr(two_scales, "COARSE_PX", SIDE)
+        monkeypatch.setattr(two_scales, "LEAST_SIDE_PX", SIDE + 1)
 
     def inpaint(rgb: Tensor, known: Tensor) -> Tensor:
         calls.append(known)
