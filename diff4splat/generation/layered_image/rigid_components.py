@@ -43,8 +43,15 @@ def rigid_component_offsets(
 
 def box_size_px(mask: Bool[Tensor, "h w"]) -> tuple[int, int]:
     """Height and width of the box around a mask, which must not be empty."""
-    rows, columns = (torch.where(mask.any(axis))[0] for axis in (1, 0))
-    return int(rows[-1] - rows[0]) + 1, int(columns[-1] - columns[0]) + 1
+    rows, columns = box_around(mask)
+    return rows.stop - rows.start, columns.stop - columns.start
+
+
+def box_around(mask: Bool[Tensor, "h w"]) -> tuple[slice, slice]:
+    """Rows and columns of the box around a mask, which must not be empty."""
+    spans = (torch.where(mask.any(axis))[0].tolist() for axis in (1, 0))
+    rows, columns = (slice(span[0], span[-1] + 1) for span in spans)
+    return rows, columns
 
 
 def each_component(mask: Bool[Tensor, "h w"]) -> Iterator[Bool[Tensor, "h w"]]:

@@ -42,7 +42,7 @@ class FixedView:
         self._kept = list(self._fill()) if len(self._binned.regions) == 1 else None
 
     def draw(self, sh: Float[Tensor, "n k 3"]) -> Raster:
-        """The image with these harmonics; who has unusable ones stays out if it did at first."""
+        """The image with these harmonics, which are finite, as those at first were."""
         harmonics = _array(sh)
         nothing = np.zeros((len(harmonics), 0), np.float32)
         values = stages.channel_table(

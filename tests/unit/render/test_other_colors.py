@@ -80,9 +80,11 @@ def test_nothing_is_background() -> None:
     assert torch.equal(image, torch.tensor(BEHIND.background).expand(40, 50, 3))
 
 
-def test_it_has_no_gradient() -> None:
+@pytest.mark.parametrize("backend", ["raster", "reference"])
+def test_it_has_no_gradient(backend: str) -> None:
     gaussians = cloud(20)
-    assert not open_view(gaussians, CAMERA)(gaussians.sh.requires_grad_()).requires_grad
+    draw = open_view(gaussians, CAMERA, backend=backend)
+    assert not draw(gaussians.sh.requires_grad_()).requires_grad
 
 
 def test_mistakes_are_named() -> None:

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from diff4splat.generation.layered_image.disocclusion import grown
+from diff4splat.generation.layered_image.rigid_components import box_around
 from diff4splat.generation.layered_image.windows import largest_around, smallest_around
 
 OTHER_COLOR = 0.15
@@ -30,9 +31,11 @@ def has_other_color(
 
     The interior is farther than ``mixed_px`` from the outline.
     """
-    differs = (rgb - interior).abs().amax(-1) > OTHER_COLOR
-    pure = ~grown(~inside, mixed_px)
-    return inside & differs & _is_beyond_range(rgb, pure, REACH * mixed_px)
+    found = inside & ((rgb - interior).abs().amax(-1) > OTHER_COLOR)
+    if bool(found.any()):
+        pure, box = ~grown(~inside, mixed_px), box_around(inside)
+        found[box] &= _is_beyond_range(rgb[box], pure[box], REACH * mixed_px)
+    return found
 
 
 def _is_beyond_range(

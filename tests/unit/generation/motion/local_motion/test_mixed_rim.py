@@ -33,6 +33,11 @@ def test_the_same_colours_far_away_are_no_reason() -> None:
     assert bool(has_other_color(rgb, INSIDE, colored(0.5), MIXED_PX)[4, 4:28].all())
 
 
+def test_an_object_without_pixels_has_no_rim() -> None:
+    nothing = torch.zeros_like(INSIDE)
+    assert not has_other_color(colored(0.5), nothing, colored(0.9), MIXED_PX).any()
+
+
 def test_outside_nothing_is_found() -> None:
     rgb = torch.where(INSIDE[..., None], colored(0.5), colored(1.0))
     assert not has_other_color(rgb, INSIDE, colored(0.5), MIXED_PX).any()
