@@ -17,7 +17,7 @@ from diff4splat.configs.stages import (
 )
 from diff4splat.models.config.networks import TIME_STRIDE
 from diff4splat.models.config.sizes import small_size
-from diff4splat.training.recipe.data import DataSettings
+from diff4splat.training.recipe.data import DataSettings, SourceSettings
 from diff4splat.training.recipe.losses import (
     AutoencoderLosses,
     DepthLosses,
@@ -27,6 +27,7 @@ from diff4splat.training.recipe.losses import (
     MotionDiffusionLosses,
     MotionLosses,
     ObjectMaskLosses,
+    ObjectShadowLosses,
     ReconstructionLosses,
 )
 from diff4splat.training.recipe.optimizer import OptimizerSettings
@@ -78,6 +79,7 @@ def small_recipe() -> Recipe:
             _motion_diffusion(video),
             object_mask,
             _image_classifier(object_mask),
+            _object_shadow(object_mask),
         ),
         trainer=TrainerSettings(ema_decay=0.999, checkpoint_every=200, evaluate_every=400),
     )
@@ -232,4 +234,25 @@ def _image_classifier(object_mask: StageRecipe) -> StageRecipe:
         trained=("image_classifier",),
         losses=ImageClassifierLosses(),
         optimizer=OptimizerSettings(learning_rate=5e-3, warmup_steps=50),
+    )
+
+
+def _object_shadow(object_mask: StageRecipe) -> StageRecipe:
+    """Reads clips of ``prepare synth --without-objects``."""
+    return replace(
+        object_mask,
+        name="object_shadow",
+        kind="object_shadow",
+        steps=10_000,
+        trained=("object_shadow",),
+        losses=ObjectShadowLosses(),
+        optimizer=OptimizerSettings(learning_rate=1.2e-3, warmup_steps=100),
+        data=replace(
+            object_mask.data,
+            sources=(SourceSettings(still_share=0.0),),
+            views=4,
+            frames=1,
+            size_px=(128, 128),
+        ),
+        public_backbone=False,
     )

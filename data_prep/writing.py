@@ -21,11 +21,15 @@ from diff4splat.data_prep.synthetic.captioning import SOURCE
 from diff4splat.data_prep.synthetic.renderer.clips import draw_clip
 from diff4splat.data_prep.synthetic.renderer.jit import GROUP as DRAWING
 from diff4splat.data_prep.synthetic.renderer.settings import DrawSettings
+from diff4splat.data_prep.synthetic.renderer.without_objects import draw_without_objects
 from diff4splat.data_prep.synthetic.worlds import WorldRecipe, make_world, world_identifier
 from diff4splat.errors import ConfigError
 from diff4splat.progress.interrupts import uninterrupted
 from diff4splat.progress.phases import Phases
 from diff4splat.progress.precompile import ensure_precompiled
+
+MOST_OBJECTS = 7
+"""That are taken away: eight views are the most that a clip of a world has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,12 +43,19 @@ class WorldJob:
     """Index of the first world."""
     draw: DrawSettings = field(default_factory=DrawSettings)
     workers: int = 1
+    without_objects: int = 0
+    """Views of the first image that lack one object each, in place of the clip; 0 for the clip."""
 
     def __post_init__(self) -> None:
         if self.clips < 1 or self.workers < 1 or self.first < 0:
             raise ConfigError(
                 "prepare synth: expected --clips and --workers of at least 1 and --first of at "
                 f"least 0, got {self.clips}, {self.workers} and {self.first}"
+            )
+        if not 0 <= self.without_objects <= MOST_OBJECTS:
+            raise ConfigError(
+                f"prepare synth: expected --without-objects from 0 to {MOST_OBJECTS}, got "
+                f"{self.without_objects}"
             )
 
     @property
@@ -86,7 +97,10 @@ def write_worlds(job: WorldJob, phases: Phases, append: bool = False) -> int:
 
 def _require_alike(job: WorldJob) -> None:
     """Names say seed, split and index alone: clips of another size would be taken for done."""
-    wanted = (job.recipe.frames, job.recipe.views, job.recipe.size_px)
+    frames, views = job.recipe.frames, job.recipe.views
+    if job.without_objects:
+        frames, views = 1, 1 + job.without_objects
+    wanted = (frames, views, job.recipe.size_px)
     names = {world_identifier(job.recipe, index) for index in job.indices}
     for entry in read_manifest(job.folder).clips:
         found = (entry.frames, entry.views, entry.size_px)
@@ -100,7 +114,7 @@ def _require_alike(job: WorldJob) -> None:
 def _drawn(job: WorldJob, indices: list[int]) -> Iterator[EncodedClip]:
     """Encoded clips in the order of ``indices``."""
     if job.workers == 1:
-        yield from (_draw(job.recipe, job.draw, index) for index in indices)
+        yield from (_draw(job, index) for index in indices)
         return
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(job.workers, context, initializer=_begin_worker)
@@ -108,7 +122,7 @@ def _drawn(job: WorldJob, indices: list[int]) -> Iterator[EncodedClip]:
     waiting: list[Future[EncodedClip]] = []
     try:
         for index in indices:
-            waiting.append(pool.submit(_draw, job.recipe, job.draw, index))
+            waiting.append(pool.submit(_draw, job, index))
             if len(waiting) > 2 * job.workers:
                 yield waiting.pop(0).result()
         for future in waiting:
@@ -123,5 +137,8 @@ def _begin_worker() -> None:
     torch.set_num_threads(1)
 
 
-def _draw(recipe: WorldRecipe, draw: DrawSettings, index: int) -> EncodedClip:
-    return encode_clip(draw_clip(make_world(recipe, index), draw))
+def _draw(job: WorldJob, index: int) -> EncodedClip:
+    world = make_world(job.recipe, index)
+    if job.without_objects:
+        return encode_clip(draw_without_objects(world, job.without_objects, job.draw))
+    return encode_clip(draw_clip(world, job.draw))

@@ -2,6 +2,7 @@
 
 Usage: python examples/make_text_figure.py picture.jpg figure.png --thing "a red ball"
        python examples/make_text_figure.py picture.jpg figure.png --prompts "a red ball rolls" ...
+       ... --ablate object_shadow   # every row once more, without that network
 
 A thing stands for three prompts: it slides to the left, to the right, nothing moves around it.
 """
@@ -14,6 +15,7 @@ import torch
 from diff4splat import Diff4SplatPipeline
 from diff4splat.generation.inputs.image_size import find_image_size
 from diff4splat.generation.inputs.input_image import load_image
+from diff4splat.generation.settings import GenerationSettings
 from diff4splat.io.photos.images import write_png
 from diff4splat.render.api import render
 
@@ -36,16 +38,19 @@ def main() -> None:
     asked.add_argument("--thing")
     asked.add_argument("--prompts", nargs="+")
     parser.add_argument("--model", default="small")
+    parser.add_argument("--ablate", default="", help="a network that is left out in a second row")
     options = parser.parse_args()
     pipeline = Diff4SplatPipeline.from_pretrained(options.model)
     side_px, multiple_px = find_image_size(options.model)
     picture = load_image(options.picture, side_px, multiple_px=multiple_px)
-    rows = []
+    rows, without = [], [()] + [(options.ablate,)] * bool(options.ablate)
     for prompt in options.prompts or prompts_about(options.thing):
-        scene = pipeline(picture, "arc:0.1", prompt)
-        last_s = float(scene.path.times_s[-1])
-        shown = [render(scene, scene.path.cameras[0], share * last_s).rgb for share in TIMES]
-        rows.append(torch.cat(shown, 1).clamp(0, 1))
+        for removed in without:
+            settings = GenerationSettings(without=removed)
+            scene = pipeline(picture, "arc:0.1", prompt, settings=settings)
+            last_s = float(scene.path.times_s[-1])
+            shown = [render(scene, scene.path.cameras[0], share * last_s).rgb for share in TIMES]
+            rows.append(torch.cat(shown, 1).clamp(0, 1))
     write_png(torch.cat(rows), options.out)
 
 

@@ -30,6 +30,7 @@ from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
 from diff4splat.models.object_mask.mask_heads import HeadShape
 from diff4splat.models.object_mask.network import ObjectMaskNet
+from diff4splat.models.object_shadow.network import ObjectShadowNet
 from diff4splat.models.placement.initial_weights import (
     InitialWeights,
     RecordedCalls,
@@ -95,6 +96,7 @@ def _builders(config: ModelConfig) -> Mapping[str, Callable[[], nn.Module]]:
         "object_mask": lambda: _object_mask(config),
         "image_classifier": ImageClassifier,
         "image_inpainting": lambda: ImageInpainting(config.image_inpainting.widths),
+        "object_shadow": lambda: ObjectShadowNet(config.object_shadow.width),
         "image_encoder": lambda: ClipImageEncoder(config.image_encoder),
     }
 

@@ -16,6 +16,7 @@ from diff4splat.models.protocols import (
     MotionPrior,
     ObjectMask,
     PromptEncoder,
+    ShadowOfObject,
     VideoCodec,
     VideoVelocity,
 )
@@ -36,6 +37,7 @@ class Networks:
     object_mask: ObjectMask | None = None
     image_classifier: ImageClasses | None = None
     image_inpainting: ImageCompletion | None = None
+    object_shadow: ShadowOfObject | None = None
 
     def parts(self) -> list[tuple[str, Any]]:
         """(name, network) of the parts that exist."""
@@ -78,4 +80,6 @@ def model_parts(config: ModelConfig) -> tuple[str, ...]:
         absent.add("image_classifier")
     if not config.image_inpainting.used:
         absent.add("image_inpainting")
+    if not config.object_shadow.used:
+        absent.add("object_shadow")
     return tuple(part for part in PARTS if part not in absent)

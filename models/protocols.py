@@ -100,6 +100,14 @@ class ObjectMask(Protocol):
 
 
 @runtime_checkable
+class ShadowOfObject(Protocol):
+    """As ``ObjectShadowNet``."""
+
+    def __call__(self, image: Tensor, mask: Tensor) -> Tensor:
+        """For every pixel how much darker the object of the mask makes it."""
+
+
+@runtime_checkable
 class VideoCodec(Protocol):
     """As ``VideoVae``."""
 

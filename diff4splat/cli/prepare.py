@@ -56,6 +56,8 @@ class PrepareSynthetic:
     """With --meshes: fraction of places that are furnished with objects of natural size."""
     motions: tuple[str, ...] = ()
     """Only worlds with these motions, such as slides or bends. Default: all motions."""
+    without_objects: Annotated[int, Number(least=0, most=7)] = 0
+    """Instead of a clip: its first image, and this many views without one object; for shadows."""
     tracks: Annotated[int, Number(least=0)] = 512
     """Points followed through every clip."""
     workers: Annotated[int, Number(least=1)] = 1
@@ -103,6 +105,7 @@ class PrepareSynthetic:
             first=self.first,
             draw=DrawSettings(tracks=self.tracks),
             workers=self.workers,
+            without_objects=self.without_objects,
         )
         phases = ConsolePhases()
         drawn = write_worlds(job, phases, self.append)

@@ -31,6 +31,7 @@ from diff4splat.generation.layered_image.gaussians import GaussianSet, image_gau
 from diff4splat.generation.layered_image.inpainting import Inpaint, NetworkInpainting
 from diff4splat.generation.layered_image.pixel_maps.image_maps import ImageMaps
 from diff4splat.generation.motion.local_motion.gaussians import with_local_motion
+from diff4splat.generation.object_shadow.gaussians import with_shadows
 from diff4splat.generation.one_thread import one_thread
 from diff4splat.generation.plan import FILL_PARTS, GenerationPlan
 from diff4splat.generation.priors import image_maps
@@ -200,6 +201,7 @@ class Diff4SplatPipeline:
             visible_count = layered.visible_count
             if maps.objects is not None:
                 found, visible_count = with_local_motion(found, layered, maps.objects)
+            found = with_shadows(found, layered, maps.shadows, request.key_times_s)
         threshold_px, camera = request.settings.static_threshold_px, request.image.camera
         motion = prune_static_tracks(found.gaussians, found.motion, camera, threshold_px, log)
         return replace(found, motion=motion), visible_count

@@ -7,6 +7,7 @@
     object mask          with the motion prior
     image classifier     with the object mask, if the prompt has a noun that it knows
     text encoder         if a prompt is given and something takes it
+    object shadow        with the motion prior
     image inpainting     if the image is larger than any copy that the networks see, and extended
                          layers are wanted
     VAE, DiT, LDRM       only where hidden regions are filled by the video model
@@ -24,8 +25,8 @@ from diff4splat.models.hub.model import Model, parameter_counts
 from diff4splat.models.networks import model_parts
 from diff4splat.progress.run_log import RunLog
 
-MOTION_PARTS = ("text_encoder", "motion_unet", "object_mask", "image_classifier")
-"""What a prompt that moves something needs; some models have no object mask or classifier."""
+MOTION_PARTS = ("text_encoder", "motion_unet", "object_mask", "image_classifier", "object_shadow")
+"""What a prompt that moves something needs; some models have the first two alone."""
 FILL_PARTS = ("vae", "dit", "ldrm", "deformation")
 """What fills hidden regions by video; some public models also have an image encoder."""
 WORSE_FILL = "with these weights it makes hidden regions worse; --fill video runs it"
@@ -146,6 +147,11 @@ def plan_generation(
         or _untrained("image_classifier", trained)
         or facts.removed("image_classifier")
         or ("" if facts.names_class else NO_CLASS)
+    )
+    reasons["object_shadow"] = (
+        reasons["motion_unet"]
+        or _untrained("object_shadow", trained)
+        or facts.removed("object_shadow")
     )
     reasons["image_inpainting"] = (
         _untrained("image_inpainting", trained)

@@ -32,6 +32,7 @@ from diff4splat.models.config.priors import (
     MonocularDepthConfig,
     MotionUNetConfig,
     ObjectMaskConfig,
+    ObjectShadowConfig,
 )
 from diff4splat.paths.formats.json_text import decode_json
 
@@ -53,6 +54,7 @@ __all__ = [
     "MonocularDepthConfig",
     "MotionUNetConfig",
     "ObjectMaskConfig",
+    "ObjectShadowConfig",
     "RefinementConfig",
     "TextConfig",
     "VaeConfig",
@@ -80,6 +82,7 @@ class ModelConfig:
     motion_unet: MotionUNetConfig = field(default_factory=MotionUNetConfig)
     object_mask: ObjectMaskConfig = field(default_factory=ObjectMaskConfig)
     image_inpainting: ImageInpaintingConfig = field(default_factory=ImageInpaintingConfig)
+    object_shadow: ObjectShadowConfig = field(default_factory=ObjectShadowConfig)
     joint: JointConfig = field(default_factory=JointConfig)
     """Where the video model has one sequence of text and video."""
     image_encoder: ImageEncoderConfig = field(default_factory=ImageEncoderConfig)

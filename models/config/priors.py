@@ -137,6 +137,22 @@ class ImageInpaintingConfig:
         return 2 ** max(len(self.widths) - 1, 0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectShadowConfig:
+    """Object shadow: a U-Net from an image and an object's mask to its shadow (ADR 57)."""
+
+    width: int = 0
+    """Channels at half the resolution; 0 leaves it out: shadows stay where they are."""
+
+    def __post_init__(self) -> None:
+        require_optional_width(self, "width")
+
+    @property
+    def used(self) -> bool:
+        """Whether there is such a network."""
+        return self.width > 0
+
+
 def _require_backbone_fits(config: MonocularDepthConfig | ObjectMaskConfig) -> None:
     fits = config.used or not config.image_backbone
     where = type(config).__name__

@@ -19,11 +19,17 @@ from diff4splat.models.image_unet.cells import FOLDED_PX, LEVELS
 class ImageUNet(nn.Module):
     """Convolutions at four resolutions; heads are those of the networks that extend it."""
 
-    def __init__(self, channels: Sequence[int], down_block: Callable[[int], nn.Module]) -> None:
+    def __init__(
+        self,
+        channels: Sequence[int],
+        down_block: Callable[[int], nn.Module],
+        image_channels: int = 3,
+    ) -> None:
         """``channels`` of every resolution, finest first; ``down_block`` makes that of a level."""
         super().__init__()
         steps = list(pairwise(channels))
-        self.input_conv = nn.Conv2d((3 + 2) * FOLDED_PX**2, channels[0], 3, padding=1)
+        inputs = (image_channels + 2) * FOLDED_PX**2
+        self.input_conv = nn.Conv2d(inputs, channels[0], 3, padding=1)
         self.down_blocks = nn.ModuleList([down_block(level) for level in range(LEVELS)])
         self.downsample = nn.ModuleList(
             [nn.Conv2d(fine, coarse, 2, stride=2) for fine, coarse in steps]
@@ -37,8 +43,8 @@ class ImageUNet(nn.Module):
         del channels
         return nn.Identity()
 
-    def features(self, image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b c h2 w2"]:
-        """``image`` is RGB in [0, 1], its sides multiples of 16."""
+    def features(self, image: Float[Tensor, "b k h w"]) -> Float[Tensor, "b c h2 w2"]:
+        """``image`` is RGB, and what else a network sees, in [0, 1]; sides are multiples of 16."""
         inputs = torch.cat([image * 2 - 1, pixel_coordinates(image)], 1)
         features = self.input_conv(torch.nn.functional.pixel_unshuffle(inputs, FOLDED_PX))
         skips = []
@@ -62,7 +68,7 @@ def upsample_path(
     return features
 
 
-def pixel_coordinates(image: Float[Tensor, "b 3 h w"]) -> Float[Tensor, "b 2 h w"]:
+def pixel_coordinates(image: Float[Tensor, "b k h w"]) -> Float[Tensor, "b 2 h w"]:
     """X and y of the pixel centres, −1 and 1 at the edges of the image."""
     y, x = (
         (2 * torch.arange(size, device=image.device, dtype=image.dtype) + 1) / size - 1

@@ -134,6 +134,14 @@ class OnnxImageClassifier(OnnxPart):
         return run_graph(self.model["image_classifier"], inputs)["corrected_logits"]
 
 
+class OnnxObjectShadow(OnnxPart):
+    """As ``ObjectShadowNet``."""
+
+    def __call__(self, image: Tensor, mask: Tensor) -> Tensor:
+        """For every pixel how much darker the object of the mask makes it."""
+        return run_graph(self.model["object_shadow"], {"image": image, "mask": mask})["darkening"]
+
+
 class OnnxImageInpainting(OnnxPart):
     """As ``ImageInpainting``."""
 

@@ -14,6 +14,7 @@ from diff4splat.models.onnx.adapters import (
     OnnxLdrm,
     OnnxMotion,
     OnnxObjectMask,
+    OnnxObjectShadow,
     OnnxTextEncoder,
     OnnxVae,
 )
@@ -30,10 +31,11 @@ ADAPTERS = {
     "object_mask": OnnxObjectMask,
     "image_classifier": OnnxImageClassifier,
     "image_inpainting": OnnxImageInpainting,
+    "object_shadow": OnnxObjectShadow,
 }
 FEW_THREADS = (
     *("text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"),
-    "image_inpainting",
+    *("image_inpainting", "object_shadow"),
 )
 """One thread: scenes without a video fill are the same, bit for bit, on any number of cores."""
 

@@ -145,6 +145,21 @@ def image_inpainting_graphs(network: nn.Module, config: ModelConfig) -> list[Gra
     ]
 
 
+def object_shadow_graphs(network: nn.Module, config: ModelConfig) -> list[GraphSource]:
+    """An image and the mask of an object to how much darker it makes each pixel."""
+    del config
+    size = _image_size(IMAGE_MULTIPLE_PX)
+    return [
+        GraphSource(
+            name="object_shadow",
+            part="object_shadow",
+            module=TensorFunction(network, lambda part, *inputs: (part(*inputs),)),
+            inputs=(unit("image", "batch", 3, *size), unit("mask", "batch", *size)),
+            outputs=(output("darkening", "batch", 3, *size),),
+        )
+    ]
+
+
 def _image_size(multiple_px: int) -> tuple[str, str]:
     """Symbols of the sides that a network takes."""
     return f"{multiple_px}*rows", f"{multiple_px}*columns"

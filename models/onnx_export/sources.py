@@ -14,6 +14,7 @@ from diff4splat.models.onnx_export.prior_graphs import (
     monocular_depth_graphs,
     motion_unet_graphs,
     object_mask_graphs,
+    object_shadow_graphs,
     text_encoder_graphs,
 )
 from diff4splat.models.onnx_export.source import GraphSource
@@ -31,6 +32,7 @@ GRAPHS: Mapping[str, Callable[[nn.Module, ModelConfig], list[GraphSource]]] = Ma
         "object_mask": object_mask_graphs,
         "image_classifier": image_classifier_graphs,
         "image_inpainting": image_inpainting_graphs,
+        "object_shadow": object_shadow_graphs,
     }
 )
 """Part → its graphs."""

@@ -34,9 +34,8 @@ from diff4splat.scene.scene import Scene
 
 SIDE_PX = 64
 PROMPT = "the red box slides to the left"
-PRIORS = frozenset(
-    {"text_encoder", "monocular_depth", "motion_unet", "object_mask", "image_classifier"}
-)
+OF_MOTION = frozenset({"motion_unet", "object_mask", "image_classifier", "object_shadow"})
+PRIORS = OF_MOTION | {"text_encoder", "monocular_depth"}
 VIDEO = frozenset({"vae", "dit", "ldrm", "deformation"})
 SEES_NO_SMALL_IMAGE = "image_inpainting"
 """It runs for photographs alone: a test of its own."""
@@ -72,7 +71,7 @@ CASES = {
     ),
     "video, still": Case(
         prompt=PROMPT,
-        parts=(PRIORS | VIDEO) - {"motion_unet", "object_mask", "image_classifier", "deformation"},
+        parts=(PRIORS | VIDEO) - OF_MOTION - {"deformation"},
         fill="video",
         still=True,
     ),
@@ -99,11 +98,13 @@ AND_VIDEO = ["prompt", pytest.param("video", marks=pytest.mark.slow)]
 
 
 def image(enlargement: int = 1) -> InputImage:
-    """A red box in front of a gradient."""
+    """A red box in front of a gradient, with a shadow to its right."""
     y, x = torch.meshgrid(*(torch.linspace(0, 1, SIDE_PX),) * 2, indexing="ij")
     rgb = torch.stack([0.3 + 0.4 * x, 0.6 - 0.3 * y, 0.4 + 0.2 * x * y], -1)
     rgb[36:52, 20:40] = torch.tensor([0.85, 0.15, 0.1])
     rgb[36:40, 20:40] = torch.tensor([0.95, 0.35, 0.3])
+    rgb[52:55, 24:48] *= 0.45  # Its shadow.
+    rgb[46:52, 40:48] *= 0.45
     rgb = rgb.repeat_interleave(enlargement, 0).repeat_interleave(enlargement, 1)
     camera = pinhole(float(len(rgb)), rgb.shape[:2])
     return InputImage(rgb=rgb, camera=camera, focal_source="test")

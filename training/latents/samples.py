@@ -13,10 +13,11 @@ from diff4splat.training.batches.epoch_shuffle import (
 )
 from diff4splat.training.batches.requests.samples import RequestSamples
 from diff4splat.training.batches.samples import ClipSamples
+from diff4splat.training.batches.shadows.samples import ShadowSamples
 from diff4splat.training.latents.latent_batch import LatentBatch, collate_latents
 from diff4splat.training.latents.latent_shards import LatentPack, read_packs, require_alike
 from diff4splat.training.recipe.data import SourceSettings
-from diff4splat.training.recipe.kinds import REQUEST_KINDS
+from diff4splat.training.recipe.kinds import REQUEST_KINDS, SHADOW_KINDS
 from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
@@ -66,7 +67,9 @@ class LatentSamples:
         return collate_latents(samples)
 
 
-def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples | RequestSamples:
+def open_samples(
+    recipe: StageRecipe, seed: int
+) -> ClipSamples | LatentSamples | RequestSamples | ShadowSamples:
     """What the recipe's sources hold: clips, clips that were encoded before, or images of clips.
 
     Raises:
@@ -81,6 +84,8 @@ def open_samples(recipe: StageRecipe, seed: int) -> ClipSamples | LatentSamples 
         )
     if encoded.pop():
         return LatentSamples(recipe, seed)
+    if recipe.kind in SHADOW_KINDS:
+        return ShadowSamples.open(recipe, seed)
     kind = RequestSamples if recipe.kind in REQUEST_KINDS else ClipSamples
     return kind.open(recipe, seed)
 

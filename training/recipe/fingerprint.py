@@ -100,7 +100,7 @@ _MODEL_ADDED = (
     "image_classifier",
 )
 """Settings of networks that are off where they are empty or 0."""
-_UNUSED_AT = {"joint": "level_width", "image_encoder": "width"}
+_UNUSED_AT = {"joint": "level_width", "image_encoder": "width", "object_shadow": "width"}
 """Sections of later releases, and what is 0 in a model without them."""
 _IN_NO_STAGE = ("image_inpainting",)
 """Networks with public weights that no stage runs."""

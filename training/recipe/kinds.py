@@ -12,6 +12,7 @@ StageKind = Literal[
     "motion_diffusion",
     "object_mask",
     "image_classifier",
+    "object_shadow",
     "video_diffusion",
     "video_distillation",
     "joint",
@@ -37,7 +38,9 @@ CAPTION_KINDS = (
 """Kinds that read captions, which name left and right."""
 REQUEST_KINDS = ("object_mask", "image_classifier")
 """Kinds whose samples are images with many prompts."""
-IMAGE_KINDS = ("motion_diffusion", *REQUEST_KINDS)
+SHADOW_KINDS = ("object_shadow",)
+"""Kinds whose samples are images with and without an object."""
+IMAGE_KINDS = ("motion_diffusion", *REQUEST_KINDS, *SHADOW_KINDS)
 """Kinds that look at single images: clips need no frames but key frames."""
 LATENT_KINDS = ("video_diffusion", "video_distillation")
 """Kinds that can learn from encoded clips."""

@@ -167,6 +167,16 @@ class ImageClassifierLosses:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectShadowLosses:
+    """Of the shadow of one object."""
+
+    darkening: float = 2.0
+    """Huber's error of the logarithm."""
+    lit_colors: float = 20.0
+    """Squared error of the colours without the shadow."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointLosses:
     """Of the video diffusion model and the reconstruction together."""
 
@@ -186,6 +196,7 @@ Losses = (
     | MotionDiffusionLosses
     | ObjectMaskLosses
     | ImageClassifierLosses
+    | ObjectShadowLosses
     | JointLosses
 )
 LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
@@ -199,6 +210,7 @@ LOSSES: Mapping[StageKind, type[Losses]] = MappingProxyType(
         "motion_diffusion": MotionDiffusionLosses,
         "object_mask": ObjectMaskLosses,
         "image_classifier": ImageClassifierLosses,
+        "object_shadow": ObjectShadowLosses,
         "video_diffusion": FlowLosses,
         "video_distillation": DistillationLosses,
         "joint": JointLosses,

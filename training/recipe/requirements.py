@@ -38,6 +38,8 @@ def _require_networks(stage: StageRecipe, model: ModelConfig) -> None:
     fits = stage.kind != "image_classifier" or model.object_mask.image_classifier
     where = f"{what}: model.object_mask.image_classifier"
     require(fits, where, "true for its kind", model.object_mask.image_classifier)
+    fits = stage.kind != "object_shadow" or model.object_shadow.used
+    require(fits, f"{what}: model.object_shadow.width", "an object shadow for its kind", 0)
     needs = stage.kind == "object_mask" and stage.losses.instances
     fits = not needs or model.object_mask.instance_channels
     require(fits, f"{what}: model.object_mask.instance_channels", "2 or more for its loss", 0)

@@ -12,6 +12,7 @@ from diff4splat.training.stages.kinds.monocular_depth import MonocularDepthStage
 from diff4splat.training.stages.kinds.motion import MotionStage
 from diff4splat.training.stages.kinds.motion_diffusion import MotionDiffusionStage
 from diff4splat.training.stages.kinds.object_mask import ObjectMaskStage
+from diff4splat.training.stages.kinds.object_shadow import ObjectShadowStage
 from diff4splat.training.stages.kinds.posed_video_pretrain import PosedVideoPretrainStage
 from diff4splat.training.stages.kinds.static import StaticStage
 from diff4splat.training.stages.kinds.vae import AutoencoderStage
@@ -30,6 +31,7 @@ STAGES: Mapping[StageKind, type[ModelStage]] = MappingProxyType(
         "motion_diffusion": MotionDiffusionStage,
         "object_mask": ObjectMaskStage,
         "image_classifier": ImageClassifierStage,
+        "object_shadow": ObjectShadowStage,
         "video_diffusion": VideoDiffusionStage,
         "video_distillation": VideoDistillationStage,
         "joint": JointStage,

@@ -73,7 +73,7 @@ def draw_clip(world: World, settings: DrawSettings | None = None) -> Clip:
             frames,
         )
         views = [
-            _view(camera, [images[at] for images in painted], truths[at], lenses[0][0])
+            as_view(camera, [images[at] for images in painted], truths[at], lenses[0][0])
             for at, camera in enumerate(world.views)
         ]
         tracks = None
@@ -120,9 +120,10 @@ def _measure(
     return render_ground_truth(buffer, frame, row[frame], following)
 
 
-def _view(
+def as_view(
     camera: Camera, images: list[np.ndarray], truths: list[GroundTruth], first: RenderCamera
 ) -> View:
+    """One camera's images and truth, in the axes of the first camera."""
     flow = None
     if truths[0].to_next is not None:
         flow = Flow(

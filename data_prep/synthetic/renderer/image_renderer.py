@@ -39,7 +39,7 @@ class Renderer:
         seen: Float64[np.ndarray, "n 3"],
         settings: DrawSettings,
     ) -> None:
-        self._buffer, self._settings = buffer, settings
+        self._buffer, self._settings, self._seen = buffer, settings, seen
         self._materials, self._lighting = materials_of(buffer), lighting_of(world)
         edge, half = settings.shadow_px, max(settings.shadow_px // 2, 1)
         self._sun = HeightMaps(chart_of(world.light.toward, seen, buffer, edge), buffer, edge)
@@ -55,6 +55,12 @@ class Renderer:
         mean_share = max(mean / (lens.height * lens.width * 3 * 255), 1e-3)
         factor = min(max(_TARGET_MEAN / mean_share, 0.85), 2.2)
         self._lighting = self._lighting._replace(exposure=self._lighting.exposure * factor)
+
+    def of(self, world: World, buffer: TriangleBuffer) -> "Renderer":
+        """Another world in the same exposure, with shadows of the same resolution."""
+        other = Renderer(world, buffer, self._seen, self._settings)
+        other._lighting = other._lighting._replace(exposure=self._lighting.exposure)
+        return other
 
     def render(self, frame: int, lenses: list[RenderCamera]) -> list[UInt8[np.ndarray, "h w 3"]]:
         """The image of every view at one frame."""

@@ -8,6 +8,7 @@ Network = Literal[
     "object-mask",
     "image-classifier",
     "image-inpainting",
+    "object-shadow",
     "text",
     "video",
     "ldrm",

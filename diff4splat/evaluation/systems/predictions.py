@@ -22,6 +22,8 @@ from diff4splat.scene.scene import Scene
 
 MIN_COVERAGE = 0.05
 """Alpha below which a pixel is static."""
+LEAST_SOLID, FAINT_WEIGHT = 0.6, 1e-3
+"""Opacity of a Gaussian of a surface (shadows have at most 0.55), and the weight of others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,15 +86,21 @@ class ScenePrediction:
 def scene_flow(
     scene: Scene, camera: Camera, source_s: float, times_s: tuple[float, ...]
 ) -> Float[Tensor, "t h w 3"]:
-    """World-space displacement of the surface at every pixel, from the source time."""
+    """World-space displacement of the surface at every pixel, from the source time.
+
+    What is less opaque than ``LEAST_SOLID`` hardly counts before a surface: a shadow that slides
+    over the ground does not move it.
+    """
     height, width = camera.size_px
     if isinstance(scene.motion, StaticMotion) or not times_s:
         return torch.zeros(len(times_s), height, width, 3)
     start = scene.state_at(source_s)
     offsets = [scene.state_at(time_s).means - start.means for time_s in times_s]
-    settings = RenderSettings(features=torch.cat(offsets, -1), dilation_px2=scene.dilation_px2)
+    weight = torch.where(start.opacities < LEAST_SOLID, FAINT_WEIGHT, 1.0)[:, None]
+    features = torch.cat([torch.cat(offsets, -1) * weight, weight], -1)
+    settings = RenderSettings(features=features, dilation_px2=scene.dilation_px2)
     rendered = render(start, camera, outputs=("features", "alpha"), settings=settings)
-    is_covered = rendered.alpha > MIN_COVERAGE
-    alpha = torch.where(is_covered, rendered.alpha, 1.0)[..., None]
-    flow = torch.where(is_covered[..., None], rendered.features / alpha, 0.0)
+    is_covered = (rendered.alpha > MIN_COVERAGE)[..., None]
+    found, share = rendered.features[..., :-1], rendered.features[..., -1:]
+    flow = torch.where(is_covered, found / torch.where(is_covered, share, 1.0), 0.0)
     return flow.unflatten(-1, (len(times_s), 3)).movedim(2, 0)

@@ -59,6 +59,7 @@ from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
 )
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, moving_mask
+from diff4splat.generation.object_shadow.shadow import reduced_like, without_shadows
 
 
 def build_layered_image(
@@ -73,9 +74,15 @@ def build_layered_image(
     """The layers of ``image``; ``small`` is the copy that ``maps`` belong to.
 
     Without ``infill`` between the pixels, theirs are twice as wide. ``inpaint`` gives colours to
-    what is hidden, in place of shifted patches and a reflected border.
+    what is hidden, in place of shifted patches and a reflected border. Shadows of what moves are
+    taken off all layers.
     """
+    with_shadows = image.rgb
+    small, image, maps = _without_shadows(small, image, maps)
     pixels, reduced = pixel_layer(small, image, maps), is_reduced(small, image)
+    if maps.shadows:
+        moves = moving_mask(pixels.depth, pixels.displacement)[..., None]
+        pixels = replace(pixels, rgb=torch.where(moves, with_shadows, pixels.rgb))
     is_photograph = inpaint is not None or finest_copy(small, maps).shape != image.rgb.shape
     rings = PHOTOGRAPH if is_photograph else (NEAR,)
     hidden = hidden_layers(small, maps, pixels, border_cells)
@@ -96,10 +103,28 @@ def build_layered_image(
     hidden += occluded.all
     if border_cells:
         hidden += fine_borders(pixels, disoccluded, rings, inpaint)
+    ground = pixels.depth
+    if disoccluded is not None:
+        moves = moving_mask(pixels.depth, pixels.displacement)
+        ground = torch.where(moves & disoccluded.mask, disoccluded.depth, ground)
     if not infill:
         wide = replace(pixels, footprint_px=2 * PIXEL_FOOTPRINT_PX)
-        return LayeredImage(layers=(wide, *hidden))
-    return LayeredImage(layers=(pixels, subpixel_infill(pixels), *hidden))
+        return LayeredImage(layers=(wide, *hidden), ground_depth=ground)
+    layers = (pixels, subpixel_infill(pixels), *hidden)
+    return LayeredImage(layers=layers, ground_depth=ground)
+
+
+def _without_shadows(
+    small: InputImage, image: InputImage, maps: ImageMaps
+) -> tuple[InputImage, InputImage, ImageMaps]:
+    """All three without the shadows of what moves."""
+    if not maps.shadows:
+        return small, image, maps
+    lit = without_shadows(image, maps.shadows)
+    if maps.fine is not None:
+        fine = replace(image, rgb=maps.fine.rgb)
+        maps = replace(maps, fine=replace(maps.fine, rgb=reduced_like(fine, lit).rgb))
+    return reduced_like(small, lit), lit, maps
 
 
 def hidden_layers(

@@ -4,7 +4,7 @@ Axes: ``h w`` rows and columns of a layer, ``t`` latent frames. Every layer stay
 end, when ``gaussians.py`` makes one Gaussian of each valid cell.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -59,6 +59,8 @@ class LayeredImage:
     """All layers of one image; those that the image shows come first."""
 
     layers: tuple[ImageLayer, ...]
+    ground_depth: Float[Tensor, "h w"] | None = None
+    """z of the static surface at every pixel: behind what moves, else what the image shows."""
 
     @property
     def visible_count(self) -> int:
@@ -68,7 +70,7 @@ class LayeredImage:
     @property
     def visible(self) -> "LayeredImage":
         """The layers that the image shows, alone."""
-        return LayeredImage(layers=tuple(layer for layer in self.layers if layer.in_image))
+        return replace(self, layers=tuple(layer for layer in self.layers if layer.in_image))
 
 
 def moving_mask(

@@ -36,6 +36,8 @@ from diff4splat.generation.motion.object_relief import (
     with_changed_depth,
 )
 from diff4splat.generation.motion.sampling import MotionRequest, MotionSample, sample_motion
+from diff4splat.generation.object_shadow.prediction import predicted_darkening
+from diff4splat.generation.object_shadow.shadow import ObjectShadow
 from diff4splat.generation.settings import GenerationSettings, why_unguided
 from diff4splat.models.hub.model import Model
 from diff4splat.progress.run_log import RunLog
@@ -66,16 +68,18 @@ class ObjectMotion:
         if shows_photograph:
             mask, depth = with_rim(event > 0, depth, image.rgb)
             event = torch.where(mask, event.flatten()[nearest_inside(event > 0)], event)
+        displacement = self._displacement(image, event, depth)
         copy = MovingMaps(
             camera=image.camera,
             depth=depth,
             event=event,
-            displacement=self._displacement(image, event, depth),
+            displacement=displacement,
             image_scale=len(images.image.rgb) / len(image.rgb),
         )
         moved, copy = self._moved(maps, copy)
         if not copy.displacement.any():
             return maps
+        moved = replace(moved, shadows=self._shadows(images.image, event, displacement))
         if shows_photograph:
             return with_displacement(moved, image, copy.depth, copy.displacement)
         return with_majority_displacement(moved, copy.depth, copy.displacement)
@@ -100,6 +104,29 @@ class ObjectMotion:
                 found, displacement=as_far_in_image(found.displacement, found.depth, as_one)
             )
         return replace(maps, objects=objects), found
+
+    def _shadows(
+        self,
+        image: InputImage,
+        event: Int[Tensor, "y x"],
+        displacement: Float[Tensor, "t y x 3"],
+    ) -> tuple[ObjectShadow, ...]:
+        """Of what each event displaces; those that darken something."""
+        network = self.model.networks.object_shadow
+        if network is None or not displacement.any():
+            return ()
+        travels = displacement.any(-1).any(0)
+        masks = [travels & (event == number) for number in range(1, len(self.requests) + 1)]
+        with self.log.phases.phase("find shadows"):
+            found = [
+                ObjectShadow(
+                    darkening=predicted_darkening(network, image.rgb, mask),
+                    displacement=displacement[:, mask].median(1).values,
+                )
+                for mask in masks
+                if mask.any()
+            ]
+        return tuple(one for one in found if one.darkening.any())
 
     def _in_place(self, event: Int[Tensor, "y x"]) -> Bool[Tensor, "y x"]:
         """Pixels that move about themselves alone."""

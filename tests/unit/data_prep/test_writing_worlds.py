@@ -81,10 +81,10 @@ def interrupted_at(clip: int, stop: Callable[[], None]) -> Callable[..., object]
     """``_draw`` that is stopped before it draws one clip."""
     draw = writing._draw
 
-    def drawing(recipe: WorldRecipe, settings: DrawSettings, index: int) -> object:
+    def drawing(job: WorldJob, index: int) -> object:
         if index == clip:
             stop()
-        return draw(recipe, settings, index)
+        return draw(job, index)
 
     return drawing
 

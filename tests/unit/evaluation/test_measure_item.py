@@ -196,6 +196,15 @@ def test_flow_does_not_fade_with_the_surface() -> None:
     assert torch.allclose(flow[0, 16, 20], torch.tensor(SHIFT), atol=1e-5)
 
 
+def test_a_shadow_does_not_move_the_ground_that_it_slides_over() -> None:
+    scene = wall_and_patch(SHIFT)
+    faint = scene.gaussians.opacities.clone()
+    faint[scene.motion.moving_index] = 0.5
+    shadow = replace(scene, gaussians=replace(scene.gaussians, opacities=faint))
+    flow = scene_flow(shadow, view_cameras(0)[0], 0.0, (1.0,))
+    assert float(flow[0, 16, 20].norm()) < 0.01 * float(torch.tensor(SHIFT).norm())
+
+
 def test_points_at_pixels_that_show_another_object_are_not_followed() -> None:
     clip = filmed(wall_and_patch(SHIFT))
     case = make_sample(clip, tiny_protocol(), "generation")

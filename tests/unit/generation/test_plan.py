@@ -21,7 +21,8 @@ from diff4splat.models.networks import PARTS, model_parts
 from diff4splat.progress.run_log import RunLog
 
 VIDEO = frozenset(FILL_PARTS)
-PRIORS = frozenset({"monocular_depth", "motion_unet", "object_mask", "text_encoder"})
+SHADOW = frozenset({"object_shadow"})
+PRIORS = SHADOW | {"monocular_depth", "motion_unet", "object_mask", "text_encoder"}
 DEPTH = frozenset({"monocular_depth"})
 CLASSIFIER = frozenset({"image_classifier"})
 INPAINTING = frozenset({"image_inpainting"})
@@ -70,6 +71,7 @@ TABLE = [
     ("small", (), {"prompt": True, "fill": "video"}, PRIORS | VIDEO),
     ("small", PARTS, {"prompt": True, "without": ("monocular_depth",)}, PRIORS - DEPTH),
     ("small", PARTS, {"prompt": True, "without": ("motion_unet",)}, DEPTH),
+    ("small", PARTS, {"prompt": True, "without": ("object_shadow",)}, PRIORS - SHADOW),
     ("small", PARTS, {"prompt": True, "without": ("text_encoder",)}, DEPTH),
     ("small", PARTS, {"prompt": True, "without": ("object_mask",)}, PRIORS - {"object_mask"}),
     (
@@ -107,7 +109,7 @@ TABLE = [
         "small",
         ("text_encoder", "motion_unet"),
         {"prompt": True},
-        PRIORS - DEPTH - {"object_mask"},
+        PRIORS - DEPTH - SHADOW - {"object_mask"},
     ),
     ("small", ("text_encoder", "object_mask"), {"prompt": True}, frozenset()),
     (

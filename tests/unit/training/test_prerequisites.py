@@ -57,6 +57,7 @@ SMALL_BUILDS_ON = {
     "motion_diffusion": {"text_encoder": "video_diffusion"},
     "object_mask": {"text_encoder": "video_diffusion"},
     "image_classifier": {"text_encoder": "video_diffusion", "object_mask": "object_mask"},
+    "object_shadow": {},
     "video_distillation": {
         "vae": "vae",
         "monocular_depth": "monocular_depth",

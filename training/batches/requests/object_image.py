@@ -5,8 +5,6 @@ Axes: ``h w`` pixels.
 
 from dataclasses import dataclass
 
-import cv2
-import numpy as np
 import torch
 from jaxtyping import UInt8
 from torch import Tensor
@@ -14,10 +12,8 @@ from torch import Tensor
 from diff4splat.data.clip import Clip
 from diff4splat.data.clip_objects import object_numbers
 from diff4splat.errors import InputError
+from diff4splat.training.batches.random_images.random_window import draw_window
 from diff4splat.training.batches.requests.present import PresentObject, named_objects
-
-WHOLE_SHARE, LEAST_PART = 0.5, 0.55
-"""Share of images that are shown whole; least side of a part, as a share of the image's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,32 +42,10 @@ def random_object_image(
             "leave the source out"
         )
     frame = int(torch.randint(clip.frames, (), generator=generator))
-    window, mirror = _random_window(clip.size_px, generator)
-    maps = [view.rgb[frame][window].numpy(), view.instances[frame][window].numpy()]
-    if mirror:
-        maps = [np.ascontiguousarray(one[:, ::-1]) for one in maps]
-    kinds = (_smooth(maps[0], size_px), cv2.INTER_NEAREST)
-    rgb, instances = (
-        torch.from_numpy(cv2.resize(one, size_px[::-1], interpolation=kind))
-        for one, kind in zip(maps, kinds, strict=True)
-    )
+    window = draw_window(clip.size_px, size_px, generator)
+    instances = window.labels(view.instances[frame])
     return ObjectImage(
-        image=rgb,
+        image=window.colors(view.rgb[frame]),
         objects=named_objects(clip.note, instances),
         numbers=object_numbers(clip.note, instances),
     )
-
-
-def _random_window(
-    size_px: tuple[int, int], generator: torch.Generator
-) -> tuple[tuple[slice, slice], bool]:
-    """Rows and columns, and whether to mirror them."""
-    mirror, whole, share, top, left = torch.rand(5, generator=generator).tolist()
-    share = 1.0 if whole < WHOLE_SHARE else LEAST_PART + (1 - LEAST_PART) * share
-    height, width = (round(share * side) for side in size_px)
-    top, left = round(top * (size_px[0] - height)), round(left * (size_px[1] - width))
-    return (slice(top, top + height), slice(left, left + width)), mirror < 0.5
-
-
-def _smooth(image: np.ndarray, size_px: tuple[int, int]) -> int:
-    return cv2.INTER_AREA if image.shape[0] > size_px[0] else cv2.INTER_CUBIC

@@ -17,6 +17,7 @@ from diff4splat.models.networks import Networks
 from diff4splat.models.object_mask.enlarged import enlarged, reduced
 from diff4splat.models.object_mask.instance_vectors import membership_logits
 from diff4splat.training.batches.coarse_images import coarse
+from diff4splat.training.batches.random_images.random_light import draw_light
 from diff4splat.training.batches.requests.instance_seeds import draw_seeds, stack_seeds
 from diff4splat.training.batches.requests.request_batch import RequestBatch
 from diff4splat.training.losses.object_mask import (
@@ -29,10 +30,6 @@ from diff4splat.training.stages.loss_terms import LossTerm, weighted_sum
 from diff4splat.training.stages.model_stage import ModelStage, StagePlan, Terms
 from diff4splat.training.stages.previews import mask_preview
 from diff4splat.training.stages.text_conditioning import TextConditioning
-
-LOG_GAMMA, LOG_GAIN, LOG_BALANCE, NOISE = 0.3, 0.2, 0.06, 0.03
-"""Half the ranges of gamma, gain and white balance, as logarithms; largest deviation of noise.
-Small enough that colours keep their names."""
 
 
 class ObjectMaskStage(ModelStage):
@@ -147,13 +144,8 @@ class ObjectMaskStage(ModelStage):
         self, rgb: Float[Tensor, "b 3 h w"], batch: RequestBatch
     ) -> Float[Tensor, "b 3 h w"]:
         """Another exposure, white balance and noise for every image."""
-        own = self.random.per_sample(batch, "light")
-        draws = torch.stack([torch.rand(6, generator=one) for one in own]).to(rgb)
-        gamma, gain, *balance, noise = (2 * draws - 1)[..., None, None, None].unbind(1)
-        factors = (LOG_GAIN * gain + LOG_BALANCE * torch.cat(balance, 1)).exp()
-        lit = rgb.clamp_min(1e-3) ** (LOG_GAMMA * gamma).exp() * factors
-        normal = torch.randn(rgb.shape, generator=self.random.per_step(batch, "noise"))
-        return (lit + NOISE * noise.abs() * normal.to(rgb)).clamp(0, 1)
+        light = draw_light(self.random.per_sample(batch, "light"), rgb)
+        return light.noisy(light.lit(rgb), self.random.per_step(batch, "noise"))
 
 
 def _rgb(images: Tensor) -> Float[Tensor, "b 3 h w"]:

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from diff4splat.generation.inputs.input_image import InputImage
 from diff4splat.generation.motion.local_motion.moving_object import MovingObjects
+from diff4splat.generation.object_shadow.shadow import ObjectShadow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +37,8 @@ class ImageMaps:
     """The same of a larger copy, for the image's own pixels."""
     objects: MovingObjects | None = None
     """What moves about itself; None where nothing does."""
+    shadows: tuple[ObjectShadow, ...] = ()
+    """Of what moves, at the size of the image."""
 
 
 def is_reduced(small: InputImage, image: InputImage) -> bool:

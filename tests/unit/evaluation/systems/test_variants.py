@@ -37,6 +37,10 @@ def generator(**settings: object) -> Generator:
     return Generator(pipeline=pipeline, settings=GenerationSettings(**settings))
 
 
+OF_MOTION = {"object_mask", "image_classifier", "object_shadow"}
+"""What only a motion prior asks for."""
+
+
 def by_row(full: Generator) -> dict[str, Generator | None]:
     """The changed system of every ablation; None where nothing changes."""
     variants = ablations(full, NETWORKS)
@@ -59,13 +63,12 @@ def test_a_network_that_runs_is_left_out() -> None:
     video = {"vae", "dit", "ldrm", "deformation"}
     assert gone == {
         "without depth prior": {"monocular_depth"},
-        "without motion prior": {"motion_unet", "object_mask", "image_classifier"},
+        "without motion prior": {"motion_unet", *OF_MOTION},
         "without object mask": {"object_mask", "image_classifier"},
         "without image classifier": {"image_classifier"},
         "without image inpainting": {"image_inpainting"},
-        "without text encoder": {
-            *("text_encoder", "motion_unet", "object_mask", "image_classifier")
-        },
+        "without object shadow": {"object_shadow"},
+        "without text encoder": {"text_encoder", "motion_unet", *OF_MOTION},
         "without video model": {"dit"},
         "without VAE and LDRM": video,
         "without deformation": {"deformation"},

@@ -28,6 +28,7 @@ from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
     pixel_layer,
 )
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
+from diff4splat.generation.object_shadow.shadow import ObjectShadow
 from diff4splat.models.ldrm.plane_prior import OPAQUE
 from diff4splat.render.api import render
 from diff4splat.render.settings import RenderSettings
@@ -279,3 +280,42 @@ def test_behind_what_moves_lie_the_texture_of_patches_and_sharp_colours(
     expected = with_sharp_colors(textured).rgb
     assert torch.equal(layers[2].rgb, expected)
     assert not torch.equal(expected, textured.rgb) and not torch.equal(textured.rgb, plain.rgb)
+
+
+@pytest.mark.parametrize("factor", [1, FACTOR])
+def test_layers_are_lit_as_if_what_moves_cast_no_shadow(factor: int) -> None:
+    image, height, width = input_image(0.2 + 0.3 * random_rgb(*SIZE_PX)), *SIZE_PX
+    displacement = torch.zeros(3, height // factor, width // factor, 3)
+    displacement[1:, 8 // factor : 12 // factor, 8 // factor : 12 // factor, 0] = 0.5
+    maps = ImageMaps(
+        depth=torch.full(displacement.shape[1:3], 3.0),
+        displacement=displacement,
+        shadows=(
+            ObjectShadow(
+                darkening=torch.full((height, width, 3), 0.4), displacement=torch.zeros(3, 3)
+            ),
+        ),
+    )
+    layered = build_layered_image(downsample(image, factor), image, maps, 0)
+    pixels = layered.layers[0]
+    moves = pixels.displacement.any(-1).any(0)
+    assert bool(moves.any())
+    torch.testing.assert_close(pixels.rgb[moves], image.rgb[moves])
+    lit = image.rgb * torch.tensor(0.4).exp()
+    torch.testing.assert_close(pixels.rgb[~moves], lit[~moves])
+    # What the object hides is lit, too.
+    behind = layered.layers[2]
+    assert float(behind.rgb[behind.mask].mean()) > 0.85 * float(lit.mean())
+
+
+def test_the_ground_lies_behind_what_moves() -> None:
+    layered = with_box(displacement=moving_block())
+    pixels = layered.layers[0]
+    moves = pixels.displacement.any(-1).any(0)
+    behind = layered.layers[2]
+    assert torch.equal(layered.ground_depth[~moves], pixels.depth[~moves])
+    covered = moves & behind.mask
+    assert torch.equal(layered.ground_depth[covered], behind.depth[covered])
+    assert bool((layered.ground_depth[covered] > pixels.depth[covered]).all())
+    static = built()
+    assert torch.equal(static.ground_depth, static.layers[0].depth)

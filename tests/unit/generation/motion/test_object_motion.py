@@ -14,6 +14,7 @@ from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.settings import GenerationSettings
 from diff4splat.models.config.sizes import size_by_name
 from diff4splat.models.hub.model import Model
+from diff4splat.models.networks import Networks
 from diff4splat.progress.run_log import RunLog
 
 SIDE = 16
@@ -88,3 +89,49 @@ def test_maps_have_the_body_of_what_turns(monkeypatch: pytest.MonkeyPatch, scale
     assert middle < 8.9 and outline > 9.1
     assert bool((maps.depth[:10] == 9.0).all())
     assert bool(maps.displacement.any(-1).any(0)[20:44, 20:44].all())
+
+
+def darkened(monkeypatch: pytest.MonkeyPatch, value: float, *, in_place: bool = False) -> ImageMaps:
+    """The same maps by a model with a network that sees that shadow everywhere."""
+
+    def network(image: Tensor, mask: Tensor) -> Tensor:
+        assert float(mask.max()) == 1 and 0 < float(mask.mean()) < 0.5
+        return torch.full_like(image, value)
+
+    networks = Networks(object_shadow=network)
+    request = MotionRequest(
+        text=None,
+        seed=0,
+        settings=GenerationSettings(),
+        local_motion="spins" if in_place else "",
+        in_place=in_place,
+    )
+    side = 64
+    event = torch.zeros(side, side, dtype=torch.long)
+    event[16:48, 16:48] = 1
+    moving = (event > 0)[None, ..., None] * torch.tensor([0.0 if in_place else 2.0, 0.0, 0.0])
+    monkeypatch.setattr(ObjectMotion, "_events", lambda *_: event)
+    monkeypatch.setattr(ObjectMotion, "_displacement", lambda *_: moving)
+    small = size_by_name("small")
+    config = replace(small, motion_unet=replace(small.motion_unet, input_scale=1))
+    model = Model(config=config, networks=networks)
+    image = input_image(0.3 * random_rgb(side, side))
+    motion = ObjectMotion(model=model, frames=1, requests=(request,), log=RunLog())
+    maps = ImageMaps(depth=torch.full((side, side), 3.0), displacement=None)
+    return motion.added_to(maps, Copies(image=image, small=image))
+
+
+def test_what_is_displaced_has_a_shadow_with_its_displacement(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (shadow,) = darkened(monkeypatch, 0.3).shadows
+    assert torch.allclose(shadow.displacement, torch.tensor([[2.0, 0.0, 0.0]]))
+    assert torch.allclose(shadow.darkening, torch.full((64, 64, 3), 0.3), atol=1e-5)
+
+
+def test_no_shadow_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert darkened(monkeypatch, 0.0).shadows == ()
+
+
+def test_what_spins_in_place_keeps_its_shadow(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert darkened(monkeypatch, 0.3, in_place=True).shadows == ()

@@ -51,6 +51,7 @@ def test_the_file_lists_parts_in_one_order(tmp_path: Path) -> None:
             "object_mask",
             "image_classifier",
             "image_inpainting",
+            "object_shadow",
         ],
         "license": "not stated",
         "origin": "not stated",

@@ -26,7 +26,8 @@ def test_every_recipe_keeps_the_order_of_stages(name: str) -> None:
     small = ["monocular_depth", "posed_video_pretrain", "static-low", "motion", "dynamic"]
     is_small = name in ("small", "distil")
     middle = small if is_small else ["static-low", "static-high", "dynamic"]
-    last = ["motion_diffusion", "object_mask", "image_classifier"] if is_small else ["joint"]
+    small_last = ["motion_diffusion", "object_mask", "image_classifier", "object_shadow"]
+    last = small_last if is_small else ["joint"]
     last += ["video_distillation"] if name == "distil" else []
     assert names == ["vae", *middle, "video_diffusion", *last]
 

@@ -1,0 +1,1 @@
+"""The shadow that one object of an image casts."""

@@ -1,0 +1,1 @@
+"""Images with and without one object."""
