@@ -59,7 +59,7 @@ from diff4splat.generation.layered_image.pixel_maps.pixel_layer import (
 )
 from diff4splat.generation.layered_image.subpixel_infill import subpixel_infill
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage, moving_mask
-from diff4splat.generation.object_shadow.shadow import reduced_like, without_shadows
+from diff4splat.generation.object_shadow.shadow import without_shadows
 
 
 def build_layered_image(
@@ -120,11 +120,13 @@ def _without_shadows(
     """All three without the shadows of what moves."""
     if not maps.shadows:
         return small, image, maps
-    lit = without_shadows(image, maps.shadows)
+    small, image = (
+        replace(one, rgb=without_shadows(one.rgb, maps.shadows)) for one in (small, image)
+    )
     if maps.fine is not None:
-        fine = replace(image, rgb=maps.fine.rgb)
-        maps = replace(maps, fine=replace(maps.fine, rgb=reduced_like(fine, lit).rgb))
-    return reduced_like(small, lit), lit, maps
+        fine = replace(maps.fine, rgb=without_shadows(maps.fine.rgb, maps.shadows))
+        maps = replace(maps, fine=fine)
+    return small, image, maps
 
 
 def hidden_layers(

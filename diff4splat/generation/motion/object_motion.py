@@ -82,7 +82,8 @@ class ObjectMotion:
         moved = replace(moved, shadows=self._shadows(images.image, event, displacement))
         if shows_photograph:
             return with_displacement(moved, image, copy.depth, copy.displacement)
-        return with_majority_displacement(moved, copy.depth, copy.displacement)
+        found = with_majority_displacement(moved, copy.depth, copy.displacement)
+        return found if found.displacement is not None else replace(found, shadows=())
 
     def _moved(self, maps: ImageMaps, copy: MovingMaps) -> tuple[ImageMaps, MovingMaps]:
         """Both with bounded relief of what moves, and what it does about itself."""

@@ -1,15 +1,14 @@
 """The shadow of one moving object, and the image without it.
 
-Axes: ``h w`` pixels of the image, ``t`` latent frames.
+Axes: ``h w`` pixels of the image, ``y x`` of a copy, ``t`` latent frames.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from jaxtyping import Float
 from torch import Tensor
-
-from diff4splat.generation.inputs.input_image import InputImage, downsample
+from torch.nn.functional import interpolate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,14 +24,13 @@ class ObjectShadow:
     """Of the object, in scene units, along the first camera's axes."""
 
 
-def without_shadows(image: InputImage, shadows: Sequence[ObjectShadow]) -> InputImage:
-    """The image as it would be lit if these objects were not there."""
+def without_shadows(
+    rgb: Float[Tensor, "y x 3"], shadows: Sequence[ObjectShadow]
+) -> Float[Tensor, "y x 3"]:
+    """The image, or a copy of it, as it would be lit if these objects were not there."""
     if not shadows:
-        return image
-    darkening = sum(one.darkening for one in shadows)
-    return replace(image, rgb=(image.rgb * darkening.exp()).clamp(0, 1))
-
-
-def reduced_like(copy: InputImage, image: InputImage) -> InputImage:
-    """``copy`` with the colours of ``image``, of which it is a smaller copy."""
-    return replace(copy, rgb=downsample(image, len(image.rgb) // len(copy.rgb)).rgb)
+        return rgb
+    darkening = sum(one.darkening for one in shadows).movedim(-1, 0)[None]
+    if darkening.shape[2:] != rgb.shape[:2]:
+        darkening = interpolate(darkening, tuple(rgb.shape[:2]), mode="area")
+    return (rgb * darkening[0].movedim(0, -1).exp()).clamp(0, 1)

@@ -319,3 +319,18 @@ def test_the_ground_lies_behind_what_moves() -> None:
     assert bool((layered.ground_depth[covered] > pixels.depth[covered]).all())
     static = built()
     assert torch.equal(static.ground_depth, static.layers[0].depth)
+
+
+def test_shadows_of_the_image_are_taken_off_a_copy_that_is_filled_by_video() -> None:
+    image, small = input_image(random_rgb(32, 48)), (8, 12)
+    maps = ImageMaps(
+        depth=random_depth(*small, (2.0, 9.0)),
+        displacement=None,
+        fine=FineMaps(rgb=downsample(image, 2).rgb, depth=random_depth(16, 24, (2.0, 9.0))),
+        shadows=(
+            ObjectShadow(darkening=torch.full((32, 48, 3), 0.1), displacement=torch.zeros(2, 3)),
+        ),
+    )
+    copy = downsample(image, 4)
+    pixels = build_layered_image(copy, copy, maps, 0).layers[0]
+    torch.testing.assert_close(pixels.rgb, (copy.rgb * torch.tensor(0.1).exp()).clamp(0, 1))

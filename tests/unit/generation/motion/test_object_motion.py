@@ -8,7 +8,9 @@ from image_layers import input_image, random_rgb
 from torch import Tensor
 
 from diff4splat.generation.inputs.copies import Copies
+from diff4splat.generation.inputs.input_image import enlarged
 from diff4splat.generation.layered_image.pixel_maps.image_maps import FineMaps, ImageMaps
+from diff4splat.generation.motion import object_motion
 from diff4splat.generation.motion.object_motion import ObjectMotion
 from diff4splat.generation.motion.sampling import MotionRequest
 from diff4splat.generation.settings import GenerationSettings
@@ -135,3 +137,13 @@ def test_no_shadow_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_spins_in_place_keeps_its_shadow(monkeypatch: pytest.MonkeyPatch) -> None:
     assert darkened(monkeypatch, 0.3, in_place=True).shadows == ()
+
+
+def test_a_shadow_stays_with_an_object_that_is_too_small_to_move(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kept = darkened(monkeypatch, 0.3)
+    monkeypatch.setattr(object_motion, "with_majority_displacement", lambda maps, *_: maps)
+    monkeypatch.setattr(object_motion, "motion_copy", lambda images, _: enlarged(images.small, 1))
+    lost = darkened(monkeypatch, 0.3)
+    assert kept.shadows and lost.displacement is None and lost.shadows == ()
