@@ -101,10 +101,9 @@ def image(enlargement: int = 1) -> InputImage:
     """A red box in front of a gradient, with a shadow to its right."""
     y, x = torch.meshgrid(*(torch.linspace(0, 1, SIDE_PX),) * 2, indexing="ij")
     rgb = torch.stack([0.3 + 0.4 * x, 0.6 - 0.3 * y, 0.4 + 0.2 * x * y], -1)
+    rgb[46:55, 30:60] *= 0.7  # Its shadow.
     rgb[36:52, 20:40] = torch.tensor([0.85, 0.15, 0.1])
     rgb[36:40, 20:40] = torch.tensor([0.95, 0.35, 0.3])
-    rgb[52:55, 24:48] *= 0.45  # Its shadow.
-    rgb[46:52, 40:48] *= 0.45
     rgb = rgb.repeat_interleave(enlargement, 0).repeat_interleave(enlargement, 1)
     camera = pinhole(float(len(rgb)), rgb.shape[:2])
     return InputImage(rgb=rgb, camera=camera, focal_source="test")
