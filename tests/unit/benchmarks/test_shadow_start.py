@@ -2,7 +2,7 @@
 
 import torch
 
-from benchmarks.larger_backbone.shadow_start import start_from_depth
+from benchmarks.object_shadow.start import start_from_depth
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.object_shadow.network import ObjectShadowNet, object_coordinates
 

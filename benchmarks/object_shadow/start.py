@@ -1,6 +1,6 @@
 """Write a model whose object shadow starts from its depth prior, to train further.
 
-``python -m benchmarks.larger_backbone.shadow_start --model small --out start``: the U-Net of the
+``python -m benchmarks.object_shadow.start --model small --out start``: the U-Net of the
 depth prior knows surfaces and objects; the mask and the object's coordinates, which it has never
 seen, count nothing.
 """

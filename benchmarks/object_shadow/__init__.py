@@ -1,0 +1,1 @@
+"""The object shadow: where its training starts, and what it explains."""
