@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from diff4splat.training.losses.object_shadow import (
+    BEND,
     DARKENING_RANGE,
     LEAST_COLOR,
     LEAST_DARKENING,
@@ -35,14 +36,17 @@ def test_extreme_colours_have_a_bounded_darkening(image: float, without: float) 
     assert low - 1e-6 <= float(found.min()) and float(found.max()) <= high + 1e-6
 
 
-def test_both_errors_are_those_of_the_formulas() -> None:
+@pytest.mark.parametrize(
+    ("far", "error_of_far"), [(0.1, 0.1**2 / (2 * BEND)), (0.7, 0.7 - BEND / 2)]
+)
+def test_both_errors_are_those_of_the_formulas(far: float, error_of_far: float) -> None:
     image, without, valid = pair()
     truth = true_darkening(image, without)
-    found = truth + 0.1
+    found = truth + far
     for sample in range(2):
         own = valid[sample]
         weight = 1 + SHADOW_WEIGHT * (truth[sample] > LEAST_DARKENING).double()
-        wanted = (weight * 0.01).mean(0)[own].mean()
+        wanted = (weight * error_of_far).mean(0)[own].mean()
         assert float(darkening_error(found, truth, valid)[sample]) == pytest.approx(float(wanted))
         lit = (image * found.exp()).clamp_max(1) - without
         wanted = lit.square().mean(1)[sample][own].mean()
