@@ -20,6 +20,8 @@ SIDE_PX = 128
 """Of the longer side of the copy that the network sees (chosen in docs/log/object-shadow.md)."""
 LEAST_DARKENING, LEAST_PEAK = 0.07, 0.15
 """Below the first a pixel is as bright as without the object; a shadow reaches the second."""
+MOST_DARKENING = 0.8
+"""Beyond it a wrong prediction makes dark things glow, and a right one leaves a faint trace."""
 SURROUNDINGS_SHARE, LEAST_LIT = 0.1, 0.02
 """Of the copy's longer side: how far surroundings reach; least share of them that must be lit."""
 GUIDE_PX, GUIDE_VARIANCE = 2, 4e-3
@@ -59,7 +61,7 @@ def _by_network(
     """On a copy of the size that the network was trained on, enlarged or reduced again."""
     size_px = _network_size(image.shape[1:])
     copy, mask = _resized(image[None], size_px)[0], _resized(share, size_px)[0]
-    found = network(copy[None], mask)[0].to(image).clamp_min(0)
+    found = network(copy[None], mask)[0].to(image).clamp(0, MOST_DARKENING)
     found = no_brighter_than_around(found, copy, mask[0])
     if max(size_px) < max(image.shape[1:]):
         return enlarged_along(found, _log_brightness(copy), _log_brightness(image))

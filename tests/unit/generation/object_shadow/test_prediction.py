@@ -8,6 +8,7 @@ import torch
 from diff4splat.generation.object_shadow.prediction import (
     LEAST_DARKENING,
     LEAST_PEAK,
+    MOST_DARKENING,
     SIDE_PX,
     enlarged_along,
     is_shadow,
@@ -62,6 +63,11 @@ def test_no_pixel_becomes_brighter_than_white() -> None:
 @pytest.mark.parametrize("value", [-1.0, 0.0, LEAST_DARKENING / 2])
 def test_next_to_nothing_is_no_shadow(value: float) -> None:
     assert not predicted_darkening(Fake(value), torch.full((64, 64, 3), 0.3), mask()).any()
+
+
+def test_no_prediction_makes_what_is_dark_glow() -> None:
+    found = predicted_darkening(Fake(5.0), torch.full((64, 64, 3), 0.05), mask())
+    assert float(found.max()) == pytest.approx(MOST_DARKENING)
 
 
 def test_a_shadow_is_clearly_dark_somewhere() -> None:
