@@ -138,21 +138,7 @@ def plan_generation(
         or _motion_reason(trained, facts)
         or ("the text encoder is not trained" if _untrained("text_encoder", trained) else ""),
     }
-    # What moves and how it moves belong together.
-    reasons["object_mask"] = (
-        reasons["motion_unet"] or _untrained("object_mask", trained) or facts.removed("object_mask")
-    )
-    reasons["image_classifier"] = (
-        reasons["object_mask"]
-        or _untrained("image_classifier", trained)
-        or facts.removed("image_classifier")
-        or ("" if facts.names_class else NO_CLASS)
-    )
-    reasons["object_shadow"] = (
-        reasons["motion_unet"]
-        or _untrained("object_shadow", trained)
-        or facts.removed("object_shadow")
-    )
+    reasons |= _with_motion(reasons["motion_unet"], trained, facts)
     reasons["image_inpainting"] = (
         _untrained("image_inpainting", trained)
         or facts.removed("image_inpainting")
@@ -180,6 +166,16 @@ def plan_generation(
     ]
     running = frozenset(part for part in parts if not reasons[part])
     return GenerationPlan(parts=running, skipped=tuple(skipped), depth_given=facts.depth_given)
+
+
+def _with_motion(motion: str, trained: Collection[str], facts: RequestFacts) -> dict[str, str]:
+    """Of what only a motion prior asks for; ``motion`` is why that does not run."""
+    mask, classifier, shadow = (
+        motion or _untrained(part, trained) or facts.removed(part)
+        for part in ("object_mask", "image_classifier", "object_shadow")
+    )
+    classifier = mask or classifier or ("" if facts.names_class else NO_CLASS)
+    return {"object_mask": mask, "image_classifier": classifier, "object_shadow": shadow}
 
 
 def _untrained(part: str, trained: Collection[str]) -> str:

@@ -5,6 +5,7 @@ The trainer asks for indices; everything else follows from them, the seed and th
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Self
 
 import torch
 
@@ -74,3 +75,19 @@ class ClipSamples:
         weights = torch.tensor([source.weight for source in self.recipe.data.sources])
         key = SampleKey(self.seed, self.recipe.name, sample_index, "source")
         return int(torch.multinomial(weights.double(), 1, generator=key.generator()))
+
+
+class SamplesOfClips:
+    """Samples of another shape, from the clips that a recipe names."""
+
+    def __init__(self, clips: ClipSamples) -> None:
+        self.clips, self.recipe = clips, clips.recipe
+
+    @classmethod
+    def open(cls, recipe: StageRecipe, seed: int) -> Self:
+        """The sources that the recipe names.
+
+        Raises:
+            InputError, FileFormatError: a folder is not one of shards.
+        """
+        return cls(ClipSamples.open(recipe, seed))

@@ -4,6 +4,7 @@ Axes: ``h w`` cells of a layer, ``t`` latent frames, ``k`` key times, ``n`` Gaus
 ones. Gaussians keep the order of the layers, and within a layer that of its rows.
 """
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -19,6 +20,9 @@ from diff4splat.scene.harmonics import dc_from_color
 from diff4splat.scene.motion.keyframes import KeyframeMotion
 from diff4splat.scene.motion.protocol import Motion
 from diff4splat.scene.motion.static import StaticMotion
+
+GONE = math.log(0.02)
+"""Growth of what vanishes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,13 +9,12 @@ other colours than its darkest have in it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from diff4splat.generation.layered_image.gaussians import GaussianSet, between, offset_motion
+from diff4splat.generation.layered_image.gaussians import GONE, GaussianSet, between
 from diff4splat.generation.layered_image.types import NO_PIXEL, LayeredImage, moving_mask
 from diff4splat.generation.object_shadow.ground import along_plane, ground_normal, on_ground
 from diff4splat.generation.object_shadow.shadow import ObjectShadow
@@ -23,13 +22,12 @@ from diff4splat.generation.scene_assembly import joined
 from diff4splat.geometry.depth import unproject
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.harmonics import dc_from_color
+from diff4splat.scene.motion.keyframes import KeyframeMotion
 
 FOOTPRINT_PX = 0.6
 """Standard deviation of a pixel's Gaussian: neighbours overlap without a pattern."""
 OVERLAP = 2 * math.pi * FOOTPRINT_PX**2
 """Sum of the Gaussians of all pixels at one of them."""
-GONE = math.log(0.02)
-"""Growth of what vanishes."""
 
 
 def with_shadows(
@@ -68,15 +66,16 @@ def shadow_gaussians(
         strict=True,
     )
     positions, index = torch.stack(placed), torch.arange(len(points), device=points.device)
-    motion = offset_motion(index, positions[[0, -1]] - positions[0], key_times_s)
     growth = torch.where(torch.stack(gone), GONE, (positions[..., 2] / positions[0, :, 2]).log())
-    motion = replace(
-        motion,
+    identity = points.new_tensor([1.0, 0.0, 0.0, 0.0])
+    motion = KeyframeMotion(
+        key_times_s=key_times_s,
+        moving_index=index,
         offsets=positions - positions[0],
+        rotations=identity.repeat(*positions.shape[:2], 1),
         log_scale_offsets=growth[..., None].expand_as(positions).clone(),
     )
     through, rgb = veil(pixels.rgb[chosen], darkening)
-    identity = points.new_tensor([1.0, 0.0, 0.0, 0.0])
     focal_px = pixels.camera.focal_px.prod().sqrt()
     gaussians = Gaussians(
         means=positions[0],

@@ -6,28 +6,15 @@ from diff4splat.training.batches.requests.image_requests import draw_image_reque
 from diff4splat.training.batches.requests.object_image import random_object_image
 from diff4splat.training.batches.requests.present import name_maps
 from diff4splat.training.batches.requests.request_batch import RequestBatch, collate_requests
-from diff4splat.training.batches.samples import ClipSamples
-from diff4splat.training.recipe.stage import StageRecipe
+from diff4splat.training.batches.samples import SamplesOfClips
 from diff4splat.training.stage import SampleKey
 
 REQUESTS = 5
 """Prompts per image: they cost little beside the image."""
 
 
-class RequestSamples:
+class RequestSamples(SamplesOfClips):
     """Images with prompts, from the clips that a recipe names."""
-
-    def __init__(self, clips: ClipSamples) -> None:
-        self.clips, self.recipe = clips, clips.recipe
-
-    @classmethod
-    def open(cls, recipe: StageRecipe, seed: int) -> "RequestSamples":
-        """The sources that the recipe names.
-
-        Raises:
-            InputError, FileFormatError: a folder is not one of shards.
-        """
-        return cls(ClipSamples.open(recipe, seed))
 
     def __getitem__(self, sample_index: int) -> RequestBatch:
         """A batch of one image.

@@ -10,29 +10,16 @@ from torch import Tensor
 from diff4splat.data.clip import Clip
 from diff4splat.errors import InputError
 from diff4splat.training.batches.random_images.random_window import draw_window
-from diff4splat.training.batches.samples import ClipSamples
+from diff4splat.training.batches.samples import SamplesOfClips
 from diff4splat.training.batches.shadows.shadow_batch import ShadowBatch, collate_shadows
-from diff4splat.training.recipe.stage import StageRecipe
 from diff4splat.training.stage import SampleKey
 
 LEAST_STRENGTH = 1e-3
 """Added to the mean brightness of a shadow: objects without any are shown, too."""
 
 
-class ShadowSamples:
+class ShadowSamples(SamplesOfClips):
     """Pairs of images, from the clips that a recipe names."""
-
-    def __init__(self, clips: ClipSamples) -> None:
-        self.clips, self.recipe = clips, clips.recipe
-
-    @classmethod
-    def open(cls, recipe: StageRecipe, seed: int) -> "ShadowSamples":
-        """The sources that the recipe names.
-
-        Raises:
-            InputError, FileFormatError: a folder is not one of shards.
-        """
-        return cls(ClipSamples.open(recipe, seed))
 
     def __getitem__(self, sample_index: int) -> ShadowBatch:
         """A batch of one pair.

@@ -1,7 +1,7 @@
 """The object shadow: what one object takes from the light of all other pixels.
 
     image, mask that is not exact ─ object shadow ─ darkening ─┐
-    image, the same without the object ─ true darkening ───────┴ squared errors
+    image, the same without the object ─ true darkening ───────┴ errors
 
 Axes: ``b`` images, ``h w`` pixels.
 """
@@ -42,7 +42,7 @@ class ObjectShadowStage(ModelStage):
     def forward(self, batch: ShadowBatch) -> Terms:
         """The terms ``darkening`` and ``lit_colors``."""
         losses = self.plan.recipe.losses
-        light = draw_light(self.random.per_sample(batch, "light"), _rgb(batch.images).float())
+        light = draw_light(self.random.per_sample(batch, "light"), _rgb(batch.images))
         image, without = (light.lit(_rgb(one)) for one in (batch.images, batch.without))
         noisy = light.noisy(image, self.random.per_step(batch, "noise"))
         image, without = image.clamp_max(1), without.clamp_max(1)

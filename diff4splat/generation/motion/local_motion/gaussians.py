@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
-from diff4splat.generation.layered_image.gaussians import GaussianSet, offset_motion
+from diff4splat.generation.layered_image.gaussians import GONE, GaussianSet, offset_motion
 from diff4splat.generation.layered_image.types import NO_PIXEL, ImageLayer, LayeredImage
 from diff4splat.generation.motion.local_motion.hidden_side import (
     RIM_PX,
@@ -25,9 +25,6 @@ from diff4splat.geometry.camera import Camera, project
 from diff4splat.geometry.depth import unproject
 from diff4splat.scene.gaussians import Gaussians
 from diff4splat.scene.motion.keyframes import KeyframeMotion
-
-GONE = math.log(0.02)
-"""Growth of what vanishes."""
 
 
 def with_local_motion(

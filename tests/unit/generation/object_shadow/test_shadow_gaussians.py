@@ -5,10 +5,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from diff4splat.generation.layered_image.gaussians import image_gaussians
+from diff4splat.generation.layered_image.gaussians import GONE, image_gaussians
 from diff4splat.generation.layered_image.types import ImageLayer, LayeredImage
 from diff4splat.generation.object_shadow.gaussians import (
-    GONE,
     shadow_gaussians,
     veil,
     with_shadows,

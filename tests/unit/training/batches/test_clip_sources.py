@@ -192,7 +192,7 @@ def test_folders_that_give_no_clip_are_named(tmp_path: Path, folder: Path) -> No
     stills = write_shards(tmp_path / "stills", still=2, moving=0)
     shards = [
         SourceSettings(kind="shards", folder=str(one), still_share=share, weight=weight)
-        for one, share, weight in ((folder, 0.0, 1), (stills, 0.0, 1), (stills, 0.0, 0))
+        for one, share, weight in ((folder, 0.0, 1.0), (stills, 0.0, 1.0), (stills, 0.0, 0.0))
     ]
     (line,) = unused_sources(replace(DATA, sources=tuple(shards)))
     assert str(stills) in line and "moving clips" in line and "still_share" in line
