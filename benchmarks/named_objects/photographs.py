@@ -1,7 +1,9 @@
 """Whether objects of photographs are found: ``python -m benchmarks.named_objects.photographs``.
 
-Four photographs of scikit-image, with outlines drawn by hand (``photographs.json``). Columns as in
-``benchmarks.named_objects``; the image shows what moves, for every sentence and model.
+Four photographs of scikit-image, with outlines drawn by hand (``photographs.json``), and with
+``--opencv FOLDER`` eight of OpenCV's samples (Debian package ``opencv-doc``, folder ``data``).
+Columns as in ``benchmarks.named_objects``; the image shows what moves, for every sentence and
+model.
 """
 
 import argparse
@@ -26,11 +28,12 @@ from benchmarks.named_objects.__main__ import (
     without_classifier,
 )
 from diff4splat.generation.plan import MOTION_PARTS
-from diff4splat.io.photos.images import write_png
+from diff4splat.io.photos.images import read_photo, write_png
 from diff4splat.io.pixels import unit_rgb
 from diff4splat.models.hub.model import Model, load_model
 
 OUTLINES = Path(__file__).with_name("photographs.json")
+OPENCV_OUTLINES = Path(__file__).with_name("opencv_photographs.json")
 SHORT_SIDE_PX, MULTIPLE_PX = 128, 16
 TILE_PX, DARK, PER_ROW = (160, 224), 0.2, 3
 
@@ -50,11 +53,12 @@ class Asked:
         return f"the {self.name} moves to the left"
 
 
-def all_asked() -> list[Asked]:
-    """Every name of every photograph."""
+def all_asked(opencv: Path | None = None) -> list[Asked]:
+    """Every name of every photograph; of those in a folder of OpenCV's samples, if it is given."""
+    outlines = OPENCV_OUTLINES if opencv else OUTLINES
     asked = []
-    for photograph, content in json.loads(OUTLINES.read_text(encoding="utf-8")).items():
-        rgb = reduced(getattr(skimage.data, photograph)())
+    for photograph, content in json.loads(outlines.read_text(encoding="utf-8")).items():
+        rgb = reduced(_pixels(photograph, opencv))
         nothing = torch.zeros(rgb.shape[:2], dtype=torch.bool)
         named = {
             name: outlined(one["outline"], rgb)
@@ -64,6 +68,13 @@ def all_asked() -> list[Asked]:
         for name, truth in (named | dict.fromkeys(content["absent"], nothing)).items():
             asked.append(Asked(photograph=photograph, name=name, rgb=rgb, truth=truth))
     return asked
+
+
+def _pixels(photograph: str, opencv: Path | None) -> np.ndarray:
+    if opencv is None:
+        return getattr(skimage.data, photograph)()
+    file = next(opencv.glob(f"{photograph}.*"), opencv / photograph)
+    return (read_photo(file, convert=True).rgb.numpy() * 255).round().astype(np.uint8)
 
 
 def reduced(image: np.ndarray) -> Tensor:
@@ -107,9 +118,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("models", nargs="+")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--opencv", type=Path)
     parser.add_argument("--without-classifier", action="store_true")
     options = parser.parse_args()
-    asked, columns = all_asked(), []
+    asked, columns = all_asked(options.opencv), []
     lines = ["| model |" + " | ".join(COLUMNS) + " |", "|---|" + "---:|" * len(COLUMNS)]
     for name in options.models:
         model = load_model(name, parts=MOTION_PARTS)

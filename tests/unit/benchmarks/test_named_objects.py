@@ -3,6 +3,7 @@
 import json
 import math
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
 import torch
@@ -12,6 +13,7 @@ from benchmarks.named_objects.__main__ import auc, collect, means, measure
 from benchmarks.named_objects.requests import asked_image
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.generation.motion.motion_mask import MotionProbability
+from diff4splat.io.photos.images import write_png
 from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
 
@@ -55,18 +57,33 @@ def test_every_object_can_be_asked_for() -> None:
     assert len(all_.requests) > len(few.requests)
 
 
-def test_outlines_of_photographs_are_shares_and_names_are_of_one_object() -> None:
+@pytest.mark.parametrize("table", ["OUTLINES", "OPENCV_OUTLINES"])
+def test_outlines_of_photographs_are_shares_and_names_are_of_one_object(table: str) -> None:
     pytest.importorskip("skimage", reason="pip install scikit-image")
-    from benchmarks.named_objects.photographs import OUTLINES, outlined
+    from benchmarks.named_objects import photographs
 
-    for content in json.loads(OUTLINES.read_text(encoding="utf-8")).values():
+    outlines, outlined = getattr(photographs, table), photographs.outlined
+    for content in json.loads(outlines.read_text(encoding="utf-8")).values():
         names = [name for one in content["objects"].values() for name in one["names"]]
         names += content["absent"]
         assert len(set(names)) == len(names)
         for one in content["objects"].values():
             assert all(0 <= share <= 1 for corner in one["outline"] for share in corner)
             mask = outlined(one["outline"], torch.zeros(128, 192, 3))
-            assert 0.005 < float(mask.double().mean()) < 0.8
+            assert 0.002 < float(mask.double().mean()) < 0.8
+
+
+def test_photographs_of_a_folder_are_asked_about(tmp_path: Path) -> None:
+    pytest.importorskip("skimage", reason="pip install scikit-image")
+    from benchmarks.named_objects.photographs import OPENCV_OUTLINES, all_asked
+
+    content = json.loads(OPENCV_OUTLINES.read_text(encoding="utf-8"))
+    for photograph in content:
+        write_png(torch.full((130, 200, 3), 0.5), tmp_path / f"{photograph}.png")
+    asked = all_asked(tmp_path)
+    assert {one.photograph for one in asked} == set(content)
+    assert all(one.rgb.shape == (128, 192, 3) for one in asked)
+    assert sum(not bool(one.truth.any()) for one in asked) == 3 * len(content)
 
 
 def test_means_have_every_column() -> None:
