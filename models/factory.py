@@ -28,7 +28,6 @@ from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.motion_unet.unet import MotionUNet
 from diff4splat.models.networks import PARTS, Networks, model_parts
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
-from diff4splat.models.object_mask.ensemble import ObjectMaskEnsemble
 from diff4splat.models.object_mask.mask_heads import HeadShape
 from diff4splat.models.object_mask.network import ObjectMaskNet
 from diff4splat.models.object_shadow.network import ObjectShadowNet
@@ -133,9 +132,7 @@ def _object_mask(config: ModelConfig) -> nn.Module:
     )
     if not mask.image_backbone:
         return ObjectMaskNet(shape)
-    if len(mask.backbone_sizes) == 1:
-        return BackboneObjectMaskNet(shape, mask.backbone_size)
-    return ObjectMaskEnsemble(shape, mask.backbone_sizes)
+    return BackboneObjectMaskNet(shape, mask.backbone_size)
 
 
 def _text_encoder(config: ModelConfig) -> nn.Module:

@@ -10,7 +10,6 @@ from diff4splat.models.image_backbone.public_weights import (
 from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.image_classifier.network import ImageClassifier
 from diff4splat.models.networks import Networks
-from diff4splat.models.object_mask.ensemble import ObjectMaskEnsemble
 
 
 def start_from_public_backbones(networks: Networks, parts: Sequence[str]) -> None:
@@ -25,14 +24,12 @@ def start_from_public_backbones(networks: Networks, parts: Sequence[str]) -> Non
         if isinstance(network, ImageClassifier):
             network.cells.load_state_dict(public_classifier_weights())
             continue
-        members = network.members if isinstance(network, ObjectMaskEnsemble) else [network]
-        for member in members:
-            if not isinstance(member, BackboneUNet):
-                raise ConfigError(
-                    f"public_backbone: expected parts on the image backbone, got {part}; set "
-                    f"model.{part}.image_backbone or leave public_backbone out"
-                )
-            fill_backbone(member)
+        if not isinstance(network, BackboneUNet):
+            raise ConfigError(
+                f"public_backbone: expected parts on the image backbone, got {part}; set "
+                f"model.{part}.image_backbone or leave public_backbone out"
+            )
+        fill_backbone(network)
 
 
 def fill_backbone(network: BackboneUNet) -> None:

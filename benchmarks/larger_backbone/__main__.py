@@ -41,8 +41,6 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     model = load_model(arguments.model)
-    if len(model.config.object_mask.backbone_sizes) > 1 and arguments.part == "object_mask":
-        parser.error("--model: expected one object mask, got an ensemble; name another model")
     if getattr(model.config, arguments.part).backbone_size == arguments.size:
         expected = f"--model: expected another backbone than {arguments.size}"
         parser.error(f"{expected}, got it; name one in --size")

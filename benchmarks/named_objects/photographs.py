@@ -1,7 +1,7 @@
 """Whether objects of photographs are found: ``python -m benchmarks.named_objects.photographs``.
 
-Four photographs of scikit-image, with outlines drawn by hand (``photographs.json``), and with
-``--opencv FOLDER`` eight of OpenCV's samples (Debian package ``opencv-doc``, folder ``data``).
+Four photographs of scikit-image, or with ``--opencv FOLDER`` eight of OpenCV's samples (Debian
+package ``opencv-doc``, folder ``data``), with outlines drawn by hand (``photographs.json``).
 Columns as in ``benchmarks.named_objects``; the image shows what moves, for every sentence and
 model.
 """

@@ -8,7 +8,6 @@ from diff4splat.models.config.checks import require, require_counts, require_opt
 BACKBONE_MULTIPLE_PX = 32
 """Image sides that the image backbone takes are multiples of it."""
 BackboneSize = Literal["lite0", "lite2"]
-SecondBackbone = Literal["none", "lite0", "lite2"]
 """Of EfficientNet-Lite: with the larger one the depth prior has 6.7 million weights, else 5.3, the
 object mask 5.3 million, else 4.8."""
 MAX_LEVELS, MAX_WIDTH = 10, 1 << 14
@@ -54,8 +53,6 @@ class ObjectMaskConfig:
     """Whether it has a second encoder, the image backbone (ADR 32)."""
     backbone_size: BackboneSize = "lite0"
     """Of the image backbone."""
-    second_backbone: SecondBackbone = "none"
-    """Of a second network, whose logits are averaged with those of the first (ADR 58)."""
     instance_channels: int = 0
     """Of the vectors that separate instances, 2 or more; 0 leaves them out (ADR 36)."""
     image_classifier: bool = False
@@ -68,10 +65,6 @@ class ObjectMaskConfig:
         expected = "0, or 2 or more with an object mask"
         require(fits, "ObjectMaskConfig.instance_channels", expected, self.instance_channels)
         _require_backbone_fits(self)
-        fits = self.image_backbone or self.second_backbone == "none"
-        fits = fits and self.second_backbone in get_args(SecondBackbone)
-        expected = "none, or lite0 or lite2 with the image backbone"
-        require(fits, "ObjectMaskConfig.second_backbone", expected, self.second_backbone)
         fits = self.used or not self.image_classifier
         where = "ObjectMaskConfig.image_classifier"
         require(fits, where, "false without an object mask", self.image_classifier)
@@ -80,12 +73,6 @@ class ObjectMaskConfig:
     def used(self) -> bool:
         """Whether there is such a network."""
         return self.width > 0
-
-    @property
-    def backbone_sizes(self) -> tuple[BackboneSize, ...]:
-        """Of every network of the ensemble."""
-        second = self.second_backbone
-        return (self.backbone_size,) if second == "none" else (self.backbone_size, second)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

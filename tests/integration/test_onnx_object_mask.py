@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
@@ -17,22 +16,16 @@ from diff4splat.models.hub.model import Model
 CHANNELS = 3
 
 
-def config(**settings: Any) -> ModelConfig:
-    mask = ObjectMaskConfig(width=4, instance_channels=CHANNELS, **settings)
+def config() -> ModelConfig:
+    mask = ObjectMaskConfig(width=4, instance_channels=CHANNELS)
     motion = MotionUNetConfig(width=8, heads=1)
     return replace(tiny_size(), motion_unet=motion, object_mask=mask)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "settings", [{}, {"image_backbone": True, "second_backbone": "lite2"}], ids=["one", "ensemble"]
-)
-def test_mask_and_instances_are_those_of_the_network(
-    settings: dict[str, Any], tmp_path: Path
-) -> None:
-    size = config(**settings)
-    model = Model(config=size, networks=create_networks(size))
-    image, text = torch.rand(1, 3, 32, 48), torch.randn(1, 4, size.text.width)
+def test_mask_and_instances_are_those_of_the_network(tmp_path: Path) -> None:
+    model = Model(config=config(), networks=create_networks(config()))
+    image, text = torch.rand(1, 3, 32, 48), torch.randn(1, 4, config().text.width)
     graph = exported_part(model, tmp_path, "object_mask", ("mask_logits", "instances"))
     with torch.no_grad():
         found = graph.predict_mask_and_instances(image, text)

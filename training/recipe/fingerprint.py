@@ -75,7 +75,6 @@ def _without_plain(model: Mapping[str, Any]) -> dict[str, Any]:
         ("text", "encoder"): "bytes",
         ("monocular_depth", "backbone_size"): "lite0",
         ("object_mask", "backbone_size"): "lite0",
-        ("object_mask", "second_backbone"): "none",
     }
     return {
         key: {n: one for n, one in value.items() if plain.get((key, n)) != one}

@@ -1,18 +1,10 @@
 """The start of a network on a larger backbone."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import pytest
 import torch
 
-from benchmarks.larger_backbone import ensemble
 from benchmarks.larger_backbone.__main__ import main
 from benchmarks.larger_backbone.fitted_start import fit, start_from
-from diff4splat.models.config.priors import BackboneSize, MotionUNetConfig, ObjectMaskConfig
-from diff4splat.models.config.sizes import test_size as tiny_size
-from diff4splat.models.factory import create_networks
-from diff4splat.models.hub.model import Model, load_model, save_model
 from diff4splat.models.image_backbone.efficientnet_lite import EfficientNetLite
 from diff4splat.models.image_backbone.unet import BackboneUNet
 from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
@@ -79,51 +71,3 @@ def test_the_backbone_that_a_part_has_is_refused(
         main()
     assert stop.value.code == 2
     assert "expected another backbone than lite2" in capsys.readouterr().err
-
-
-def model_with_mask(size: BackboneSize, seed: int) -> Model:
-    mask = ObjectMaskConfig(width=4, image_backbone=True, backbone_size=size, instance_channels=3)
-    motion = MotionUNetConfig(width=8, heads=1)
-    config = replace(tiny_size(), motion_unet=motion, object_mask=mask)
-    return Model(config=config, networks=create_networks(config, seed=seed))
-
-
-@torch.no_grad()
-def test_an_ensemble_has_the_masks_of_both_models(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    models = [model_with_mask("lite0", 1), model_with_mask("lite2", 2)]
-    folders = [tmp_path / name for name in ("first", "second", "both")]
-    for model, folder in zip(models, folders, strict=False):
-        save_model(model, folder)
-    monkeypatch.setattr("sys.argv", ["ensemble", *map(str, folders[:2]), "--out", str(folders[2])])
-    ensemble.main()
-    both = load_model(str(folders[2]))
-    assert both.config.object_mask.backbone_sizes == ("lite0", "lite2")
-    inputs = torch.rand(1, 3, 32, 32), torch.rand(1, 4, both.config.text.width)
-    maps = [one.networks.object_mask.predict_mask_and_instances(*inputs) for one in models]
-    logits, vectors = both.networks.object_mask.predict_mask_and_instances(*inputs)
-    torch.testing.assert_close(logits, (maps[0][0] + maps[1][0]) / 2)
-    torch.testing.assert_close(vectors, maps[1][1])
-    words = [one.networks.text_encoder.state_dict() for one in (both, models[0])]
-    assert all(torch.equal(words[0][name], words[1][name]) for name in words[0])
-
-
-def test_an_ensemble_of_an_ensemble_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-) -> None:
-    first = model_with_mask("lite0", 1)
-    save_model(ensemble.ensemble(first, model_with_mask("lite2", 2)), tmp_path / "both")
-    save_model(first, tmp_path / "first")
-    names = [str(tmp_path / name) for name in ("first", "both", "new")]
-    monkeypatch.setattr("sys.argv", ["ensemble", *names[:2], "--out", names[2]])
-    with pytest.raises(SystemExit) as stop:
-        ensemble.main()
-    assert stop.value.code == 2
-    assert "SECOND: expected one object mask on an image backbone" in capsys.readouterr().err
-    assert not (tmp_path / "new").exists()
-    arguments = ["--part", "object_mask", "--model", names[1], "--out", names[2]]
-    monkeypatch.setattr("sys.argv", ["larger_backbone", *arguments])
-    with pytest.raises(SystemExit):
-        main()
-    assert "got an ensemble" in capsys.readouterr().err

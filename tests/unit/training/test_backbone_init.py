@@ -16,7 +16,6 @@ from diff4splat.models.monocular_depth.backbone_network import BackboneDepthNet
 from diff4splat.models.monocular_depth.network import MonocularDepthNet
 from diff4splat.models.networks import Networks
 from diff4splat.models.object_mask.backbone_network import BackboneObjectMaskNet
-from diff4splat.models.object_mask.ensemble import ObjectMaskEnsemble
 from diff4splat.models.object_mask.mask_heads import HeadShape
 from diff4splat.training import backbone_init
 from diff4splat.training.prerequisites import last_checkpoint
@@ -51,17 +50,6 @@ def test_a_shorter_backbone_takes_the_weights_that_it_has(monkeypatch: pytest.Mo
     assert len(taken) < len(public)
     for name, value in taken.items():
         torch.testing.assert_close(value, public[name])
-
-
-def test_every_member_of_an_ensemble_takes_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    torch.manual_seed(1)
-    public = {size: EfficientNetLite(size=size).state_dict() for size in ("lite0", "lite2")}
-    monkeypatch.setattr(backbone_init, "public_backbone_weights", public.__getitem__)
-    network = ObjectMaskEnsemble(HeadShape(width=4, text_width=8), ("lite2", "lite0"))
-    backbone_init.start_from_public_backbones(Networks(object_mask=network), ["object_mask"])
-    for member, size in zip(network.members, ("lite2", "lite0"), strict=True):
-        for name, value in member.backbone.state_dict().items():
-            torch.testing.assert_close(value, public[size][name])
 
 
 def test_a_part_without_a_backbone_is_refused() -> None:

@@ -20,7 +20,7 @@ from diff4splat.models.config.model import (
     TextConfig,
     VaeConfig,
 )
-from diff4splat.models.config.priors import BackboneSize, SecondBackbone
+from diff4splat.models.config.priors import BackboneSize
 from diff4splat.models.config.sizes import SIZES, paper_size, size_by_name, small_size, test_size
 
 LEAVES = [
@@ -73,7 +73,6 @@ BOUND = [
     ("vae", "tile_px"),
     ("monocular_depth", "backbone_size"),
     ("object_mask", "backbone_size"),
-    ("object_mask", "second_backbone"),
     ("joint", "level_width"),
     ("joint", "patch_frames"),
     ("image_encoder", "width"),
@@ -136,16 +135,6 @@ def test_the_size_of_the_backbone_changes_the_fingerprint() -> None:
         for size in get_args(BackboneSize)
     ]
     assert len({config.fingerprint() for config in configs}) == len(configs) == 4
-
-
-def test_a_second_object_mask_changes_the_fingerprint() -> None:
-    base = dataclasses.replace(test_size(), motion_unet=MotionUNetConfig(width=8))
-    masks = [
-        dataclasses.replace(ON_BACKBONE["object_mask"], second_backbone=one)
-        for one in get_args(SecondBackbone)
-    ]
-    prints = {dataclasses.replace(base, object_mask=mask).fingerprint() for mask in masks}
-    assert len(prints) == len(masks) == 3
 
 
 def test_vectors_of_instances_change_the_fingerprint() -> None:
@@ -275,14 +264,6 @@ def test_malformed_json_is_a_config_error(text: str) -> None:
                 {"backbone_size": "lite2"},
                 {"backbone_size": "lite1", "image_backbone": True},
                 {"backbone_size": None, "image_backbone": True},
-            )
-        ),
-        *(
-            (ObjectMaskConfig, {"width": 4, **change}, "ObjectMaskConfig.second_backbone: expected")
-            for change in (
-                {"second_backbone": "lite0"},
-                {"second_backbone": "lite1", "image_backbone": True},
-                {"second_backbone": None, "image_backbone": True},
             )
         ),
         (

@@ -132,16 +132,6 @@ def test_runs_from_before_sizes_of_the_backbone_go_on(name: str) -> None:
     assert fingerprint(larger, name) != fingerprint(first, name)
 
 
-def test_runs_from_before_ensembles_go_on() -> None:
-    recipe, name = recipe_by_name("small"), "object_mask"
-    second = "model.object_mask.second_backbone="
-    one, two = (override(recipe, [f"{second}{size}"]) for size in ("none", "lite2"))
-    data = recipe_to_dict(one)
-    del data["model"][name]["second_backbone"]
-    assert fingerprint_of(data, name, "") == fingerprint(one, name)
-    assert fingerprint(two, name) != fingerprint(one, name)
-
-
 def test_stages_that_do_not_exist_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"--stage: expected one of vae, .* got 'last'"):
         recipe_by_name("small").stage("last")
