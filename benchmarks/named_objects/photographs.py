@@ -27,9 +27,10 @@ from benchmarks.named_objects.__main__ import (
     motion_of,
     without_classifier,
 )
+from diff4splat.errors import InputError
 from diff4splat.generation.plan import MOTION_PARTS
 from diff4splat.io.photos.images import read_photo, write_png
-from diff4splat.io.pixels import unit_rgb
+from diff4splat.io.pixels import to_bytes, unit_rgb
 from diff4splat.models.hub.model import Model, load_model
 
 OUTLINES = Path(__file__).with_name("photographs.json")
@@ -73,8 +74,7 @@ def all_asked(opencv: Path | None = None) -> list[Asked]:
 def _pixels(photograph: str, opencv: Path | None) -> np.ndarray:
     if opencv is None:
         return getattr(skimage.data, photograph)()
-    file = next(opencv.glob(f"{photograph}.*"), opencv / photograph)
-    return (read_photo(file, convert=True).rgb.numpy() * 255).round().astype(np.uint8)
+    return to_bytes(read_photo(opencv / photograph, convert=True).rgb)
 
 
 def reduced(image: np.ndarray) -> Tensor:
@@ -121,7 +121,10 @@ def main() -> None:
     parser.add_argument("--opencv", type=Path)
     parser.add_argument("--without-classifier", action="store_true")
     options = parser.parse_args()
-    asked, columns = all_asked(options.opencv), []
+    try:
+        asked, columns = all_asked(options.opencv), []
+    except InputError as error:
+        parser.error(f"--opencv: {error}")
     lines = ["| model |" + " | ".join(COLUMNS) + " |", "|---|" + "---:|" * len(COLUMNS)]
     for name in options.models:
         model = load_model(name, parts=MOTION_PARTS)

@@ -5,6 +5,8 @@ import math
 from collections import defaultdict
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 import torch
 from oracles_clips import make_clip
@@ -13,7 +15,6 @@ from benchmarks.named_objects.__main__ import auc, collect, means, measure
 from benchmarks.named_objects.requests import asked_image
 from diff4splat.captions.vocabulary import UNSEEN_NOUNS
 from diff4splat.generation.motion.motion_mask import MotionProbability
-from diff4splat.io.photos.images import write_png
 from diff4splat.training.batches.requests.present import TRAINING_NOUNS
 
 
@@ -79,11 +80,25 @@ def test_photographs_of_a_folder_are_asked_about(tmp_path: Path) -> None:
 
     content = json.loads(OPENCV_OUTLINES.read_text(encoding="utf-8"))
     for photograph in content:
-        write_png(torch.full((130, 200, 3), 0.5), tmp_path / f"{photograph}.png")
+        cv2.imwrite(str(tmp_path / photograph), np.full((130, 200, 3), 128, np.uint8))
     asked = all_asked(tmp_path)
     assert {one.photograph for one in asked} == set(content)
     assert all(one.rgb.shape == (128, 192, 3) for one in asked)
+    assert all(float((one.rgb - 128 / 255).abs().max()) < 0.01 for one in asked)
     assert sum(not bool(one.truth.any()) for one in asked) == 3 * len(content)
+
+
+def test_a_folder_without_the_photographs_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    pytest.importorskip("skimage", reason="pip install scikit-image")
+    from benchmarks.named_objects import photographs
+
+    monkeypatch.setattr("sys.argv", ["photographs", "small", "--opencv", str(tmp_path)])
+    with pytest.raises(SystemExit) as stop:
+        photographs.main()
+    assert stop.value.code == 2
+    assert "messi5.jpg" in capsys.readouterr().err
 
 
 def test_means_have_every_column() -> None:
